@@ -23,17 +23,17 @@ def solve(system: System, tolerance: float) -> dict[str, Any]:
     models = [ExactLaw(t.law, Cells.around(t.law.convex, t.argument(x.array_r), radial=t.radial)) for t in system.terms]
     snes = PETSc.SNES().create(system.comm)
     snes.setType("vinewtonrsls")
-    residual = system.load.duplicate()
-    snes.setFunction(lambda _, u, f: system.residual(u, f, models), residual)
-    system.jacobian.matrix.setNearNullSpace(system.near_null)
-    snes.setJacobian(lambda _, u, j, p: system.jacobian.set_rates(system.tangents(u, models)), system.jacobian.matrix)
+    residual, equations, jacobian = system.load.duplicate(), system.equations, system.jacobian
+    snes.setFunction(lambda _, u, f: equations.residual(u, f, models), residual)
+    jacobian.matrix.setNearNullSpace(system.near_null)
+    snes.setJacobian(lambda _, u, j, p: jacobian.set_rates(equations.tangents(u, models)), jacobian.matrix)
     snes.setVariableBounds(system.lower, system.upper)
     snes.setTolerances(atol=0.0, rtol=tolerance, max_it=_MOST)
     snes.getKSP().setType("cg")
     snes.getKSP().setTolerances(rtol=tolerance)
     snes.getKSP().getPC().setType("gamg")
     snes.solve(None, x)
-    system.residual(x, residual, models)
+    equations.residual(x, residual, models)
     measure = solver.measure(x, residual, system.lower, system.upper)
     return {
         "newton": snes.getIterationNumber(),

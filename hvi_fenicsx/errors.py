@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from pathlib import Path
 
 
 class ExitCode(IntEnum):
@@ -13,7 +14,7 @@ class ExitCode(IntEnum):
     ERROR = 1
     """Anything else."""
     BAD_INPUT = 2
-    """The scene or the command line cannot be used."""
+    """The scene or the command line cannot be used, or a file cannot be written."""
     NO_SOLUTION = 3
     """No solution exists: the state is *escapes*."""
     NOT_CONVERGED = 4
@@ -40,6 +41,24 @@ class InputError(HviError, ValueError):
     exit_code = ExitCode.BAD_INPUT
 
 
+class NotWrittenError(InputError):
+    """A file could not be written: there is no room for it, or it may not be there.
+
+    Args:
+        file: which one.
+        reason: why, and how to mend it.
+        words: all that is said of it; by default file and reason.
+    """
+
+    def __init__(self, file: Path, reason: str, words: str = "") -> None:
+        super().__init__(words or f"{file} could not be written: {reason}")
+        self.file, self.reason = file, reason
+
+    def __reduce__(self) -> tuple[type[NotWrittenError], tuple[Path, str, str]]:
+        """What other ranks make it of."""
+        return type(self), (self.file, self.reason, str(self))
+
+
 class SolverError(HviError, RuntimeError):
     """A solver broke down; the message carries PETSc's own name for the reason."""
 
@@ -50,3 +69,10 @@ class Interrupted(HviError):
     """A signal came before there was anything to write."""
 
     exit_code = ExitCode.INTERRUPTED
+
+    def __init__(self) -> None:
+        super().__init__("interrupted; nothing was written")
+
+    def __reduce__(self) -> tuple[type[Interrupted], tuple[()]]:
+        """What other ranks make it of."""
+        return type(self), ()

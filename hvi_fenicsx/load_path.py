@@ -122,7 +122,8 @@ class LoadPath:
     def headline(self) -> str:
         """The largest factor that is borne, by which state, and what happens then, in one line."""
         if not self.rows:
-            return f"no state is borne: {self.reason or self.end}"
+            known = "is borne" if self.end == End.ESCAPES else "was found"
+            return f"no state {known}: {self.reason or self.end}"
         row = self.rows[self.peak]
         kind = "limit point" if row.event == Event.FOLD else f"{'stable' if row.stable else 'unstable'} state"
         return f"largest factor that is borne: {self._shown(self.peak)} ({kind}, row {self.peak}); {self._then()}"

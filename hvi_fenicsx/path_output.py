@@ -7,14 +7,15 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from .equilibrium_paths.state import End
-from .errors import HviError
 from .load_path import LoadPath
 from .path import journal
 from .path.following import PathRun
 from .report.html import path_page
 from .results import ResultFolder, path_files
 from .results.path_files import Crossing
+from .results.whole import made
 from .results.write import write_record
+from .runtime import writing
 from .runtime.mpi import on_root
 from .workflow import unsolved
 
@@ -35,7 +36,7 @@ def write(
         run: that found the path.
         path: the path.
         given: further entries of the summary.
-        tell: is given a line where picture or page fail, on rank 0.
+        tell: is given a line where picture or page cannot be made, on rank 0.
         draw: whether to make a picture.
 
     Returns:
@@ -63,17 +64,14 @@ def _crossings(run: PathRun) -> Iterator[Crossing]:
 def _from_files(
     folder: ResultFolder, record: dict[str, Any], path: LoadPath, tell: Callable[[str], None], *, draw: bool
 ) -> None:
-    """Picture and page, from the other files; one that fails costs a line. Rank 0 only."""
+    """Picture and page, from the other files; that one cannot be made costs a line. Rank 0 only."""
     write_record(folder.work, record)
     if path.end == End.INTERRUPTED and (folder.target / journal.NAME).exists():
-        shutil.copyfile(folder.target / journal.NAME, folder.work / journal.NAME)
-    if not path.rows:
-        return
-    try:
-        if draw:
-            from .report.pictures import path_picture  # loads the plotting library
+        with writing.told(folder.work / journal.NAME):
+            shutil.copyfile(folder.target / journal.NAME, folder.work / journal.NAME)
+    if path.rows and draw:
+        from .report.pictures import path_picture  # loads the plotting library
 
-            path_picture.draw(folder.work)
-        path_page.write(folder.work)
-    except HviError as error:
-        tell(f"picture and report: {error}")
+        made("picture", tell, lambda: path_picture.draw(folder.work))
+    if path.rows:
+        made("report", tell, lambda: path_page.write(folder.work))

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from .certify import certificate, correction, plausibility
 from .certify.certificate import Examination
@@ -75,7 +74,9 @@ def finish(
         estimating: whether to estimate the error, which takes about as long as the solve.
     """
     found = find_solution(prepared, progress, interrupted, start)
-    return found.estimated() if estimating else found.solution
+    solution = found.estimated() if estimating else found.solution
+    found.free_levels()
+    return solution
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,26 +93,32 @@ class FoundSolution:
     solution: Solution
     levels: Levels
 
-    def estimated(self) -> Solution:
+    def estimated(self, interrupted: Callable[[], bool] = never) -> Solution:
         """The solution with an estimate of its error, where one can be given. Collective.
 
         It takes about as long as the solve.
+
+        Args:
+            interrupted: whether to stop (collective); then nothing is estimated.
         """
         prepared, found = self.prepared, self.solution
         if found.solve_result is None or found.examination is None or not prepared.problem.has_potential:
             return found
-        if not found.examination.certificate.passed:
+        if not found.examination.certificate.passed or interrupted():
             return found
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, self.levels, found.solve_result.u, found.examination)
         return replace(found, estimate=errors, warnings=found.warnings + plausibility.of_estimate(errors))
 
     def free(self) -> None:
-        """Free the systems, and what solving them has left: on several ranks Python alone frees nothing. Collective."""
-        for system in (self.prepared.system, *(level.system for level in self.levels)):
-            system.free()
-            PETSc.garbage_cleanup(system.comm)
-            PETSc.garbage_cleanup(system.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
+        """Free the systems, and what solving them has left. Collective."""
+        self.free_levels()
+        self.prepared.system.free()
+
+    def free_levels(self) -> None:
+        """Free the systems of the coarser levels. Collective."""
+        for level in reversed(self.levels):
+            level.free()
 
 
 def find_solution(

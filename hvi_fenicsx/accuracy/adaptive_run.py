@@ -85,12 +85,16 @@ class AdaptiveRun:
     def finish(self) -> AccuracyResult:
         """Refine until the goal is reached, or cannot be. Collective."""
         while self.open:
+            if self._estimated is not None and self._asked():
+                self._give_up(self._estimated, "interrupted")
+                break
             start = time.perf_counter()
             found = self._next(self.level)
             if isinstance(found, str):
                 self._why = found
-            elif self._stopped_by_budget(found):
-                self._give_up(found)
+            elif self._estimated is not None and _is_stopped(found):
+                late = f"the mesh of {found.dofs:,} unknowns was not solved when the time had passed"
+                self._give_up(self._estimated, "interrupted" if self._asked() else late)
             else:
                 self.level = found
                 self._why = self._record(self.level, start)
@@ -102,6 +106,7 @@ class AdaptiveRun:
             steps=tuple(self.steps),
             why=None if self.goal.accuracy is None and self.steps else self._why,
             more=self._cost_of_more(),
+            interrupted=self._why is not None and self._asked(),
         )
 
     def _interrupted(self) -> bool:
@@ -114,17 +119,10 @@ class AdaptiveRun:
             return False
         return largest(self.comm, self.solver.timer.total) > self.goal.seconds
 
-    def _stopped_by_budget(self, level: AdaptiveLevel) -> bool:
-        """Whether a solve was stopped, and only by the time. Collective."""
-        result = level.solution.solve_result
-        return result is not None and result.interrupted and not self._asked() and self._overrun()
-
-    def _give_up(self, level: AdaptiveLevel) -> None:
+    def _give_up(self, kept: AdaptiveLevel, why: str) -> None:
         """Keep the last mesh with an error instead of one whose solve was stopped."""
-        assert self._estimated is not None
-        self.level, self._failures = self._estimated, 0
-        self._why = f"the mesh of {level.dofs:,} unknowns was not solved when the time had passed"
-        self.report(self._why)
+        self.level, self._failures, self._why = kept, 0, why
+        self.report(why)
 
     def _first(self) -> AdaptiveLevel:
         """The coarsest mesh that sees the data, solved to a loose tolerance. Collective."""
@@ -241,6 +239,12 @@ class AdaptiveRun:
         if self.goal.seconds is not None and expected > self.goal.seconds:
             return f"the next mesh of {dofs:,} unknowns would end after {expected:.0f} s"
         return None
+
+
+def _is_stopped(level: AdaptiveLevel) -> bool:
+    """Whether a solve was stopped, by a signal or by the time."""
+    result = level.solution.solve_result
+    return result is not None and result.interrupted
 
 
 def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:

@@ -61,6 +61,7 @@ class AccuracyResult:
         why: why it ended without reaching the goal; None where it was reached.
         more: what the accuracy asked for would cost, or a tenth of the error where it was reached or none was asked;
             None where no error is known.
+        interrupted: whether it ended because it was to stop.
         choice: how the degree was chosen; None where the scene states it, or there was no choice.
     """
 
@@ -71,12 +72,15 @@ class AccuracyResult:
     steps: tuple[AdaptiveStep, ...]
     why: str | None
     more: Cost | None
+    interrupted: bool
     choice: DegreeChoice | None = None
 
     @property
     def exit_code(self) -> int:
-        """The solution's, or *not converged* where the accuracy was not reached."""
+        """The solution's, or *interrupted* or *not converged* where the accuracy was not reached."""
         missed = self.goal.accuracy is not None and self.why is not None
+        if self.interrupted and not self.solution.exit_code:
+            return ExitCode.INTERRUPTED
         return self.solution.exit_code or (ExitCode.NOT_CONVERGED if missed else ExitCode.CERTIFIED)
 
     def as_dict(self) -> dict[str, Any]:

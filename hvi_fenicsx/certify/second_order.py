@@ -58,7 +58,7 @@ def _by_inertia(problem: Problem, u: fem.Function, found: Growth) -> str:
     for term in system.terms:
         argument = term.argument(x.array_r)
         models.append(ExactLaw(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
-    system.jacobian.set_rates(system.tangents(x, models))
+    system.jacobian.set_rates(system.equations.tangents(x, models))
     strong, weak = np.flatnonzero(found.strong), np.flatnonzero(found.weak)
     with negative_eigenvalues(system) as negative:
         if negative(strong) == 0:

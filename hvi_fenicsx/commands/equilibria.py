@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import console, results
-from ..errors import ExitCode, HviError
+from ..errors import ExitCode
 from ..preparation import Preparation, prepare
 from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
-from ..results.whole import picture_process, write_whole
+from ..results.whole import made, picture_process, write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root, time_over
 from ..runtime.signals import Interrupt
@@ -45,12 +45,14 @@ class Request:
         options: the words of the command line.
         prepared: the scene, assembled.
         folder: where the results go.
+        interrupted: whether to stop (collective).
         saved: what an earlier search left.
     """
 
     options: argparse.Namespace
     prepared: Preparation
     folder: results.ResultFolder
+    interrupted: Callable[[], bool]
     saved: Saved | None
 
 
@@ -69,8 +71,11 @@ def execute(options: argparse.Namespace) -> int:
     saved = on_root(COMM, lambda: search_file.read(goes_to, scene)) if options.resume else None
     display = telling.on_first_rank(log.TerminalDisplay)
     with target.opened(options, goes_to) as folder, log.Handlers(*display):
-        prepared = prepare(scene, COMM, timer)
-        return _run(Request(options=options, prepared=prepared, folder=folder, saved=saved))
+        prepared, interrupt = prepare(scene, COMM, timer), Interrupt(COMM)
+        interrupt.watch()
+        return _run(
+            Request(options=options, prepared=prepared, folder=folder, interrupted=interrupt.requested, saved=saved)
+        )
 
 
 def _proven(record: dict[str, Any]) -> bool:
@@ -80,28 +85,27 @@ def _proven(record: dict[str, Any]) -> bool:
 
 def _run(request: Request) -> int:
     """Search, write and tell; the exit code. Collective."""
-    interrupt = Interrupt(COMM)
-    interrupt.watch()
-    prepared, folder = request.prepared, request.folder
+    prepared, folder, interrupted = request.prepared, request.folder, request.interrupted
     run_logs = telling.on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
     with log.Handlers(*run_logs):
         telling.say(console.heading(prepared, COMM.size))
-        bodies, kept = Equilibria(prepared), SearchFile(folder, prepared.scene)
+        bodies, kept = Equilibria(prepared, interrupted=interrupted), SearchFile(folder, prepared.scene)
         found = bodies.find(
             lowest=request.options.lowest,
             gap=request.options.gap,
-            stop=_stop(interrupt, request.options.limit),
+            stop=_stop(interrupted, request.options.limit),
             report=_reporter(),
             saved=request.saved,
             keep=kept.keep,
         )
         on_root(COMM, lambda: kept.write_left(found.left))
-        code = _exit_code(prepared, found, interrupted=interrupt.requested())
+        code = _exit_code(prepared, found, interrupted=interrupted())
         telling.say([f"result: {found.reason}; {counted(found.nodes, 'box', 'boxes')}"])
         rows = list(_all_written(request, bodies, found))
         files.write(folder, prepared, found, rows, code, request.options.given)
         if rows:
-            on_root(COMM, lambda: _picture_and_page(folder.work, draw=not request.options.no_pictures))
+            draw = not request.options.no_pictures and not interrupted()
+            on_root(COMM, lambda: _picture_and_page(folder.work, draw=draw))
         telling.say(_lines(prepared, found, rows))
     on_root(COMM, lambda: telling.finish(run_logs))
     folder.commit(prepared.scene)
@@ -109,10 +113,10 @@ def _run(request: Request) -> int:
     return int(code)
 
 
-def _stop(interrupt: Interrupt, limit: float | None) -> Callable[[], bool]:
+def _stop(interrupted: Callable[[], bool], limit: float | None) -> Callable[[], bool]:
     """Whether to stop: a signal, or the time is over. Collective."""
     late = time_over(COMM, limit)
-    return lambda: interrupt.requested() or late()
+    return lambda: interrupted() or late()
 
 
 def _reporter() -> Callable[[str], None]:
@@ -127,13 +131,10 @@ def _reporter() -> Callable[[str], None]:
 
 
 def _picture_and_page(folder: Path, *, draw: bool) -> None:
-    """From the other files; one that fails costs a line. Rank 0 only."""
-    try:
-        if draw:
-            picture.draw(folder)
-        equilibria_page.write(folder)
-    except HviError as error:
-        telling.say([f"picture and report: {error}"])
+    """From the other files; that one cannot be made costs a line. Rank 0 only."""
+    if draw:
+        made("picture", telling.LOG.info, lambda: picture.draw(folder))
+    made("report", telling.LOG.info, lambda: equilibria_page.write(folder))
 
 
 def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> ExitCode:
@@ -153,10 +154,11 @@ def _all_written(request: Request, bodies: Equilibria, found: Found) -> Iterator
 
 
 def _written(request: Request, bodies: Equilibria, found: Found, i: int) -> files.Row:
-    """Write one equilibrium into a result folder of its own; its row. Collective."""
+    """Write one equilibrium into a result folder of its own; its row. After a signal nothing is drawn. Collective."""
     solution, folder = bodies.solution(found.points[i]), request.folder
     name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
-    drawn, dimension = not request.options.no_pictures and i < MOST_DRAWN, request.prepared.scene.dimension
+    drawn = not request.options.no_pictures and i < MOST_DRAWN and not request.interrupted()
+    dimension = request.prepared.scene.dimension
     with (
         results.ResultFolder(COMM, folder.work / name) as own,
         picture_process(own, dimension, telling.LOG.info, wanted=drawn) as pictures,

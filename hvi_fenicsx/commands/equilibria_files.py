@@ -14,7 +14,7 @@ from ..certify.contact_state import ContactState
 from ..errors import ExitCode
 from ..preparation import Preparation
 from ..results.write import write_record
-from ..runtime import memory, versions
+from ..runtime import memory, versions, writing
 from ..runtime.mpi import largest, on_root
 from ..scene import Scene, dump_scene
 from ..solution import Solution
@@ -109,11 +109,11 @@ def write(
 
 
 def _write(folder: results.ResultFolder, scene: Scene, found: Found, rows: list[Row], record: dict[str, Any]) -> None:
-    with (folder.work / TABLE).open("w", encoding="utf-8", newline="") as file:
+    with writing.told(folder.work / TABLE), (folder.work / TABLE).open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
         table.writerows([_cell(getattr(r, name)) for name in COLUMNS] for r in rows)
-    (folder.work / "scene.toml").write_text(dump_scene(scene, folder.target), encoding="utf-8")
+    writing.text(folder.work / "scene.toml", dump_scene(scene, folder.target))
     write_record(folder.work, record)
 
 

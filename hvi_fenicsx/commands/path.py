@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,14 +108,14 @@ def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
     """The summary of the path that was followed and written. Collective."""
     prepared = prepare(request.scene, COMM, request.timer)
     telling.say(console.heading(prepared, COMM.size))
-    run = PathRun(prepared, request.wanted)
+    run = PathRun(prepared, request.wanted, interrupt.requested)
     telling.say(console.path_wanted(request.wanted, run.scaled))
     if request.known:
         telling.say([f"{len(request.known)} rows are there already; on from factor {request.known[-1]['factor']:.6g}"])
-    with ExitStack() as stack:
-        writer = _JournalWriter(request, stack)
-        control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested, jumping=_tell_jump)
-        path = run.follow(control, request.known)
+    writer = _JournalWriter(request)
+    control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested, jumping=_tell_jump)
+    path = run.follow(control, request.known)
+    on_root(COMM, writer.close)
     telling.say(console.path_outcome(path))
     return path_output.write(request.folder, run, path, request.given, telling.LOG.info, draw=request.draw)
 
@@ -124,8 +123,8 @@ def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
 class _JournalWriter:
     """Keeps each new state in the folder of the result; the file is opened with the first of them."""
 
-    def __init__(self, request: PathRequest, stack: ExitStack) -> None:
-        self._request, self._stack = request, stack
+    def __init__(self, request: PathRequest) -> None:
+        self._request = request
         self._journal: Journal | None = None
 
     def keep(self, record: Record) -> None:
@@ -137,8 +136,13 @@ class _JournalWriter:
             file = self._request.folder.announce(journal.NAME)
             if not self._request.known:
                 file.unlink(missing_ok=True)
-            self._journal = self._stack.enter_context(Journal(file, self._request.identity))
+            self._journal = Journal(file, self._request.identity)
         self._journal.append(record)
+
+    def close(self) -> None:
+        """Close the file, if there is one. Rank 0 only."""
+        if self._journal is not None:
+            self._journal.close()
 
 
 def _tell_jump(factor: float, steps: int) -> None:

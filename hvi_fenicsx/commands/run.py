@@ -123,7 +123,7 @@ def _solve(request: RunRequest, interrupt: Interrupt, begin: Begin) -> tuple[Sol
     found = find_solution(prepared, interrupted=interrupt.requested)
     shown = last_borne.in_place_of(prepared, found.solution, interrupt.requested)
     begun = begin(shown)
-    solution = found.estimated() if shown is found.solution else shown
+    solution = found.estimated(interrupt.requested) if shown is found.solution else shown
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
     telling.say([*console.outcome(solution), *console.warnings(new)])
     return solution, begun, {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 import zipfile
 from collections.abc import Callable
@@ -11,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import results
-from ..errors import InputError
+from ..errors import NotWrittenError
+from ..runtime import writing
 from ..scene import Scene
 from ..stationary_points.found import Saved
 from . import telling
@@ -49,18 +49,16 @@ class SearchFile:
         began = time.monotonic()
         try:
             self._write(state())
-        except (OSError, InputError) as error:
+        except NotWrittenError as error:
             self._broken = True
-            telling.LOG.info("%s cannot be written (%s); a kill would lose the search", NAME, error)
+            telling.LOG.info("%s; a kill would lose the search", error)
         now = time.monotonic()
         self._next = now + max(BETWEEN, (now - began) / SHARE)
 
     def _write(self, state: Saved) -> None:
         file = self._folder.announce(NAME)
-        aside = file.with_name(f".{NAME}.part")
-        with aside.open("wb") as stream:
+        with writing.whole(file) as aside, aside.open("wb") as stream:
             np.savez(stream, allow_pickle=False, **{_IDENTITY: self._identity, **state})
-        os.replace(aside, file)
 
     def write_left(self, state: Saved) -> None:
         """Write what a search that was stopped has left, as a file of the result. Rank 0 only.
@@ -69,8 +67,9 @@ class SearchFile:
             state: what is left; nothing is written where it is empty.
         """
         if state:
-            content = {_IDENTITY: self._identity, **state}
-            np.savez_compressed(self._folder.work / NAME, allow_pickle=False, **content)
+            content, file = {_IDENTITY: self._identity, **state}, self._folder.work / NAME
+            with writing.told(file):
+                np.savez_compressed(file, allow_pickle=False, **content)
 
 
 def read(target: Path, scene: Scene) -> Saved | None:

@@ -12,11 +12,7 @@ from ..system.condensed_stiffness import CellInverse, CondensedStiffness
 from ..typing import Array
 from .cells import Cells
 from .step import FACTOR
-
-_KEPT = 1e-6
-"""What an inverse that is kept may leave of a column; one step of refinement takes this out."""
-WEAK = 1e-3
-"""A pivot that is so small beside its column costs digits."""
+from .thresholds import ExactThresholds
 
 
 class Basis:
@@ -28,6 +24,7 @@ class Basis:
         cells: where all unknowns are; changed from outside.
         driver: the variable that drives.
         inverse: of the cell's equations, where it is known and the factor drives.
+        thresholds: what costs digits.
 
     Attributes:
         driver: the variable that drives.
@@ -38,8 +35,15 @@ class Basis:
     """
 
     def __init__(
-        self, stiffness: CondensedStiffness, rate: Array, cells: Cells, driver: int, inverse: CellInverse | None = None
+        self,
+        stiffness: CondensedStiffness,
+        rate: Array,
+        cells: Cells,
+        driver: int,
+        inverse: CellInverse | None,
+        thresholds: ExactThresholds,
     ) -> None:
+        self._thresholds = thresholds
         self._stiffness, self._rate, self._cells, self.driver = stiffness, rate, cells, driver
         if inverse is None or driver != FACTOR:
             self._factorise()
@@ -61,7 +65,7 @@ class Basis:
         """The values that the basis takes to a column, (n,); factorised anew where the inverse has lost digits."""
         found = self.roughly(right)
         left = right - self._product(found, self.driver)
-        if not np.max(np.abs(left), initial=0.0) <= _KEPT * np.max(np.abs(right), initial=0.0):
+        if not np.max(np.abs(left), initial=0.0) <= self._thresholds.kept * np.max(np.abs(right), initial=0.0):
             self._factorise()
             found = self.roughly(right)
             left = right - self._product(found, self.driver)
@@ -94,10 +98,10 @@ class Basis:
             0 where that, or an exchange, costs no fewer digits: nothing is done; else the direction in which the
             driving variable goes on, relative to before, for the coordinate to go on as it did.
         """
-        if _strength(self.column, changed) >= WEAK:
+        if _strength(self.column, changed) >= self._thresholds.weak:
             return 0
         spread = self.roughly(self._cells.column(changed))
-        if _strength(spread, changed) < WEAK:
+        if _strength(spread, changed) < self._thresholds.weak:
             return 0
         self._inverse.exchange(spread, changed)
         return 1 if spread[changed] > 0.0 else -1
@@ -120,7 +124,8 @@ class Basis:
             if self.driver != FACTOR:
                 found.exchange(self.column, self.driver)
             left = self._product(found.solve(self._rate), FACTOR) - self._rate
-            known = bool(np.max(np.abs(left), initial=0.0) <= _KEPT * np.max(np.abs(self._rate), initial=0.0))
+            allowed = self._thresholds.kept * np.max(np.abs(self._rate), initial=0.0)
+            known = bool(np.max(np.abs(left), initial=0.0) <= allowed)
         return found if known else None
 
 

@@ -15,10 +15,13 @@ from .descent import Descent
 from .passing import go_on
 from .placing import place
 from .step import FACTOR
+from .thresholds import DEFAULT, ExactThresholds
 from .tracer import Tracer
 
-_FIRST = 1e-3
-"""Part of the first load at which a body that nothing holds at rest is looked for."""
+AWAY = "nothing holds the body at rest"
+UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
+NEUTRAL = "nothing holds the body at rest, and where a small load takes it, it may still move without a force"
+"""Why a path does not begin."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,24 +32,29 @@ class Beginning:
         cells: where the unknowns are; None: there is no such state.
         memory: what the bonds remember, (bonds, 4).
         reason: why there is none.
+        escapes: whether there is none since the body comes off.
         constant: the path from there to the constant loads, its factor from 0 to 1; None where there are none.
     """
 
     cells: Cells | None
     memory: Array
     reason: str = ""
+    escapes: bool = False
     constant: CondensedProblem | None = None
 
 
-def at_rest(problem: CondensedProblem, remember: Collection[int], aim: float) -> Beginning:
+def at_rest(
+    problem: CondensedProblem, remember: Collection[int], aim: float, thresholds: ExactThresholds = DEFAULT.exact
+) -> Beginning:
     """The state at the factor 0, before constant loads act: these are applied along a path of their own.
 
     Args:
         problem: the problem.
         remember: numbers of the problem's bonds that remember.
         aim: the factor that the path goes to first.
+        thresholds: of the path.
     """
-    bonds = BondTable(problem, remember)
+    bonds = BondTable(problem, remember, thresholds)
     chains = [bonds.chain(i) for i in range(problem.size)]
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     force = _nearest(bonds, x, problem.force - problem.elastic @ x)
@@ -56,9 +64,9 @@ def at_rest(problem: CondensedProblem, remember: Collection[int], aim: float) ->
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
-        settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
+        settled, reason = _settled(bonds, replace(problem, force=held, force_rate=rate))
         if settled is None:
-            return Beginning(cells=None, memory=bonds.memory, reason="nothing holds the body at rest")
+            return Beginning(cells=None, memory=bonds.memory, reason=reason, escapes=reason == AWAY)
         cells = settled
     if rate is not away:
         return Beginning(cells=cells, memory=bonds.memory)
@@ -75,20 +83,22 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
     return np.where((problem.lower == problem.upper), wanted, found)
 
 
-def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | None:
-    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; None: away."""
+def _settled(bonds: BondTable, problem: CondensedProblem) -> tuple[Cells | None, str]:
+    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; or why nowhere."""
     chains = [bonds.chain(i) for i in range(problem.size)]
-    load = problem.load(_FIRST)
+    first = bonds.thresholds.first_load
+    load = problem.load(first)
     start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     landing = Descent(bonds, load).land(start, start)
     if not landing.found:
-        return None
+        return None, AWAY if landing.escapes else UNKNOWN
     cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
-    tracer = Tracer(problem.elastic, problem.force, problem.force_rate, cells, _FIRST, driver=FACTOR, heading=-1)
+    equations = problem.elastic, problem.force, problem.force_rate
+    tracer = Tracer(*equations, cells, first, heading=-1, thresholds=bonds.thresholds)
     while True:
         step = tracer.advance(0.0)
         if step.variable is None:
-            return None
+            return None, UNKNOWN
         if step.variable == FACTOR:
-            return tracer.cells
+            return (None, NEUTRAL) if tracer.cells.is_singular() else (tracer.cells, "")
         go_on(tracer, bonds, step)

@@ -13,6 +13,7 @@ from ..system.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
 from .graphs import Passed, graph_of, on_corner, remembering, turned
 from .segments import Component, Segment, chain
+from .thresholds import DEFAULT, ExactThresholds
 
 
 def is_piecewise_linear(problem: CondensedProblem) -> bool:
@@ -80,18 +81,24 @@ class BondTable:
     Args:
         problem: the problem.
         remember: numbers of the problem's bonds (groups) that remember; those of linear laws have nothing to remember.
+        thresholds: of the path.
+
+    Attributes:
+        thresholds: of the path.
 
     Raises:
         InputError: a law is not piecewise linear, or acts on |u_t| in 3D.
     """
 
-    def __init__(self, problem: CondensedProblem, remember: Collection[int] = ()) -> None:
+    def __init__(
+        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: ExactThresholds = DEFAULT.exact
+    ) -> None:
         if not is_piecewise_linear(problem):
             raise InputError(
                 "the exact path needs laws whose graph is piecewise linear, each along one component of the "
                 "displacement; here one is smoothed or curved, or acts on |u_t| in space"
             )
-        self.problem, self.bonds = problem, self._made(problem, remember)
+        self.problem, self.bonds, self.thresholds = problem, self._made(problem, remember), thresholds
         self._at: list[list[Bond]] = [[] for _ in range(problem.size)]
         for bond in self.bonds:
             self._at[bond.unknown].append(bond)

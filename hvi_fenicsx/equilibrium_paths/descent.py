@@ -22,9 +22,6 @@ from .segments import Component, Segment, chain
 from .softest import softest
 from .tracer import Tracer
 
-_ROUNDING = 1e-9
-"""Forces that balance may leave so much of the largest one."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Landing:
@@ -118,7 +115,7 @@ class Descent:
         if np.any(along):
             yield along / np.max(np.abs(along))
         with suppress(np.linalg.LinAlgError):
-            found = softest(cells, cells.inverse(), np.ones(self._n))
+            found = softest(cells, cells.inverse(), np.ones(self._n), self._bonds.thresholds.softest)
             if np.any(found):
                 yield found / np.max(np.abs(found))
         for i in np.flatnonzero((cells.rise < 0.0) & ~cells.bound):
@@ -189,7 +186,7 @@ class Descent:
         force = np.clip(load - stiffness @ x, *self._convex_forces(x))
         held = stiffness @ x + force
         cells = place(stiffness, self._convex, x, force)
-        tracer = Tracer(stiffness, held, load - held, cells, 0.0)
+        tracer = Tracer(stiffness, held, load - held, cells, 0.0, thresholds=self._bonds.thresholds)
         while True:
             self._step()
             step = tracer.advance(1.0)
@@ -247,7 +244,8 @@ class Descent:
         """Whether the forces balance: in singular equations, which rounding makes regular, they do not."""
         elastic, force = self._stiffness @ cells.x, cells.force
         size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, force, self._load))
-        return float(np.max(np.abs(elastic + force - self._load), initial=0.0)) <= _ROUNDING * size
+        left = float(np.max(np.abs(elastic + force - self._load), initial=0.0))
+        return left <= self._bonds.thresholds.balanced * size
 
 
 def _number(segments: tuple[Segment, ...], x: float, *, held: bool) -> int:

@@ -56,7 +56,8 @@ class ExactFollower(Follower):
         beginning: Beginning | None = None,
     ) -> None:
         super().__init__(problem, options, resume, watch)
-        self._beginning, self._bonds = beginning, BondTable(problem, options.remember)
+        self._beginning = beginning
+        self._bonds = BondTable(problem, options.remember, options.thresholds.exact)
         self._moved, self._direction, self._blocked = 0, 1, False
         self._untried: tuple[Array, list[Way]] = np.empty(0), []
         self.tracer: Tracer
@@ -71,13 +72,14 @@ class ExactFollower(Follower):
     @override
     def _begun(self) -> Iterator[PathState]:
         programme, remember = self._options.programme, self._options.remember
-        start = self._beginning or at_rest(self._problem, remember, programme[0])
+        exact = self._options.thresholds.exact
+        start = self._beginning or at_rest(self._problem, remember, programme[0], exact)
         if start.constant is not None:
             start = self._loaded(start, start.constant)
         self._bonds.restore(start.memory)
         self._balance = EnergyBalance(self._problem, self._bonds)
         if start.cells is None:
-            self._come_off(0.0, start.reason)
+            self._end_before(start.reason, escapes=start.escapes)
             return
         self._unstable = start.cells.unstable_directions()
         self._follow_from(start.cells, 0.0)
@@ -86,7 +88,7 @@ class ExactFollower(Follower):
 
     def _loaded(self, start: Beginning, constant: CondensedProblem) -> Beginning:
         """From rest to the constant loads, as stable as it goes."""
-        options = PathOptions(remember=self._options.remember)
+        options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
         beginning = replace(start, constant=None)
         follower = ExactFollower(constant, options, watch=self._watcher, beginning=beginning)
         for _ in follower.states():
@@ -95,7 +97,8 @@ class ExactFollower(Follower):
             raise Stopped
         if follower.end is not End.REACHED:
             reason = f"under the constant loads alone: {follower.reason}"
-            return Beginning(cells=None, memory=follower.memory, reason=reason)
+            off = follower.end is End.ESCAPES
+            return Beginning(cells=None, memory=follower.memory, reason=reason, escapes=off)
         return Beginning(cells=follower.tracer.cells, memory=follower.memory)
 
     @override
@@ -132,6 +135,7 @@ class ExactFollower(Follower):
             heading=heading if given is None else given.heading,
             small=None if given is None else given.small,
             inverse=inverse,
+            thresholds=self._options.thresholds.exact,
         )
 
     def _begin_balance(self, *, anew: bool) -> None:
@@ -143,7 +147,7 @@ class ExactFollower(Follower):
     @override
     def _towards(self, aim: float) -> Iterator[PathState]:
         self._orient(aim)
-        self._rounds = Rounds(self.tracer.cells.x)
+        self._rounds = Rounds(self.tracer.cells.x, self._options.thresholds.exact.same_place)
         while self.end is None and self.tracer.factor != aim:
             if self._must_jump(aim):
                 yield from self._jump(aim)

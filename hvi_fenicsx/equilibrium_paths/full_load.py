@@ -15,6 +15,7 @@ from .eliminated import without_fixed
 from .kinds import kind_of
 from .programme import Follower
 from .state import End, Follow, PathOptions, PathState
+from .thresholds import DEFAULT, Thresholds
 from .watch import Watch
 
 
@@ -46,16 +47,20 @@ class FullLoad:
     borne: Loaded | None = None
 
 
-def at_full_load(problem: CondensedProblem, most_events: int, watch: Watch | None = None) -> FullLoad | None:
+def at_full_load(
+    problem: CondensedProblem, most_events: int, watch: Watch | None = None, thresholds: Thresholds = DEFAULT
+) -> FullLoad | None:
     """The equilibrium to which a path leads. None where this says nothing: the path is lost, or does not begin.
 
     Args:
         problem: the problem; its factor scales all loads.
         most_events: events at most, of each path.
         watch: whether to stop.
+        thresholds: the numbers that tune how it is followed.
     """
     fewer, kept = without_fixed(problem)
-    found = (_event_by_event if is_piecewise_linear(fewer) else _along_the_curve)(fewer, most_events, watch)
+    options = PathOptions(most_events=most_events, thresholds=thresholds)
+    found = (_event_by_event if is_piecewise_linear(fewer) else _along_the_curve)(fewer, options, watch)
     if found is None:
         return None
 
@@ -68,24 +73,24 @@ def at_full_load(problem: CondensedProblem, most_events: int, watch: Watch | Non
     return replace(found, x=None if found.x is None else whole(found.x), borne=borne)
 
 
-def _event_by_event(problem: CondensedProblem, most_events: int, watch: Watch | None) -> FullLoad | None:
+def _event_by_event(problem: CondensedProblem, options: PathOptions, watch: Watch | None) -> FullLoad | None:
     """Where piecewise linear laws lead: as stable as it goes, or else along the whole curve of equilibria.
 
     Where a body comes off on the way, the curve is followed on, through the limit point, since its factor may rise to 1
     again.
     """
-    follower, states = _followed(problem, Follow.STABLE, most_events, watch)
+    follower, states = _followed(problem, Follow.STABLE, options, watch)
     if follower.end is End.ESCAPES and _begins(states):
         ended = FullLoad(x=None, reason=follower.reason, borne=_largest(states))
-        follower, states = _followed(problem, Follow.EXACT, most_events, watch)
+        follower, states = _followed(problem, Follow.EXACT, options, watch)
         if follower.end not in (End.REACHED, End.INTERRUPTED):
             return ended
     return _reached(follower, states)
 
 
-def _along_the_curve(problem: CondensedProblem, most_events: int, watch: Watch | None) -> FullLoad | None:
+def _along_the_curve(problem: CondensedProblem, options: PathOptions, watch: Watch | None) -> FullLoad | None:
     """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
-    follower, states = _followed(problem, Follow.EXACT, most_events, watch)
+    follower, states = _followed(problem, Follow.EXACT, options, watch)
     if (follower.end is End.ESCAPES or follower.is_closed) and _begins(states):
         largest, stable = _largest(states), list(itertools.takewhile(lambda state: state.stable, states))
         first = len(stable) == len(states) or states[len(stable)].factor == largest.factor
@@ -116,9 +121,8 @@ def _reached(follower: Follower, states: Sequence[PathState]) -> FullLoad | None
 
 
 def _followed(
-    problem: CondensedProblem, follow: Follow, most_events: int, watch: Watch | None
+    problem: CondensedProblem, follow: Follow, options: PathOptions, watch: Watch | None
 ) -> tuple[Follower, list[PathState]]:
     """The follower at the end of its path, and the states."""
-    options = PathOptions(follow=follow, most_events=most_events)
-    follower = kind_of(problem).follower(problem, options, watch=watch)
+    follower = kind_of(problem).follower(problem, replace(options, follow=follow), watch=watch)
     return follower, list(follower.states())

@@ -20,11 +20,6 @@ from .bonds import BondTable
 from .cells import Cells
 from .segments import Segment
 
-MOST = 10
-"""All combinations of so many unknowns at most are tried."""
-_AT_END = 1e-9
-"""A coordinate so near to an end of its segment is at it, relative to the sizes of coordinates."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Way:
@@ -100,9 +95,9 @@ def ways_on(problem: CondensedProblem, bonds: BondTable, cells: Cells, sizes: Ar
         cells: the state.
         sizes: what coordinates are measured by, (n,).
     """
-    stands = [_stand(bonds, cells, i, _AT_END * float(sizes[i])) for i in range(len(cells))]
+    stands = [_stand(bonds, cells, i, bonds.thresholds.near_end * float(sizes[i])) for i in range(len(cells))]
     branching = [i for i, stand in enumerate(stands) if stand.branches]
-    if len(branching) > MOST:
+    if len(branching) > bonds.thresholds.branching:
         return []
     patterns = itertools.product((-1.0, 1.0), repeat=len(branching))
     return [way for p in patterns for way in _ways(problem, stands, branching, np.array(p))]

@@ -10,9 +10,6 @@ from .state import Event
 from .step import Step
 from .tracer import Tracer
 
-_ROUNDING = 1e-12
-"""A displacement so near to an end of a piece, relative, is at it."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Passing:
@@ -79,7 +76,7 @@ def _turn_back(tracer: Tracer, bonds: BondTable, i: int, *, forward: bool) -> No
     x, force = float(cells.x[i]), float(cells.bond_force[i])
     bonds.remember(i, x, force)
     chain = bonds.chain(i)
-    number = piece_at(chain, x, _ROUNDING, forward=forward)
+    number = piece_at(chain, x, bonds.thresholds.at_end, forward=forward)
     tracer.enter(i, number, chain[number].coordinate(x, force), chain)
 
 

@@ -12,9 +12,6 @@ from .rounds import Round
 from .state import End, Event, PathOptions, PathState
 from .watch import Stopped, Watch
 
-_AT_LIMIT = 1e-6
-"""A factor so near to the largest that can be borne, relative to those of the programme, is at the limit."""
-
 
 class Follower(ABC):
     """Follows the path of a problem through a programme.
@@ -77,7 +74,7 @@ class Follower(ABC):
     @property
     def _small(self) -> float:
         """A difference of factors that does not count."""
-        return _AT_LIMIT * max(map(abs, self._options.programme))
+        return self._options.thresholds.at_limit * max(map(abs, self._options.programme))
 
     def _not_borne(self) -> str:
         return f"no factor above {self._options.borne:.6g} is borne by any equilibrium: a body comes off"
@@ -137,6 +134,10 @@ class Follower(ABC):
         """Whether there is an equilibrium at a factor whatever the bonds remember, as far as that is known."""
         low, high = self._options.held
         return low + self._small < factor < high - self._small
+
+    def _end_before(self, reason: str, *, escapes: bool) -> None:
+        """End before the first state."""
+        (self._come_off if escapes else self._lose)(0.0, reason)
 
     def _come_off(self, factor: float, reason: str) -> None:
         """End where the way that was tried leads off; that proves nothing where the body is held."""

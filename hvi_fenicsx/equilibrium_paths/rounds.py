@@ -9,9 +9,6 @@ import numpy as np
 from ..typing import Array
 from .state import PathState
 
-_SAME_PLACE = 1e-7
-"""A difference of displacements that does not count, relative."""
-
 
 class Round(Enum):
     """How a path came back."""
@@ -25,12 +22,14 @@ class Rounds:
 
     Args:
         x: the displacements where the leg begins, (n,).
+        same_place: a difference of displacements that does not count, relative.
 
     Attributes:
         came: the last change of the displacements, (n,).
     """
 
-    def __init__(self, x: Array) -> None:
+    def __init__(self, x: Array, same_place: float) -> None:
+        self._same_place = same_place
         self._known: dict[int, tuple[float, float, float]] = {}
         self._x, self.came = x, np.zeros_like(x)
         self._weights = np.random.default_rng(0).uniform(0.5, 1.5, len(x))
@@ -53,8 +52,8 @@ class Rounds:
         self._known[key] = state.factor, self._way, here
         if abs(factor - state.factor) > 1e-9 * (1.0 + abs(state.factor)):
             return None
-        if abs(place - here) > _SAME_PLACE * float(self._weights @ np.abs(state.x)):  # what slides bears the same load
-            return None
+        if abs(place - here) > self._same_place * float(self._weights @ np.abs(state.x)):
+            return None  # what slides bears the same load
         return Round.CLOSED if self._way - way > 1e-9 * size else Round.BLOCKED
 
 

@@ -23,9 +23,6 @@ from .softest import softest
 from .step import FACTOR
 from .tracer import Tracer
 
-_STANDING = 20
-"""So many events at one place, and four for each unknown, lead nowhere."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Snap:
@@ -77,7 +74,7 @@ def _restraints(bonds: BondTable, cells: Cells, inverse: CellInverse, moved: int
         pull = np.where(free, -way * bonds.problem.elastic.column(moved), 0.0)
         unstable = np.where(free, inverse.solve(pull), way * own)
     else:
-        unstable = softest(cells, inverse, own)
+        unstable = softest(cells, inverse, own, bonds.thresholds.softest)
         unstable *= np.sign(unstable[moved]) * direction or 1.0
     size = float(np.max(np.abs(unstable), initial=0.0))
     if size == 0.0:
@@ -95,7 +92,7 @@ def _held_back(bonds: BondTable, load: Array, cells: Cells, restraint: Array, in
     stiffness = bonds.problem.elastic
     here = place(stiffness, chains, cells.x, load - stiffness @ cells.x, cells.numbers)
     try:
-        return Tracer(stiffness, load, restraint, here, 0.0, driver=FACTOR, heading=-1, inverse=inverse)
+        return Tracer(stiffness, load, restraint, here, 0.0, heading=-1, inverse=inverse, thresholds=bonds.thresholds)
     except np.linalg.LinAlgError:
         return None
 
@@ -107,7 +104,7 @@ def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array, going: 
         t, x = tracer.factor, tracer.cells.x
         step = tracer.advance(0.0)
         standing = standing + 1 if np.allclose(tracer.cells.x, x, rtol=1e-12, atol=0.0) else 0
-        if standing > _STANDING + 4 * len(x):
+        if standing > bonds.thresholds.standing + 4 * len(x):
             return None
         if step.variable is None:
             free = tracer.factor < 0.0 and tracer.stands

@@ -9,16 +9,15 @@ from ..system.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
 from .cells import Cells
 
-_ACCURACY = 1e-8
 
-
-def softest(cells: Cells, inverse: CellInverse, start: Array) -> Array:
+def softest(cells: Cells, inverse: CellInverse, start: Array, accuracy: float) -> Array:
     """The eigenvector of the negative eigenvalue next to zero, or else of the greatest one, zero where unknowns stand.
 
     Args:
         cells: the cell.
         inverse: of its equations.
         start: where the iteration begins, (n,).
+        accuracy: relative.
     """
     found, free = np.zeros(len(cells)), np.flatnonzero(cells.moving)
     begin = inverse.solve(_spread(start[free], free, len(cells)))[free]
@@ -31,7 +30,7 @@ def softest(cells: Cells, inverse: CellInverse, start: Array) -> Array:
 
     operator = LinearOperator((free.size, free.size), matvec=response, dtype=np.float64)
     try:
-        found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=_ACCURACY)[1][:, 0]
+        found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=accuracy)[1][:, 0]
     except ArpackNoConvergence:
         found[free] = begin
     return found

@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from ..system.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
+from .thresholds import DEFAULT, Thresholds
 
 
 class Event(StrEnum):
@@ -145,6 +146,8 @@ class PathOptions:
         most_events: events at most.
         borne: the largest factor with which there may be an equilibrium, where that is known.
         held: between these factors there is one, whatever the bonds remember; as far as that is known.
+        stops: factors at which a path that is not straight has a state, each time it comes to one.
+        thresholds: the numbers that tune how it is followed.
     """
 
     programme: Sequence[float] = (1.0,)
@@ -153,3 +156,5 @@ class PathOptions:
     most_events: int = 1_000_000
     borne: float = float("inf")
     held: tuple[float, float] = (0.0, 0.0)
+    stops: Sequence[float] = ()
+    thresholds: Thresholds = DEFAULT

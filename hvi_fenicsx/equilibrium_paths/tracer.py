@@ -20,9 +20,7 @@ from .basis import Basis
 from .cells import Cells
 from .segments import Segment
 from .step import FACTOR, Step
-
-_SLOW = 1e-6
-"""A variable that moves by so little of the fastest one fixes no point of the curve."""
+from .thresholds import DEFAULT, ExactThresholds
 
 
 class Tracer:
@@ -38,6 +36,7 @@ class Tracer:
         heading: its direction, 1 or -1.
         small: parts of the order ε of the coordinates, (n,); by default at random.
         inverse: of the cell's equations, where it is known and the factor drives.
+        thresholds: what costs digits.
 
     Attributes:
         factor: λ.
@@ -64,7 +63,9 @@ class Tracer:
         heading: int = 1,
         small: Array | None = None,
         inverse: CellInverse | None = None,
+        thresholds: ExactThresholds = DEFAULT.exact,
     ) -> None:
+        self._thresholds = thresholds
         self._stiffness, self._constant, self._rate = stiffness, constant, rate
         self.cells, self.factor, self.heading, self._size = cells, factor, heading, 0.0
         self._stiffest, self._dead, self._live = map(_largest, (stiffness.diagonal, constant, rate))
@@ -72,7 +73,7 @@ class Tracer:
         self._perturb()
         if small is not None:
             self.small = np.array(small)
-        self._basis = Basis(stiffness, rate, cells, driver, inverse)
+        self._basis = Basis(stiffness, rate, cells, driver, inverse, thresholds)
         self._find_direction()
 
     # -- the perturbation
@@ -128,7 +129,7 @@ class Tracer:
             scale = _largest(along) or 1.0
             along, rate, own = along / scale, self.factor_rate / scale, float(change[self.driver])
             change[self.driver] = 0.0
-            slow = abs(self.rates[self.driver]) < _SLOW * scale
+            slow = abs(self.rates[self.driver]) < self._thresholds.slow * scale
             way = float(along @ change) / (float(along @ along) or 1.0) if slow else 0.0
             change -= way * self.rates / scale
             self.factor -= own - way * rate

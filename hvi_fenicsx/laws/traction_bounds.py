@@ -9,43 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from ..typing import Array
-from .convex_parts import ConvexPart, Directional
+from .split_law import SplitLaw
 from .thresholds import DEFAULT, Thresholds
 
 _Objective = Callable[[Array, Array, Array], Array]
 """Objective f(lo, hi, |x|) of an interval of tractions lo..hi and a displacement."""
-
-
-class SplitLaw(Protocol):
-    """What is asked of a law: a :class:`~.base.Superpotential` has it all."""
-
-    @property
-    def convex(self) -> ConvexPart:
-        """H of the split."""
-
-    @property
-    def concave(self) -> ConvexPart:
-        """G of the split."""
-
-    @property
-    def growth(self) -> Directional:
-        """The traction far out."""
-
-    @property
-    def kinks(self) -> Array:
-        """Where the traction jumps, (k,)."""
-
-    @property
-    def length_scale(self) -> float:
-        """A displacement typical of the law."""
-
-    def interval(self, x: Array) -> tuple[Array, Array]:
-        """Clarke's subdifferential at x (m,)."""
 
 
 @dataclass(frozen=True)

@@ -145,6 +145,14 @@ class ModelPath(LoadPath):
             path_output.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)
             target.commit(self.run.prepared.scene)
 
+    def free(self) -> None:
+        """Free the assembled body; then neither :meth:`u` nor :meth:`write` can be called any more. Collective.
+
+        On one rank Python does so itself; on several, nothing but this frees it.
+        """
+        self.run.free()
+        self.run.prepared.system.free()
+
     def __repr__(self) -> str:
         return "\n".join(console.path_outcome(self))
 

@@ -87,7 +87,10 @@ def equilibria(
     searched = bodies.Equilibria(prepared)
     stop = time_over(prepared.system.comm, limit)
     found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
-    return _result(found, tuple(_certified(searched, found)), prepared.problem.scales.energy)
+    solutions = tuple(_certified(searched, found))
+    searched.free()
+    prepared.system.free()
+    return _result(found, solutions, prepared.problem.scales.energy)
 
 
 def _certified(searched: bodies.Equilibria, found: Found) -> Iterator[Solution]:

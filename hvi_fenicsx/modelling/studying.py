@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError
+from ..errors import InputError, NotWrittenError
 from ..mesh.shapes import OnlyMesh
-from ..results.output_folder import OutputFolder, existing
+from ..results.output_folder import OutputFolder, existing, placed
 from ..runtime.argument_checks import require_path
 from ..runtime.mpi import on_root
 from ..scene import Scene
@@ -148,10 +148,20 @@ def _target(
             return
         try:
             target = on_root(comm, lambda: _opened(Path(folder), made, force=force))
-            yield target, made[0] if made else None
+            with _placed(target):
+                yield target, made[0] if made else None
         finally:
             for one in made:
                 one.close()
+
+
+@contextmanager
+def _placed(target: Path) -> Iterator[None]:
+    """Say of a file that could not be written where it was to go."""
+    try:
+        yield
+    except NotWrittenError as error:
+        raise placed(error, target, None) from None
 
 
 def _opened(folder: Path, made: list[OutputFolder], *, force: bool) -> Path:

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
-from petsc4py import PETSc
 
 from ..certify import balance, certificate, contact_state, correction
 from ..certify.certificate import Examination
@@ -28,6 +27,7 @@ from ..equilibrium_paths.state import Event, PathState
 from ..problem import references
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
+from ..problem.vectors import product
 from ..runtime.mpi import total
 from ..solvers import frozen_mixity
 from ..system.condensation import Condensation
@@ -127,7 +127,9 @@ class Certifier:
         if found is not None:
             return found.certificate.passed
         forces = contact_state.forces(self._factored.at(state.factor), u)
-        return self._in_balance(state, u, forces, self._condensation.carried(state.x, state.factor))
+        problem = self._condensation.problem
+        carried = problem.elastic @ state.x - problem.load(state.factor)
+        return self._in_balance(state, u, forces, carried)
 
     # -- where rounding speaks against a state
 
@@ -162,7 +164,7 @@ class Certifier:
             return False
         judged = self._examination(state, found.u)
         if judged is None:
-            return self._in_balance(state, found.u, found.forces, found.carried)
+            return self._in_balance(state, found.u, found.forces, -found.force)
         return judged.certificate.passed
 
     def _graphs(self, state: PathState) -> Graphs:
@@ -171,26 +173,32 @@ class Certifier:
     def _load(self, factor: float) -> float:
         """The Euclidean norm of loads, of what prescribed displacements pull and obstacles push. Collective."""
         felt = float(np.linalg.norm(self._condensation.problem.load(factor)))
-        return max(felt, float(self._condensation.load(factor).norm()))
+        load = self._condensation.load(factor)
+        found = max(felt, float(load.norm()))
+        load.destroy()
+        return found
 
     def _is_unloaded(self, state: PathState) -> bool:
         """Whether the loads are less than the tolerance of those of the whole programme. Collective."""
         return self._load(state.factor) <= self._tolerance * self._whole_load
 
-    def _in_balance(self, state: PathState, u: fem.Function, forces: Forces, carried: PETSc.Vec) -> bool:
+    def _in_balance(self, state: PathState, u: fem.Function, forces: Forces, carried: Array) -> bool:
         """Whether forces from the forms are those that were judged on Γc, and none are left elsewhere. Collective.
 
         What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
         there, what rounding makes of the stresses is excused, and no net force.
         """
-        problem = self._factored.at(state.factor)
-        left = self._condensation.unbalanced(refinement.reaction(self._system, forces), carried)
+        reaction, spread = refinement.reaction(self._system, forces), self._condensation.forces.spread(carried)
+        left, given = self._condensation.forces.unbalanced(reaction, spread), product(spread, self._system.rotation)
+        for vector in (reaction, spread):
+            vector.destroy()
         size = max(self._norm(f) for f in (forces.load, forces.reaction))
         size = max(size, self._whole_load if self._is_unloaded(state) else 0.0) or 1.0
-        return left <= self._tolerance * size or self._is_rounding(left / size, problem, u, forces, carried, size)
+        problem = self._factored.at(state.factor)
+        return left <= self._tolerance * size or self._is_rounding(left / size, problem, u, forces, given, size)
 
     def _is_rounding(
-        self, left: float, problem: Problem, u: fem.Function, forces: Forces, carried: PETSc.Vec, size: float
+        self, left: float, problem: Problem, u: fem.Function, forces: Forces, carried: Array, size: float
     ) -> bool:
         """Whether what is left is no more than the last digits of u make, and the net forces balance. Collective."""
         if left > THRESHOLDS.largest_rounding:
@@ -198,8 +206,7 @@ class Certifier:
         sample = balance.unbalanced(problem, balance.rounding_sample(problem, u.x.array), ())
         if left * size > THRESHOLDS.rounding_safety * self._norm(sample):
             return False
-        rotation, known = self._system.rotation, references.of(problem, forces.load)
-        given = (carried if rotation is None else rotation * carried).array_r.reshape(forces.load.shape)
+        known, given = references.of(problem, forces.load), carried.reshape(forces.load.shape)
         net = balance.net_forces_carried(known, forces, given, u)
         return bool(np.all(net <= self._tolerance))
 
@@ -207,7 +214,7 @@ class Certifier:
         return float(np.sqrt(total(self._system.comm, float(np.sum(values**2)))))
 
     def _expanded(self, state: PathState) -> fem.Function:
-        return self._system.displacement(self._condensation.expand(state.x, state.factor))
+        return self._condensation.displacement(state.x, state.factor)
 
 
 def is_examined(number: int) -> bool:

@@ -24,7 +24,6 @@ from ..scene import PathTable
 from ..solvers import obstacle_force
 from ..system import loading
 from ..system.condensation import Condensation
-from ..typing import Array
 from . import records
 from .certifying import Certifier, Verdict
 from .journal import Record
@@ -54,9 +53,11 @@ class PathRun:
     Args:
         prepared: the scene, assembled.
         wanted: what path is wanted.
+        interrupted: whether to stop (collective), asked while the body is condensed.
 
     Raises:
         InputError: on all ranks alike: the path cannot be followed.
+        Interrupted: on all ranks alike: it is to stop.
 
     Attributes:
         prepared: the scene.
@@ -65,7 +66,9 @@ class PathRun:
         states: those found so far.
     """
 
-    def __init__(self, prepared: Preparation, wanted: PathTable) -> None:
+    def __init__(
+        self, prepared: Preparation, wanted: PathTable, interrupted: Callable[[], bool] = lambda: False
+    ) -> None:
         self.prepared, self.wanted = prepared, wanted
         system = prepared.system
         obstacle_force.refuse(system.problem, "no path is followed")
@@ -75,7 +78,7 @@ class PathRun:
             raise InputError("path: nothing drives the body; add a load or a prescribed displacement")
         with prepared.timer("setup"):
             most = prepared.options.thresholds.path.largest_dense
-            self._condensation = Condensation(system, self.scaled, most)
+            self._condensation = Condensation(system, self.scaled, most, interrupted)
             self._measures = Measures(system, self._condensation, self.scaled)
         self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
         self._factored = FactoredProblem(system.problem, self.scaled)
@@ -108,7 +111,9 @@ class PathRun:
         Raises:
             InputError: on all ranks alike: the path cannot be followed.
         """
-        for one in known:
+        for one in itertools.takewhile(
+            lambda record: record["event"] != Event.END, known
+        ):  # why it ends is found again
             self._take(*records.state(one))
         rows = list(self._rows())
         follower = self._follower(control)
@@ -134,7 +139,12 @@ class PathRun:
     def _follower(self, control: Control) -> Follower:
         wanted = self.wanted
         options = PathOptions(
-            programme=wanted.to, follow=Follow(wanted.follow), remember=self._remember, **self._limits()
+            programme=wanted.to,
+            follow=Follow(wanted.follow),
+            remember=self._remember,
+            stops=wanted.contact_at,
+            thresholds=self.prepared.options.thresholds.path.following,
+            **self._limits(),
         )
         resume = self.states[-1] if self.states else None
         watch = Watch(control.interrupted, control.jumping)
@@ -206,7 +216,7 @@ class PathRun:
     def crossings(self, factor: float) -> Iterator[tuple[int, Problem, fem.Function]]:
         """The states at which the path crosses a factor: the row before, problem and displacement. Collective.
 
-        Between two events the path is straight.
+        Between two rows the path is straight; one that is not has a row there.
 
         Args:
             factor: λ.
@@ -220,10 +230,11 @@ class PathRun:
                 continue
             share = (factor - before.factor) / (after.factor - before.factor)
             x = before.x + share * (after.x - before.x)
-            yield number, self._factored.at(factor), self._expanded(x, factor)
+            yield number, self._factored.at(factor), self._condensation.displacement(x, factor)
 
-    def _expanded(self, x: Array, factor: float) -> fem.Function:
-        return self.prepared.system.displacement(self._condensation.expand(x, factor))
+    def free(self) -> None:
+        """Free the condensed body; the rows stay, displacements cannot be asked for any more. Collective."""
+        self._condensation.free()
 
 
 def _finite(states: Iterator[PathState]) -> Iterator[PathState]:

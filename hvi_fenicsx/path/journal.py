@@ -12,9 +12,11 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
+
+from ..runtime import writing
 
 NAME = "path.journal"
 _FRAME = struct.Struct("<QI")
@@ -33,14 +35,17 @@ class Journal:
         records: what it held already, if that is of the same path.
 
     Raises:
-        OSError: it cannot be read or written.
+        OSError: it cannot be read.
+        NotWrittenError: it cannot be written.
     """
 
     def __init__(self, path: Path, identity: str) -> None:
+        self._path = path
         self.records, whole = _read(path, identity)
-        self._file = path.open("r+b" if whole else "wb")
-        self._file.truncate(whole)
-        self._file.seek(whole)
+        with writing.told(path):
+            self._file = path.open("r+b" if whole else "wb")
+            self._file.truncate(whole)
+            self._file.seek(whole)
         if not whole:
             self.append({"identity": identity})
 
@@ -51,22 +56,21 @@ class Journal:
             record: numbers, texts, None, arrays of floats or tables of these.
 
         Raises:
-            OSError: it cannot be written.
+            NotWrittenError: it cannot be written; the records before it are there.
         """
         content = _packed(record)
-        self._file.write(_FRAME.pack(len(content), zlib.crc32(content)) + content)
-        self._file.flush()
+        with writing.told(self._path):
+            self._file.write(_FRAME.pack(len(content), zlib.crc32(content)) + content)
+            self._file.flush()
 
     def close(self) -> None:
-        """Close the file; a power cut harms it no more."""
-        os.fsync(self._file.fileno())
-        self._file.close()
+        """Close the file; a power cut harms it no more.
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        Raises:
+            NotWrittenError: it could not be written.
+        """
+        with writing.told(self._path), self._file:
+            os.fsync(self._file.fileno())
 
 
 def read(path: Path, identity: str) -> list[Record]:

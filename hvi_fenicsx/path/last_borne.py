@@ -59,15 +59,18 @@ def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable
 
     run = PathRun(prepared, PathTable(memory=False))
     if not run.is_straight and run.size > prepared.options.thresholds.path.curved_unknowns:
+        run.free()
         return failed
     path = run.follow(Control(interrupted=interrupted))
+    peak = path.peak if path.rows and 0.0 < path.rows[path.peak].factor < 1.0 else None
+    found = None if peak is None or path.end == End.INTERRUPTED else run.state(peak)
+    run.free()
     assert failed.solve_result is not None
     if path.end == End.INTERRUPTED:
         return replace(failed, solve_result=replace(failed.solve_result, interrupted=True))
-    borne = path.rows and 0.0 < path.rows[path.peak].factor < 1.0
-    if not borne:
+    if found is None:
         return failed
-    problem, u = run.state(path.peak)
+    problem, u = found
     return _shown(prepared, problem, Borne(u=u, factor=path.rows[path.peak].factor), failed)
 
 

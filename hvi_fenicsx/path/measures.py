@@ -98,11 +98,14 @@ class Measures:
         supports = [self._support(held, i) for i in directions]
         contact = [self._contact(touched, i) for i in directions]
         means = [self._mean(part, i) for i in directions]
-        columns = [np.array(v.array_r) for v in (*[c for _, c in supports], *[c for _, c in contact], *means)]
+        factors = [*(c for _, c in supports), *(c for _, c in contact), *means]
+        columns = [np.array(v.array_r) for v in factors]
         products, rows = condensation.products(np.column_stack(columns))
         d = len(directions)
         load = self._loads(part) - self._felt(condensation, [e for e, _ in supports], [e for e, _ in contact])
         forces = products[:d] + products[d : 2 * d] + load
+        for vector in (*factors, *(ones for ones, _ in (*supports, *contact))):
+            vector.destroy()
         return (
             _Affine(constants=forces[:, 0], rates=forces[:, 1], rows=rows[:d] + rows[d : 2 * d]),
             _Affine(constants=products[2 * d :, 0], rates=products[2 * d :, 1], rows=rows[2 * d :]),
@@ -152,7 +155,10 @@ class Measures:
         constant = condensation.load(0.0)
         rate = condensation.load(1.0)
         rate.axpy(-1.0, constant)
-        return found + np.array([[ones.dot(constant), ones.dot(rate)] for ones in touched])
+        found += np.array([[ones.dot(constant), ones.dot(rate)] for ones in touched])
+        for vector in (constant, rate):
+            vector.destroy()
+        return found
 
 
 def driven(problem: Problem) -> Iterator[str]:

@@ -34,14 +34,12 @@ class Refined:
         x: of the condensed unknowns, (n,).
         force: of laws and bounds there, (n,).
         forces: of the whole body.
-        carried: by contact and laws, in the components of the unknowns.
     """
 
     u: fem.Function
     x: Array
     force: Array
     forces: Forces
-    carried: PETSc.Vec
 
 
 def reaction(system: System, forces: Forces) -> PETSc.Vec:
@@ -73,12 +71,14 @@ def refined(system: System, condensation: Condensation, problem: Problem, graphs
     unknowns = condensation.expand(graphs.x, factor)
     for _ in range(_STEPS):
         forces = contact_state.forces(problem, system.displacement(unknowns))
-        left = reaction(system, forces)
-        left.array[:] -= condensation.spread(-graphs.force).array_r
-        missing = condensation.condensed(-left.array_r)
+        left, carried = reaction(system, forces), condensation.forces.spread(-graphs.force)
+        left.axpy(-1.0, carried)
+        missing = condensation.forces.condensed(-left.array_r)
         before = graphs.x
         graphs.take(missing.condensed)
-        unknowns.array[:] += condensation.change(graphs.x - before, missing)
+        unknowns.array[:] += condensation.forces.change(graphs.x - before, missing)
+        for vector in (left, carried):
+            vector.destroy()
     u = system.displacement(unknowns)
-    forces = contact_state.forces(problem, u)
-    return Refined(u=u, x=graphs.x, force=graphs.force, forces=forces, carried=condensation.spread(-graphs.force))
+    unknowns.destroy()
+    return Refined(u=u, x=graphs.x, force=graphs.force, forces=contact_state.forces(problem, u))

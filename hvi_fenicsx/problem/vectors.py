@@ -93,6 +93,23 @@ def turn(vector: PETSc.Vec, rotation: PETSc.Mat | None) -> None:
         cartesian.destroy()
 
 
+def product(x: PETSc.Vec, *matrices: PETSc.Mat | None) -> Array:
+    """This rank's part of the product of matrices with a vector, one after the other. Collective.
+
+    Args:
+        x: the vector.
+        matrices: the first one is applied first; None: the identity.
+    """
+    made = [x]
+    for matrix in matrices:
+        if matrix is not None:
+            made.append(matrix * made[-1])
+    found = np.array(made[-1].array_r)
+    for vector in made[1:]:
+        vector.destroy()
+    return found
+
+
 def null_space(vectors: list[PETSc.Vec]) -> PETSc.NullSpace:
     """What these vectors span; they are made orthonormal (Gram and Schmidt), in place. Collective."""
     for i, vector in enumerate(vectors):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from ..errors import HviError
 
 
-class ResultError(HviError):
+class ReportError(HviError):
+    """A picture or a page cannot be made; it costs no result."""
+
+
+class ResultError(ReportError):
     """A folder holds no finished result, or its files are damaged."""
 
 
-class PictureError(HviError):
+class PictureError(ReportError):
     """A picture could not be drawn; those that could are in the folder."""
-
-
-class PageError(HviError):
-    """A page could not be written; the rest of the folder is as it was."""

@@ -17,7 +17,6 @@ This module alone knows the keys of the file. With n vertices and c cells in d d
 
 from __future__ import annotations
 
-import os
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -28,6 +27,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..runtime import writing
 from ..typing import Array, Integers
 from .errors import ResultError
 
@@ -113,15 +113,10 @@ def save(path: Path, arrays: SolutionArrays) -> None:
         arrays: the solution.
 
     Raises:
-        OSError: it cannot be written.
+        NotWrittenError: it cannot be written.
     """
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with aside.open("wb") as file:
-            np.savez(file, **dict(_members(arrays)))
-        os.replace(aside, path)
-    finally:
-        aside.unlink(missing_ok=True)
+    with writing.whole(path) as aside, aside.open("wb") as file:
+        np.savez(file, **dict(_members(arrays)))
 
 
 def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:

@@ -9,11 +9,11 @@ from typing import Self
 
 from mpi4py import MPI
 
-from ..errors import InputError
+from ..errors import InputError, NotWrittenError
 from ..runtime import manifest
 from ..runtime.mpi import on_root
 from ..scene import Scene
-from .output_folder import Existing, OutputFolder
+from .output_folder import Existing, OutputFolder, placed
 
 _XML, _PNG = b"</VTKFile>", b"IEND\xaeB`\x82"
 _ENDS = {".pvd": _XML, ".vtu": _XML, ".pvtu": _XML, ".png": _PNG, ".html": b"</html>"}
@@ -51,9 +51,18 @@ class ResultFolder:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
-        """Leave nothing behind of a result that was not finished; not collective."""
+        """Leave nothing behind of a result that was not finished; not collective.
+
+        Raises:
+            NotWrittenError: a file could not be written, in the words of the user.
+        """
         if kind is not None:
             self.discard()
+        if isinstance(error, NotWrittenError):
+            raise self._in_words(error) from None
+
+    def _in_words(self, error: NotWrittenError) -> NotWrittenError:
+        return placed(error, self.target, self.work) if self._folder is None else self._folder.in_words(error)
 
     def _open(self, target: Path, existing: Existing, inputs: Iterable[Path]) -> tuple[Path, Path]:
         self._folder = OutputFolder(target, "result")

@@ -20,15 +20,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Literal
 
-from ..errors import InputError
-from ..runtime import manifest
+from ..errors import InputError, NotWrittenError
+from ..runtime import manifest, writing
 from ..runtime.folder_lock import FolderLock
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.signals import SIGNALS
 from .moving import is_folder, move_in
 
 Existing = Literal["refuse", "replace", "resume"]
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _WAYS = {
     "result": "--force (force=True in Python) replaces it",
     "study": "--resume keeps its finished points, --force begins anew",
@@ -61,7 +60,7 @@ class OutputFolder:
     def __init__(self, target: Path, kind: Kind) -> None:
         self.kind, self.target = kind, resolved(target)
         self.work: Path | None = None
-        self._left = False
+        self._left, self._announced = False, list[str]()
         with self.told():
             self._made = [folder for folder in self.target.parents if not folder.exists()]
             self.target.parent.mkdir(parents=True, exist_ok=True)
@@ -94,13 +93,15 @@ class OutputFolder:
             inputs: files that must not be replaced.
 
         Raises:
-            InputError: it holds other files, or such a folder; it would replace an input.
+            InputError: it holds other files, or such a folder; it would replace an input; it may not be written.
         """
         with self.told(), self._closed_on_error():
             if not self.target.exists():
                 return
             if not self.target.is_dir():
                 raise self._refused("is a file; choose a folder")
+            if not os.access(self.target, os.W_OK | os.X_OK):
+                raise PermissionError(errno.EACCES, "", str(self.target))  # now, not after hours
             if any(self.target.iterdir()):
                 self._check_files(existing, inputs)
 
@@ -146,10 +147,13 @@ class OutputFolder:
             InputError: it cannot be listed.
         """
         with self.told():
-            self.target.mkdir(exist_ok=True)
+            if not self.target.exists():
+                self.target.mkdir()
+                self._made.insert(0, self.target)
             if manifest.read(self.target) is None:
                 manifest.write(self.target, Manifest(kind=self.kind, files={}))
             manifest.add(self.target, [name], changing=True)
+        self._announced.append(name)
         return self.target / name
 
     def move_in(self, inputs: Mapping[str, str], other: Mapping[str, str | None] | None = None) -> tuple[str, ...]:
@@ -217,14 +221,29 @@ class OutputFolder:
         """Say of what the file system refuses where the output was to go.
 
         Raises:
-            InputError: what was refused, and why.
+            NotWrittenError: what was refused, and why.
         """
         try:
             yield
         except OSError as error:
-            name = f"{Path(error.filename).name} " if error.filename and self.work is not None else ""
-            mend = "make room on the disk" if error.errno in _FULL else "choose another folder"
-            raise self._refused(f"{name}could not be written: {error.strerror or error}; {mend}") from None
+            file = Path(error.filename or self.target)
+            inside = any(file.is_relative_to(folder) for folder in (self.work, self.target) if folder)
+            raise self.in_words(writing.not_written(file if inside else self.target, error.errno)) from None
+        except NotWrittenError as error:
+            raise self.in_words(error) from None
+
+    def in_words(self, error: NotWrittenError) -> NotWrittenError:
+        """The error of a file in the words of the user, who knows this folder, and what it still has.
+
+        Args:
+            error: of a file that could not be written.
+        """
+        found = placed(error, self.target, self.work)
+        kept = [manifest.NAME] if self.kind == "study" else self._announced
+        if found is error or not any((self.target / name).exists() for name in kept):
+            return found
+        words = f"{found}; what is finished is kept, --resume goes on from there"
+        return NotWrittenError(found.file, found.reason, words)
 
     def _refused(self, reason: str) -> InputError:
         return InputError(f"--out {self.target}: {reason}")
@@ -237,6 +256,22 @@ def _signals_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def placed(error: NotWrittenError, target: Path, work: Path | None) -> NotWrittenError:
+    """The error of a file as one in the folder that a user knows; one of another file as it is.
+
+    Args:
+        error: of the file.
+        target: the folder.
+        work: the hidden one, in which its files are written.
+    """
+    for folder in filter(None, (work, target)):
+        if error.file.is_relative_to(folder):
+            file = target / error.file.relative_to(folder)
+            name = f"{file.relative_to(target)} " if file != target else ""
+            return NotWrittenError(file, error.reason, f"--out {target}: {name}could not be written: {error.reason}")
+    return error
 
 
 def resolved(target: Path) -> Path:

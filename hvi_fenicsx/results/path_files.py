@@ -13,6 +13,7 @@ from ..certify import certificate
 from ..equilibrium_paths.state import Event
 from ..load_path import LoadPath
 from ..problem.problem import Problem
+from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..solution import Solution
@@ -110,7 +111,7 @@ def _contact_rows(crossing: Crossing, tolerance: float) -> list[list[tuple[str, 
 
 def _write_tables(folder: Path, target: Path, solution: Solution, path: LoadPath) -> None:
     path_table.write_csv(folder / "path.csv", path)
-    (folder / "scene.toml").write_text(dump_scene(solution.scene, target), encoding="utf-8")
+    writing.text(folder / "scene.toml", dump_scene(solution.scene, target))
 
 
 def _outcome(path: LoadPath) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..load_path import LoadPath, PathRow
+from ..runtime import writing
 
 COLUMNS = ("row", "factor", "event", "part", "x", "y", "z", "energy", "work", "dissipated", "stable")
 
@@ -28,7 +29,7 @@ def write_csv(file: Path, path: LoadPath) -> None:
         file: where to.
         path: the path.
     """
-    with file.open("w", newline="", encoding="utf-8") as stream:
+    with writing.told(file), file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns(path))
         writer.writerows(_cells(path, number, row) for number, row in enumerate(path.rows))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from ..runtime import writing
 from ..runtime.mpi import in_turn, on_root
 
 
@@ -24,9 +25,9 @@ def write(comm: MPI.Comm, path: Path, header: Sequence[str], parts: Iterable[Ite
         parts: of this rank the rows of each part, as texts; as many parts on all ranks.
 
     Raises:
-        InputError: on all ranks alike: the file cannot be written.
+        NotWrittenError: on all ranks alike: the file cannot be written.
     """
-    on_root(comm, lambda: path.write_bytes(_text([header])))
+    on_root(comm, lambda: _append(path, _text([header]), "wb"))
     for rows in parts:
         text = _text(rows)
         in_turn(comm, lambda text=text: _append(path, text))  # type: ignore[misc]
@@ -38,7 +39,7 @@ def _text(rows: Iterable[Sequence[str]]) -> bytes:
     return stream.getvalue().encode()
 
 
-def _append(path: Path, text: bytes) -> None:
+def _append(path: Path, text: bytes, mode: str = "ab") -> None:
     if text:
-        with path.open("ab") as stream:
+        with writing.told(path), path.open(mode) as stream:
             stream.write(text)

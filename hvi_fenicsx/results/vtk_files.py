@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from ..errors import InputError
+from ..runtime import writing
 from ..runtime.log import logger
 from ..runtime.mpi import agree, on_root
 from ..typing import Array, Integers
@@ -56,7 +57,7 @@ def write(path: Path, comm: MPI.Comm, grid: Grid, **others: Grid) -> None:
         others: further blocks, as NAME-KEY.pvtu.
 
     Raises:
-        InputError: a file cannot be written, on all ranks alike.
+        NotWrittenError: a file cannot be written, on all ranks alike.
     """
     if _is_there(path, comm):
         files = {path.with_suffix(".pvtu"): grid}
@@ -77,7 +78,7 @@ def write_series(path: Path, comm: MPI.Comm, series: Iterable[tuple[float, Grid]
         series: times, rising, and this rank's part at each.
 
     Raises:
-        InputError: a file cannot be written, on all ranks alike.
+        NotWrittenError: a file cannot be written, on all ranks alike.
     """
     if not _is_there(path, comm):
         return
@@ -100,14 +101,16 @@ def _is_there(path: Path, comm: MPI.Comm) -> bool:
 def _write_parallel(path: Path, comm: MPI.Comm, grid: Grid) -> None:
     """Write a grid: its pieces, and the file that names them. Collective."""
     pieces = [path.with_name(f"{path.stem}_{rank}.vtu") for rank in range(comm.size)]
-    written = _write_piece(pieces[comm.rank], grid)
-    if not all(agree(comm, written)):
-        raise InputError(f"{path.name}: VTK could not write it. Is the disk full?")
+    faults = agree(comm, _write_piece(pieces[comm.rank], grid))
+    for piece, fault in zip(pieces, faults, strict=True):
+        if fault is not None:
+            raise writing.not_written(piece, fault)
     on_root(comm, lambda: _write_pieces(path, grid, pieces))
 
 
-def _write_piece(path: Path, grid: Grid) -> bool:
-    """Whether VTK could write it."""
+def _write_piece(path: Path, grid: Grid) -> int | None:
+    """Write a piece; where VTK could not, why, as in ``errno``."""
+    from vtkmodules.vtkCommonMisc import vtkErrorCode
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter  # a tenth of a second
 
     writer = vtkXMLUnstructuredGridWriter()
@@ -118,7 +121,11 @@ def _write_piece(path: Path, grid: Grid) -> bool:
     writer.EncodeAppendedDataOff()
     writer.SetCompressorTypeToLZ4()
     writer.SetInputData(_vtk_grid(grid))
-    return bool(writer.Write()) and writer.GetErrorCode() == 0
+    written, code = writer.Write(), writer.GetErrorCode()
+    if written and code == 0:
+        return None
+    of_system = {vtkErrorCode.OutOfDiskSpaceError: errno.ENOSPC}
+    return code if 0 < code < vtkErrorCode.FirstVTKErrorCode else of_system.get(code, errno.EIO)
 
 
 def _vtk_grid(grid: Grid) -> Any:
@@ -168,7 +175,8 @@ def _write_collection(path: Path, entries: Iterable[tuple[float, int, str]]) -> 
 
 def _write_xml(path: Path, root: Xml.Element) -> None:
     Xml.indent(root)
-    Xml.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    with writing.told(path):
+        Xml.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
 def _declared(fields: Mapping[str, npt.NDArray[Any]], units: Mapping[str, str]) -> Iterator[Xml.Element]:

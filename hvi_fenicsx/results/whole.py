@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import HviError
 from ..problem.cell_stress import stress_of_parts
+from ..report.errors import ReportError
 from ..report.html import render
 from ..report.pictures.draw import PictureProcess, waiting
-from ..runtime.mpi import asleep_until_all, on_root
+from ..runtime.mpi import on_root
 from ..runtime.processors import is_processor_free
 from ..runtime.timing import Timer
 from ..solution import Solution
@@ -31,7 +31,7 @@ class BegunResult:
     Attributes:
         folder: being written.
         timer: where time goes.
-        tell: is given a line on rank 0 where pictures or page fail; they do not cost the run.
+        tell: is given a line on rank 0 where pictures or page cannot be made; that does not cost the run.
         pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
         sigma: the stress in the parts of the cells that this rank owns, N/m², (c, 3, 3); None where nothing was solved.
     """
@@ -57,17 +57,20 @@ class BegunResult:
         with self.timer("output"):
             record = {**summary(solution), **given}
             write_fields(work, solution, self.sigma)
-            if (drawing := self.pictures) is not None:
-                drawing.begin()
-                _told("pictures", self.tell, lambda: drawing.finish(_PATIENCE))
-            asleep_until_all(comm)
+            on_root(comm, self._draw, asleep=True)
             record["time"] = self.timer.report()
             on_root(comm, lambda: write_record(work, record))
             if report:
-                on_root(comm, lambda: _told("report", self.tell, lambda: render.write(work)))
+                on_root(comm, lambda: made("report", self.tell, lambda: render.write(work)))
         record["time"] = self.timer.report()
         on_root(comm, lambda: write_record(work, record))
         return record
+
+    def _draw(self) -> None:
+        """Have the pictures drawn, and wait for them."""
+        if (drawing := self.pictures) is not None:
+            drawing.begin()
+            made("pictures", self.tell, lambda: drawing.finish(_PATIENCE))
 
 
 def begin_whole(
@@ -115,7 +118,7 @@ def write_whole(
         solution: what was found.
         timer: where time goes.
         given: further entries of the summary.
-        tell: is given a line on rank 0 where pictures or page fail; they do not cost the run.
+        tell: is given a line on rank 0 where pictures or page cannot be made; that does not cost the run.
         pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
     """
     begin_whole(folder, solution, timer, tell, pictures).finish(solution, given)
@@ -138,13 +141,22 @@ def picture_process(
     with contextlib.ExitStack() as stack:
         started: list[PictureProcess] = []
         if wanted and folder.comm.rank == 0:
-            _told("pictures", tell, lambda: started.append(stack.enter_context(waiting(folder.work, dimension))))
+            made("pictures", tell, lambda: started.append(stack.enter_context(waiting(folder.work, dimension))))
         yield next(iter(started), None)
 
 
-def _told(what: str, tell: Callable[[str], None], make: Callable[[], object]) -> None:
-    """Make something from the other files; a line says why it failed."""
+def made(what: str, tell: Callable[[str], None], make: Callable[[], object]) -> None:
+    """Make pictures or a page from the other files of a result; that they cannot be made costs a line. Rank 0 only.
+
+    Args:
+        what: what is made.
+        tell: is given the line.
+        make: makes it.
+
+    Raises:
+        NotWrittenError: a file could not be written: then the result is not whole.
+    """
     try:
         make()
-    except HviError as error:
+    except ReportError as error:
         tell(f"{what}: {error}")

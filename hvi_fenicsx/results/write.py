@@ -10,6 +10,7 @@ import numpy as np
 
 from ..problem.stress import von_mises
 from ..report.solution_arrays import FILE, save
+from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..solution import Solution
@@ -35,7 +36,7 @@ def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | N
         contact_table.write(comm, folder / "contact.csv", rows)
     arrays = gathering.solution_arrays(solution, stress, rows)
     on_root(comm, lambda: None if arrays is None else save(folder / FILE, arrays))
-    on_root(comm, lambda: _text(folder / "scene.toml", dump_scene(solution.scene, target)))
+    on_root(comm, lambda: writing.text(folder / "scene.toml", dump_scene(solution.scene, target)))
 
 
 def write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None:
@@ -64,8 +65,4 @@ def write_record(folder: Path, record: dict[str, Any]) -> None:
         folder: where to.
         record: the summary.
     """
-    _text(folder / "summary.json", json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    writing.text(folder / "summary.json", json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")

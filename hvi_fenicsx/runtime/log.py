@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from ..errors import InputError
-from . import terminal
+from . import terminal, writing
 from .argument_checks import require_kind
 from .newton_step import NewtonStep
 
@@ -95,7 +95,8 @@ class RunLog(logging.FileHandler):
     """
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path, mode="w", encoding="utf-8")
+        with writing.told(path):
+            super().__init__(path, mode="w", encoding="utf-8")
         self._error: OSError | None = None
         self.addFilter(lambda record: record.name not in TOLD_BY_COMMANDS)
         self.setFormatter(_ElapsedFormatter())
@@ -118,11 +119,12 @@ class RunLog(logging.FileHandler):
         """Close the file.
 
         Raises:
-            OSError: a record could not be written.
+            NotWrittenError: a record could not be written.
         """
         self.close()
-        if self._error is not None:
-            raise self._error
+        with writing.told(Path(self.baseFilename)):
+            if self._error is not None:
+                raise self._error
 
 
 class _ElapsedFormatter(logging.Formatter):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
+from . import writing
 from .versions import __version__
 
 NAME = "manifest.json"
@@ -78,15 +79,13 @@ def write(folder: Path, manifest: Manifest) -> None:
         manifest: what it says.
 
     Raises:
-        OSError: it cannot be written.
+        NotWrittenError: it cannot be written.
     """
     data: dict[str, Any] = {"program": _PROGRAM, "format": _FORMAT, "version": __version__, **vars(manifest)}
-    aside = folder / f".{NAME}.part"
-    with aside.open("w", encoding="utf-8") as file:
+    with writing.whole(folder / NAME) as aside, aside.open("w", encoding="utf-8") as file:
         file.write(json.dumps(data, indent=1) + "\n")
         file.flush()
         os.fsync(file.fileno())
-    os.replace(aside, folder / NAME)
 
 
 def listed(folder: Path) -> dict[str, str | None]:
@@ -104,7 +103,7 @@ def add(folder: Path, names: Iterable[str], *, changing: bool = False) -> None:
         changing: whether they still change, or are yet to come.
 
     Raises:
-        OSError: the manifest cannot be written.
+        NotWrittenError: the manifest cannot be written.
     """
     known = read(folder)
     if known is None:

@@ -32,17 +32,21 @@ def agree(comm: MPI.Comm, value: T) -> list[T]:
     return comm.allgather(value)
 
 
-def on_root(comm: MPI.Comm, action: Callable[[], T]) -> T:
+def on_root(comm: MPI.Comm, action: Callable[[], T], *, asleep: bool = False) -> T:
     """Run an action on rank 0 only; all ranks get its result, or raise its error. Collective.
 
     Args:
         comm: the ranks.
         action: what to do; only errors of the program and of the file system may come from it.
+        asleep: whether the other ranks sleep meanwhile, since other processes may need their processors.
 
     Raises:
         HviError: what the action raised; of a file that cannot be read or written, which one and why.
     """
-    error, result = comm.bcast(_tried(action) if comm.rank == 0 else None, root=0)
+    tried = _tried(action) if comm.rank == 0 else None
+    if asleep:
+        asleep_until_all(comm)
+    error, result = comm.bcast(tried, root=0)
     if error is not None:
         raise error
     return result

@@ -113,8 +113,8 @@ class ActiveSetSolver:
             models: what takes the place of the laws, by term.
             rtol: relative tolerance of the linear solve.
         """
-        self.system.jacobian.set_rates(self.system.tangents(x, models))
-        self.system.residual(x, self._residual, models)
+        self.system.jacobian.set_rates(self.system.equations.tangents(x, models))
+        self.system.equations.residual(x, self._residual, models)
         self._residual.array[held] = 0.0
         self.held.prepare(held)
         step = x.duplicate()
@@ -151,7 +151,7 @@ class ActiveSetSolver:
             line_search: PETSc's name; ``bt`` uses the energy.
             max_iterations: Newton steps at most.
             steady: whether x's active set is expected to be the final one; the first linear solve is then exact.
-            foundation: as in :meth:`.System.tangents`; the residual has none, so the solution is the same.
+            foundation: as in :meth:`.Equations.tangents`; the residual has none, so the solution is the same.
         """
         with self.timer("solve"):
             run = _SnesRun(self, models, tolerance, lower, upper, steady=steady, foundation=foundation)
@@ -176,7 +176,7 @@ class ActiveSetSolver:
             models: what takes the place of the laws, by term.
             tolerance: of :meth:`measure`.
         """
-        self.system.residual(x, self._residual, models)
+        self.system.equations.residual(x, self._residual, models)
         sizes = self.convergence.sizes_without_bounds(x, self._residual)
         found = replace(step, converged=sizes.worst <= tolerance, measure=sizes.worst)
         return found if found.converged else self.convergence.accept_rounding(found, sizes, x)
@@ -213,7 +213,7 @@ class _SnesRun:
         snes.setFunction(self._function, system.load.duplicate())
         snes.setJacobian(self._jacobian, unextracted(self.owner.held))
         snes.setVariableBounds(self.lower, self.upper)
-        snes.setObjective(lambda _, x: system.energy(x, self.models))
+        snes.setObjective(lambda _, x: system.equations.energy(x, self.models))
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=max_iterations)
         snes.getKSP().setTolerances(rtol=self.thresholds.finest_accuracy, atol=0.0, max_it=linear.iterations)
@@ -258,11 +258,11 @@ class _SnesRun:
         return "interrupted" if self.stopped else _REASON.get(int(self.reason), str(self.reason))
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-        self.owner.system.residual(x, f, self.models)
+        self.owner.system.equations.residual(x, f, self.models)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
         system = self.owner.system
-        system.jacobian.set_rates(system.tangents(x, self.models, self.foundation))
+        system.jacobian.set_rates(system.equations.tangents(x, self.models, self.foundation))
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         x, (f, _) = snes.getSolution(), snes.getFunction()[:2]

@@ -89,7 +89,7 @@ def _push_onto_bounds(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, 
     """
     system = solver.system
     residual = system.load.duplicate()
-    system.residual(x, residual, models)
+    system.equations.residual(x, residual, models)
     low, high = system.lower.array_r[contact], system.upper.array_r[contact]
     between = np.isfinite(low) & np.isfinite(high) & (low < high)
     target = np.where(residual.array_r[contact] >= 0.0, low, high)

@@ -105,7 +105,7 @@ class Condensation(Method):
             converged=converged,
             reason="stationary" if converged else failure,
             counts=counts,
-            energies=(self.system.energy(found, self.models),),
+            energies=(self.system.equations.energy(found, self.models),),
             interrupted=self.stopped and not converged,
         )
 
@@ -148,9 +148,9 @@ class Condensation(Method):
     def _judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """The candidate for a solution at x, and its residual of the inequality in the full space."""
         residual = x.duplicate()
-        self.system.residual(x, residual, self.models)
+        self.system.equations.residual(x, residual, self.models)
         found = onto_bounds(self.system, x, residual)
-        self.system.residual(found, residual, self.models)
+        self.system.equations.residual(found, residual, self.models)
         return found, self.solver.measure(found, residual, self.system.lower, self.system.upper)
 
 
@@ -209,12 +209,12 @@ class _Complementarity:
 
     def force(self, x: Array) -> Array:
         """F, (n,): the residual on Γc of a body that is undisplaced inside, corrected by its response."""
-        self.system.residual(self.schur.spread(x), self._residual, self.models)
+        self.system.equations.residual(self.schur.spread(x), self._residual, self.models)
         return np.asarray(self._residual.array_r[self.schur.kept] - self.schur.G @ x + self.schur.g)
 
     def tangent(self, x: Array) -> Array:
         """F', (n, n)."""
-        self.system.jacobian.set_rates(self.system.tangents(self.schur.spread(x), self.models))
+        self.system.jacobian.set_rates(self.system.equations.tangents(self.schur.spread(x), self.models))
         kept = self.schur.kept
         return np.asarray(_sparse(self.system.jacobian.matrix)[kept][:, kept].toarray() - self.schur.G)
 

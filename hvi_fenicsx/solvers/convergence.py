@@ -118,9 +118,9 @@ class ConvergenceTest:
         """
         system, safety = self._system, self._thresholds.rounding_safety
         sample = system.load.duplicate()
-        system.rounding_sample(x, sample)
+        system.equations.rounding_sample(x, sample)
         norm, traction = (safety * size for size in self._forces(sample.array_r, x))
-        system.rounding_sample(system.jacobian.strained(x), sample)
+        system.equations.rounding_sample(system.jacobian.strained(x), sample)
         unknowns = system.references.vertices * system.problem.scales.dimension
         noise = safety * system.references.norms(sample.array_r) / np.sqrt(unknowns)
         sample.destroy()

@@ -78,7 +78,7 @@ class ConvexStep:
 
     def energy(self, x: PETSc.Vec) -> float:
         """The true energy at x. Collective."""
-        return self._system.energy(x, self._laws)  # type: ignore[arg-type]
+        return self._system.equations.energy(x, self._laws)  # type: ignore[arg-type]
 
     def energy_rounding(self, energy: float, x: PETSc.Vec) -> float:
         """By how much rounding may change an energy: on stretched meshes it is a difference of much larger numbers.
@@ -87,7 +87,7 @@ class ConvexStep:
             energy: at x.
             x: the displacement.
         """
-        return max(self._thresholds.energy_rounding * abs(energy), self._system.energy_rounding(x), 1e-300)
+        return max(self._thresholds.energy_rounding * abs(energy), self._system.equations.energy_rounding(x), 1e-300)
 
     def anywhere(self, flags: Sequence[npt.NDArray[np.generic]]) -> bool:
         """Whether any flag is set, on any rank. Collective."""
@@ -132,7 +132,7 @@ class ConvexStep:
         models = self.majorants(cells, self._nearest(x, xi))
         if self.anywhere(self._overloaded(x, models)):
             return math.inf
-        self._system.residual(x, self._residual, models)
+        self._system.equations.residual(x, self._residual, models)
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
         return self._solver.measure(x, self._residual, lower, upper)
 
@@ -206,7 +206,7 @@ class ConvexStep:
 
     def _carried(self, x: PETSc.Vec, exact: Sequence[ExactLaw], drops: Sequence[Array]) -> list[Array]:
         """The ξ that balance what holds vertices on drops, by term, (m,) each."""
-        self._system.residual(x, self._residual, exact)
+        self._system.equations.residual(x, self._residual, exact)
         found = []
         for term, model, at, a in zip(self._system.terms, exact, drops, self.arguments(x), strict=True):
             middle = (model.law.concave.left(a) + model.law.concave.right(a)) / 2
@@ -218,7 +218,7 @@ class ConvexStep:
     def _overloaded(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
         if not kink_bounds.exist([m.cells for m in models]):
             return [np.zeros(len(m.cells.index), dtype=np.int64) for m in models]
-        self._system.residual(x, self._residual, models)
+        self._system.equations.residual(x, self._residual, models)
         slack = self._thresholds.kink_slack * self._options.tolerance
         return kink_bounds.overloaded(self._system, x, self._residual, models, slack)
 

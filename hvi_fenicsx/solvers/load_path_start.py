@@ -90,17 +90,16 @@ def follow(system: System, thresholds: PathThresholds, interrupted: Callable[[],
     except (InputError, SolverError):
         return None
     found = _on_first_rank(system, condensation.problem, thresholds, interrupted)
-    start = None if found is None else _expanded(system, condensation, found)
+    start = None if found is None else _expanded(condensation, found)
     condensation.free()
     return start
 
 
-def _expanded(system: System, condensation: Condensation, found: FullLoad) -> PathStart:
+def _expanded(condensation: Condensation, found: FullLoad) -> PathStart:
     """The same of the whole body. Collective."""
     borne = None
     if (last := found.borne) is not None:
-        u = system.displacement(condensation.expand(last.x, last.factor))
-        borne = Borne(u=u, factor=last.factor)
+        borne = Borne(u=condensation.displacement(last.x, last.factor), factor=last.factor)
     x = None if found.x is None else condensation.expand(found.x)
     return PathStart(x=x, reason=found.reason, borne=borne)
 
@@ -114,7 +113,7 @@ def _on_first_rank(
 
     def followed(ask: Callable[[], bool]) -> FullLoad | None:
         with suppress(np.linalg.LinAlgError, InputError):  # some edges in space have no path
-            return at_full_load(problem, thresholds.most_events, Watch(ask))
+            return at_full_load(problem, thresholds.most_events, Watch(ask), thresholds.following)
         return None
 
     return on_root_asking(system.comm, followed, interrupted)

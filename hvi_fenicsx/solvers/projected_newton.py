@@ -61,7 +61,7 @@ class ProjectedNewton:
         test, reason, stopped = self._solver.convergence, "no steps left", False
         best, stalled = np.inf, 0
         for iteration in range(most + 1):
-            self._system.residual(x, self._residual, self._models)
+            self._system.equations.residual(x, self._residual, self._models)
             sizes = test.sizes(x, self._residual, self._lower, self._upper)
             if self._solver.progress:
                 self._solver.progress(iteration, sizes.worst, self._solver.in_contact(x))
@@ -96,7 +96,7 @@ class ProjectedNewton:
 
     def _newton_step(self, x: PETSc.Vec) -> PETSc.Vec:
         system, held = self._system, self._solver.held
-        system.jacobian.set_rates(system.tangents(x, self._models, self._thresholds.foundation))
+        system.jacobian.set_rates(system.equations.tangents(x, self._models, self._thresholds.foundation))
         at, r = system.jacobian.rows.dofs, self._residual.array_r
         low, high, u = (v.array_r[at] for v in (self._lower, self._upper, x))
         pushed = ((u <= low) & (r[at] > 0.0)) | ((u >= high) & (r[at] < 0.0)) | (low >= high)
@@ -155,7 +155,7 @@ class ProjectedNewton:
     def _slopes(self, x: PETSc.Vec, step: PETSc.Vec, lengths: Array) -> Array:
         """The slopes of the energy along the projected path from x, by body: they share no force. Collective."""
         there = self._along(x, step, lengths)
-        self._system.residual(there, self._residual, self._models)
+        self._system.equations.residual(there, self._residual, self._models)
         u, d = there.array_r, step.array_r
         stopped = ((u <= self._lower.array_r) & (d < 0.0)) | ((u >= self._upper.array_r) & (d > 0.0))
         works = self._residual.array_r * np.where(stopped, 0.0, d)

@@ -75,7 +75,7 @@ class SolverRun(ABC):
 
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """The candidate for a solution at x, and its residual of the inequality. Collective."""
-        self.system.residual(x, self.residual, self.models)
+        self.system.equations.residual(x, self.residual, self.models)
         return x, self.solver.measure(x, self.residual, self.system.lower, self.system.upper)
 
 
@@ -119,7 +119,7 @@ class SmoothMethod(Method):
             converged=converged,
             reason="stationary" if converged else failure,
             counts=run.counts,
-            energies=(system.energy(found, run.models),),
+            energies=(system.equations.energy(found, run.models),),
             interrupted=run.stopped,
         )
 

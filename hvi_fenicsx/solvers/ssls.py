@@ -67,7 +67,8 @@ class _SnesRun(SolverRun):
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, False)
         snes = PETSc.SNES().create(self.system.comm)
         snes.setType("vinewtonssls")
-        snes.setFunction(lambda _, x, f: self.system.residual(x, f, self.models), self.system.load.duplicate())
+        equations, residual = self.system.equations, self.system.load.duplicate()
+        snes.setFunction(lambda _, x, f: equations.residual(x, f, self.models), residual)
         snes.setJacobian(self._tangent, self.matrix)
         snes.setVariableBounds(self.system.lower, self.system.upper)
         snes.setConvergenceTest(self._converged)
@@ -77,12 +78,12 @@ class _SnesRun(SolverRun):
         return snes
 
     def _tangent(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
-        self.system.jacobian.set_rates(self.system.tangents(x, self.models))
+        self.system.jacobian.set_rates(self.system.equations.tangents(x, self.models))
         self.system.jacobian.matrix.copy(j, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """The candidate on its bounds, and its residual of the inequality. Collective."""
-        self.system.residual(x, self.residual, self.models)
+        self.system.equations.residual(x, self.residual, self.models)
         return super().judge(onto_bounds(self.system, x, self.residual))
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:

@@ -33,8 +33,8 @@ class _TaoRun(SolverRun):
         """``bnls`` on the true Hessian."""
         tao = PETSc.TAO().create(self.system.comm)
         tao.setType("bnls")
-        tao.setObjective(lambda _, x: self.system.energy(x, self.models))
-        tao.setGradient(lambda _, x, g: self.system.residual(x, g, self.models), None)
+        tao.setObjective(lambda _, x: self.system.equations.energy(x, self.models))
+        tao.setGradient(lambda _, x, g: self.system.equations.residual(x, g, self.models), None)
         rows = _numbered_rows(self.system)
         tao.setHessian(self._tangent, self.matrix, rows)
         tao.setVariableBounds((self.system.lower, self.system.upper))
@@ -49,7 +49,7 @@ class _TaoRun(SolverRun):
 
     def _tangent(self, tao: PETSc.TAO, x: PETSc.Vec, h: PETSc.Mat, rows: PETSc.Mat) -> None:
         """The true Hessian for TAO; the system is left with the tangent of the preconditioner."""
-        self.system.jacobian.set_rates(self.system.tangents(x, self.models))
+        self.system.jacobian.set_rates(self.system.equations.tangents(x, self.models))
         self.system.jacobian.matrix.copy(h, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self.system.jacobian.set_rates(self._convex(x))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from ..equilibrium_paths.thresholds import Thresholds as FollowingThresholds
 from ..system.thresholds import Thresholds as LinearThresholds
 
 FULL_STEPS = "basic"
@@ -157,6 +158,7 @@ class PathThresholds:
         most_events: of one path.
         largest_dense: unknowns of Γc's vertices up to which the stiffness is formed for a load path of its own, where
             solves with factors take longer.
+        following: how paths are followed.
     """
 
     quick_steps: int = 8
@@ -167,6 +169,7 @@ class PathThresholds:
     whole_curve_unknowns: int = 400
     most_events: int = 20_000
     largest_dense: int = 5_000
+    following: FollowingThresholds = field(default_factory=FollowingThresholds)
 
 
 @dataclass(frozen=True, kw_only=True)

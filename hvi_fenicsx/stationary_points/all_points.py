@@ -29,15 +29,6 @@ from .rigid_balance import RigidBalance
 from .scalar_problem import ScalarProblem
 from .tightening import ForceIntervals
 
-MOST_ROUNDS = 6
-"""How often a cell is tightened before it is divided."""
-SHORTER = 0.9
-"""Tightening goes on while some interval shrinks to this share."""
-MOST_LOOKS = 4
-"""How often a cell is tested by the weighed balance before it is divided."""
-SHORTER_LOOK = 0.7
-"""It is tested again while some interval shrinks to this share."""
-
 
 @dataclass(kw_only=True)
 class Enumeration:
@@ -46,6 +37,7 @@ class Enumeration:
     Attributes:
         problem: the problem; of curved laws that of the polylines near them.
         laws: the laws, where these are curved.
+        cut: whether the test of a cell is to be cut short, since the search stops.
         points: found so far.
         cells: looked at so far.
         waiting: a stack of cells not yet decided.
@@ -54,6 +46,7 @@ class Enumeration:
 
     problem: ScalarProblem
     laws: CurvedLaws | None = None
+    cut: Callable[[], bool] = lambda: False
     points: PointList = field(init=False)
     cells: int = 0
     waiting: list[Box] = field(default_factory=list)
@@ -64,7 +57,8 @@ class Enumeration:
             raise ValueError("of polylines near curved laws the laws themselves are needed")
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
         self._balance = RigidBalance(self.problem)
-        self.points = PointList(self.problem.size)
+        self._thresholds = self.problem.thresholds.cells
+        self.points = PointList(self.problem.size, self.problem.thresholds.points.same)
         self._cells: LawsOfCells = PolylineCells(self.problem) if self.laws is None else CurvedCells(self.laws)
         self._linear, self._relaxation = LinearTest(self.problem), Relaxation(self.problem)
         self._weighed = BalanceTest(self._relaxation)
@@ -116,17 +110,17 @@ class Enumeration:
     def _looked(self, cell: Box) -> Look | None:
         """The cell made smaller, and where to divide it; None if no stationary point is in it."""
         look = None
-        for _ in range(MOST_LOOKS):
-            if (tight := self._tightened(cell)) is None or (look := self._weighed.look(tight)) is None:
+        for _ in range(self._thresholds.most_looks):
+            if (tight := self._tightened(cell)) is None or (look := self._weighed.look(tight, self.cut)) is None:
                 return None
-            cell = look.cell
-            if not np.any(cell.high - cell.low < SHORTER_LOOK * (tight.high - tight.low)):
+            cell, shorter = look.cell, self._thresholds.shorter_look
+            if self.cut() or not np.any(cell.high - cell.low < shorter * (tight.high - tight.low)):
                 break
         return look
 
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller; None if no stationary point is in it."""
-        for _ in range(MOST_ROUNDS):
+        for _ in range(self._thresholds.most_rounds):
             sides = self._forces.tightened(cell.low, cell.high)
             sides = None if sides is None else self._balance.tightened(*sides)
             if sides is None:
@@ -134,7 +128,7 @@ class Enumeration:
             smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
             if np.any(smaller.low > smaller.high):
                 return None
-            shrinks = np.any(smaller.high - smaller.low < SHORTER * (cell.high - cell.low))
+            shrinks = np.any(smaller.high - smaller.low < self._thresholds.shorter * (cell.high - cell.low))
             cell = smaller
             if not shrinks:
                 break

@@ -13,20 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array, Integers
+from .cell_thresholds import BalanceThresholds
 from .interior_point import Iterate, Programme, iterates
 from .scalar_problem import ScalarProblem
 from .weighed_balance import Graphs, Split
-
-MOST_ARCS = 12
-"""Arcs of one law of which points are taken; of more, every second, or third, ..."""
-BETWEEN = (0.25, 0.5, 0.75)
-"""Points between the ends of arcs on which h is convex."""
-PRICE = 1e3
-"""Price of a force that is missing, relative to the largest displacement of the cell."""
-NOISE = 1e-8
-"""Means off their graphs by a smaller share of the energies are on them: the method is no more exact."""
-LEAST_SCALE = 1e-3
-"""Least scale of a force, relative to the largest one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +55,8 @@ class BalanceProgramme:
 
     def __init__(self, problem: ScalarProblem, split: Split, low: Array, high: Array) -> None:
         self._problem, self._split, self._low, self._high = problem, split, low, high
-        self._points = _points(Graphs.of(problem, low, high), split.diagonal)
+        self._thresholds = problem.thresholds.balance
+        self._points = _points(Graphs.of(problem, low, high), split.diagonal, self._thresholds)
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
         below, above = np.flatnonzero(low <= problem.lower), np.flatnonzero(high >= problem.upper)
         self._pushed = np.concatenate([below, above])
@@ -83,7 +74,7 @@ class BalanceProgramme:
         np.maximum.at(most, points.owner, points.t)
         np.minimum.at(least, points.owner, points.t)
         forces = np.maximum(most - least, np.abs(self._problem.stiffness) @ self._half)
-        forces = np.maximum(forces, LEAST_SCALE * float(forces.max()) + 1e-300)
+        forces = np.maximum(forces, self._thresholds.least_scale * float(forces.max()) + 1e-300)
         largest = np.maximum(np.abs(most), np.abs(least)) + np.abs(self._problem.force)
         return forces, float(largest @ self._half) + 1e-300
 
@@ -94,7 +85,7 @@ class BalanceProgramme:
         along = np.divide(away, half[owner], out=np.zeros_like(away), where=half[owner] > 0.0)
         pull = 2.0 * (matrix @ middle) - problem.force
         cost = self._split.diagonal[owner] * points.x**2 + points.x * points.t + pull[owner] * away
-        price = PRICE * scale * float(np.max(np.abs([self._low, self._high]))) / unit
+        price = self._thresholds.price * scale * float(np.max(np.abs([self._low, self._high]))) / unit
         pushing = self._push * self._bounds * scale[self._pushed] / unit
         spare, each = np.zeros(len(self._push) + 2 * n), np.arange(n)
         ones = np.ones(n)
@@ -116,7 +107,7 @@ class BalanceProgramme:
 
     def iterates(self) -> Iterator[Iterate]:
         """The steps of the method."""
-        return iterates(self._programme)
+        return iterates(self._programme, self._thresholds)
 
     def value(self, here: Iterate) -> float:
         """The energy of an iterate.
@@ -152,18 +143,19 @@ class BalanceProgramme:
         forces = pushes * self._force_scale[self._pushed]
         np.add.at(bound, self._pushed, forces * np.abs(x[self._pushed] - self._bounds))
         law, size = x * t + d * x * x - mean, np.abs(x * t) + np.abs(d) * x * x
-        return Guide(x=x, law=np.where(free & (law > NOISE * size), law, 0.0), bound=np.where(free, bound, 0.0))
+        far = free & (law > self._thresholds.noise * size)
+        return Guide(x=x, law=np.where(far, law, 0.0), bound=np.where(free, bound, 0.0))
 
 
-def _points(graphs: Graphs, diagonal: Array) -> _Points:
+def _points(graphs: Graphs, diagonal: Array, thresholds: BalanceThresholds) -> _Points:
     """The ends of arcs, and some points between them where h is convex."""
     number, place = graphs.meets.sum(axis=1)[:, None], np.cumsum(graphs.meets, axis=1) - 1
-    stride = np.maximum(1, -(-number // MOST_ARCS))
+    stride = np.maximum(1, -(-number // thresholds.most_arcs))
     owner, k = np.nonzero(graphs.meets & ((place % stride == 0) | (place == number - 1)))
     begin, end = graphs.begin[owner, k], graphs.end[owner, k]
     inner = np.flatnonzero((diagonal[owner] + graphs.slope[owner, k] > 0.0) & (end > begin))
-    which = [np.arange(len(owner))] * 2 + [inner] * len(BETWEEN)
-    x = np.concatenate([begin, end, *(begin[inner] + share * (end - begin)[inner] for share in BETWEEN)])
+    which = [np.arange(len(owner))] * 2 + [inner] * len(thresholds.between)
+    x = np.concatenate([begin, end, *(begin[inner] + share * (end - begin)[inner] for share in thresholds.between)])
     each = np.concatenate(which)
     owner, k = owner[each], k[each]
     return _Points(owner=owner, x=x, t=graphs.offset[owner, k] + graphs.slope[owner, k] * x)

@@ -26,20 +26,8 @@ from .scalar_problem import ScalarProblem
 from .search import find
 from .search_lowest import begun
 from .stationarity import Kind
+from .thresholds import DEFAULT, Thresholds
 
-COARSE_GAP = 1e-3
-"""Gap of the first search where laws are curved, from which the error of their polylines is chosen."""
-ERROR_SHARE = 0.05
-"""Share of the gap that this error is aimed at,"""
-MOST_SHARE = 0.4
-"""and that it may take, on each side."""
-MOST_SEARCHES = 6
-"""First searches, each in the region that the one before has left."""
-SHORTER = 0.5
-"""The next one is made while some side of the region shrinks to this share."""
-
-SAME = 1e-9
-"""Points of two ranks nearer than this share of the displacements are one."""
 NONE = Found(points=(), complete=True, lower_bound=None, proven=True, nodes=0, reason="no solution exists")
 """What is found where the load moves a body away."""
 
@@ -49,22 +37,30 @@ class Equilibria:
 
     Args:
         prepared: the scene, assembled.
+        thresholds: the numbers that tune the search.
+        interrupted: whether to stop (collective), asked while the body is condensed.
 
     Attributes:
         problem: the condensed problem; None where no solution exists, and nothing is searched.
 
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched.
+        Interrupted: on all ranks alike: it is to stop.
     """
 
-    def __init__(self, prepared: Preparation) -> None:
+    def __init__(
+        self,
+        prepared: Preparation,
+        thresholds: Thresholds = DEFAULT,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> None:
         obstacle_force.refuse(prepared.problem, "equilibria are not searched")
-        self._prepared = prepared
+        self._prepared, self._thresholds = prepared, thresholds
         self.problem: ScalarProblem | None = None
         if prepared.solvability.state != "escapes":
             with prepared.timer("assembly"):
-                self._condensation = Condensation(prepared.system)
-                self.problem = scalar_problem(self._condensation.problem)
+                self._condensation = Condensation(prepared.system, interrupted=interrupted)
+                self.problem = scalar_problem(self._condensation.problem, thresholds=thresholds)
 
     def find(
         self,
@@ -105,7 +101,7 @@ class Equilibria:
                 wanted = self._refined(self.problem, wanted, stop, report)
             elif self.problem.error and not len(self.problem.lengths):
                 condensed = self._condensation.problem
-                near = scalar_problem(condensed, tractions=True)
+                near = scalar_problem(condensed, tractions=True, thresholds=self._thresholds)
                 wanted = replace(wanted, curved=CurvedLaws(near=near, problem=condensed))
             return find(self.problem, wanted, stop, report, saved, keep)
 
@@ -127,25 +123,28 @@ class Equilibria:
         self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]
     ) -> Wanted:
         """Polylines of curved laws as near as the gap needs, and a point of low energy to begin at. Collective."""
-        start = begun(coarse, COARSE_GAP, stop, report)
+        limits = self._thresholds.lowest
+        start = begun(coarse, limits.coarse_gap, stop, report)
         if start is None:
             return wanted
-        for _ in range(MOST_SEARCHES):
+        for _ in range(limits.most_searches):
             size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
-            aim = ERROR_SHARE * wanted.gap * size
-            self.problem = scalar_problem(self._condensation.problem, tolerance=aim, within=start.reach)
-            if self.problem.error <= MOST_SHARE * wanted.gap * size:
+            aim = limits.error_share * wanted.gap * size
+            self.problem = scalar_problem(
+                self._condensation.problem, tolerance=aim, within=start.reach, thresholds=self._thresholds
+            )
+            if self.problem.error <= limits.most_share * wanted.gap * size:
                 break
-            nearer = begun(self.problem, COARSE_GAP, stop, report, start)
-            if nearer is None or np.all(nearer.reach > SHORTER * start.reach):
+            nearer = begun(self.problem, limits.coarse_gap, stop, report, start)
+            if nearer is None or np.all(nearer.reach > limits.shorter * start.reach):
                 break
             start = nearer
         return replace(wanted, start=start)
 
     def _check_same(self, x: Array) -> None:
         """Refuse points that differ from rank to rank. Collective."""
-        comm = self._prepared.system.comm
-        same = np.max(np.abs(comm.bcast(x) - x), initial=0.0) <= SAME * np.max(np.abs(x), initial=0.0)
+        comm, allowed = self._prepared.system.comm, self._thresholds.same_on_ranks * np.max(np.abs(x), initial=0.0)
+        same = np.max(np.abs(comm.bcast(x) - x), initial=0.0) <= allowed
         if not all(agree(comm, bool(same))):
             raise SolverError("the ranks found different equilibria; run on one")
 
@@ -159,10 +158,15 @@ class Equilibria:
             SolverError: on all ranks alike: they found different points.
         """
         self._check_same(point.x)
-        u = self._prepared.system.displacement(self._condensation.expand(point.x))
+        u = self._condensation.displacement(point.x)
         found = SolveResult(u=u, method="stationary points of the condensed problem", converged=True, reason=point.kind)
         known = certified(self._prepared, found)
         if known.converged or self.problem is None or not (self.problem.error or len(self.problem.lengths)):
             return known
         u.x.array[:] *= self._prepared.problem.scales.displacement  # the point is not exact
         return finish(self._prepared, start=u, estimating=False)
+
+    def free(self) -> None:
+        """Free the condensed body; no solution can be asked for any more. Collective."""
+        if self.problem is not None:
+            self._condensation.free()

@@ -15,13 +15,6 @@ from .balance_programme import Guide
 from .boxes import Box
 from .scalar_problem import ScalarProblem
 
-WIDE = 30.0
-"""Intervals of pivots that are wider than this many times the largest joint are divided in growing parts,"""
-RATIO = 100.0
-"""if their ends differ by this factor at least."""
-OFF_END = 0.2
-"""A place between joints is at least this share of the interval from its ends."""
-
 
 def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guides: Sequence[Guide]) -> list[Box]:
     """The parts of a cell, the one to look at first last; each has its share of the search.
@@ -52,10 +45,11 @@ def at_bounds(problem: ScalarProblem, cell: Box) -> Mask:
 
 def _far(problem: ScalarProblem, pivots: Integers, cell: Box) -> list[Box]:
     """Growing parts of the widest interval of a pivot that reaches far: near the joints, and far on either side."""
+    thresholds = problem.thresholds.cells
     begin, end = cell.low[pivots], cell.high[pivots]
     near = np.maximum(problem.joint, np.maximum(begin, -end))
     most = np.maximum(end, -begin)
-    wide = np.flatnonzero((end - begin > WIDE * problem.joint) & (most > RATIO * near))
+    wide = np.flatnonzero((end - begin > thresholds.wide * problem.joint) & (most > thresholds.ratio * near))
     if not wide.size:
         return []
     j = wide[np.argmax((end - begin)[wide])]
@@ -77,7 +71,7 @@ def _guided(problem: ScalarProblem, cell: Box, guide: Guide) -> list[Box]:
 def _near(problem: ScalarProblem, cell: Box, i: int, x: float) -> Iterator[Box]:
     """Parts at the joint that is nearest to a place; at the place if there is none, or only a bend near an end."""
     low, high = float(cell.low[i]), float(cell.high[i])
-    short = OFF_END * (high - low)
+    short = problem.thresholds.cells.off_end * (high - low)
     at, jump = min(_joints(problem, cell, i), key=lambda joint: abs(joint[0] - x), default=(low, 0.0))
     if _jumps(problem, i, jump) or low + short <= at <= high - short:
         return _at_joint(problem, cell, i, at, jump)

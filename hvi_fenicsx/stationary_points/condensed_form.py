@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +16,8 @@ from ..typing import Array
 from .arcs import FREE, Chain, chain, total
 from .law_graphs import LawGraph, exact_graph, law_graph, near_graph
 from .lengths import Lengths
-from .scalar_problem import FAR, ScalarProblem
-
-COARSE = 1e-4
-"""Error of the energy of curved laws, relative to their scale, with which the first search is made."""
-NEAR = 5e-4
-"""Error of the tractions of curved laws, relative to their scale, in the search for all equilibria."""
-ROUNDED = 1e-12
-"""Widening of this error by rounding."""
+from .scalar_problem import ScalarProblem
+from .thresholds import DEFAULT, PolylineThresholds, Thresholds
 
 
 def scalar_problem(
@@ -32,6 +27,7 @@ def scalar_problem(
     tolerance: float | None = None,
     tractions: bool = False,
     within: Array | None = None,
+    thresholds: Thresholds = DEFAULT,
 ) -> ScalarProblem:
     """The problem at a load factor.
 
@@ -41,38 +37,52 @@ def scalar_problem(
         tolerance: energy by which curved laws may differ from their polylines, altogether; None: a coarse one.
         tractions: whether the polylines are to be near the tractions, too; then `force_error` is how near.
         within: displacements up to which curved laws are followed, (n,); None: far beyond all that the laws tell apart.
+        thresholds: the numbers that tune the search.
 
     Raises:
         InputError: a law has no potential, or acts on the length of a vector whose components have other laws.
     """
-    found: dict[_Argument, list[Chain]] = {}
-    far = np.full(problem.size, _far(problem.bonds)) if within is None else within
-    constant, error = problem.constant_at(factor), 0.0
-    force_error = np.zeros(problem.size)
-    graphs = _near_graphs(problem.bonds, far) if tractions else _graphs(problem.bonds, far, tolerance)
-    for bonds, law in zip(problem.bonds, graphs, strict=True):
-        _refuse_mixity(bonds)
-        area = float(bonds.weights.sum())
-        constant, error = constant + area * law.offset, error + area * law.error
-        for argument, sign, weight in _arguments(bonds):
-            found.setdefault(argument, []).append(chain(law.graph, weight, sign))
-            force_error[list(argument.unknowns)] += abs(sign) * weight * law.traction_error * (1.0 + ROUNDED)
-    vectors = [argument for argument in found if argument.radial]
-    _refuse_overlap(problem, found)
-    unknowns = [found.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
-    chains = [*unknowns, *(found[v] for v in vectors)]
+    polylines = thresholds.polylines
+    far = np.full(problem.size, _far(problem.bonds, polylines.far)) if within is None else within
+    if tractions:
+        graphs = _near_graphs(problem.bonds, far, polylines)
+    else:
+        graphs = _graphs(problem.bonds, far, tolerance, polylines)
+    laws = _Laws.of(problem, graphs, problem.constant_at(factor), 1.0 + polylines.rounded)
+    vectors = [argument for argument in laws.chains if argument.radial]
+    _refuse_overlap(problem, laws.chains)
+    unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
+    chains = [*unknowns, *(laws.chains[v] for v in vectors)]
+    whole = tuple(total(one) if one else FREE for one in chains)
+    lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, polylines.off_drops)
     return ScalarProblem(
         stiffness=problem.stiffness,
         force=problem.load(factor),
-        lower=problem.lower,
-        upper=problem.upper,
-        chains=tuple(total(one) if one else FREE for one in chains),
+        lower=lower,
+        upper=upper,
+        chains=whole,
         lengths=_lengths(vectors),
-        constant=constant,
-        error=error,
-        force_error=force_error if tractions else 0.0,
-        farthest=float(np.max(far)) if error else math.inf,
+        constant=laws.constant,
+        error=laws.error,
+        force_error=laws.force_error if tractions else 0.0,
+        farthest=float(np.max(far)) if laws.error else math.inf,
+        thresholds=thresholds,
     )
+
+
+def _off_drops(chains: Sequence[Chain], lower: Array, upper: Array, way: float) -> tuple[Array, Array]:
+    """Bounds at which a traction drops moved off the drop, by less than points are told apart.
+
+    An unknown there may bear any traction of the drop, whether the bound pushes or not; so the drop must be inside.
+    """
+    low, high = lower.copy(), upper.copy()
+    for i in np.flatnonzero(lower < upper):
+        drops = [a.high for a, b in itertools.pairwise(chains[i]) if b.rate(b.low) < a.rate(a.high)]
+        if lower[i] in drops:
+            low[i] -= way * (1.0 + abs(lower[i]))
+        if upper[i] in drops:
+            high[i] += way * (1.0 + abs(upper[i]))
+    return low, high
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +96,37 @@ class _Argument:
     @property
     def radial(self) -> bool:
         return bool(self.factors)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Laws:
+    """The laws of all bonds.
+
+    Attributes:
+        chains: those that act on an argument.
+        constant: of the energy.
+        error: of the energy, at most.
+        force_error: of the forces, at most, (n,).
+    """
+
+    chains: Mapping[_Argument, list[Chain]]
+    constant: float
+    error: float
+    force_error: Array
+
+    @classmethod
+    def of(cls, problem: CondensedProblem, graphs: Iterable[LawGraph], constant: float, widened: float) -> _Laws:
+        """Gather the laws; the constant is that without them, errors of forces are widened for rounding."""
+        found: dict[_Argument, list[Chain]] = {}
+        error, force_error = 0.0, np.zeros(problem.size)
+        for bonds, law in zip(problem.bonds, graphs, strict=True):
+            _refuse_mixity(bonds)
+            area = float(bonds.weights.sum())
+            constant, error = constant + area * law.offset, error + area * law.error
+            for argument, sign, weight in _arguments(bonds):
+                found.setdefault(argument, []).append(chain(law.graph, weight, sign))
+                force_error[list(argument.unknowns)] += abs(sign) * weight * law.traction_error * widened
+        return cls(chains=found, constant=constant, error=error, force_error=force_error)
 
 
 def _arguments(bonds: Bonds) -> Iterator[tuple[_Argument, float, float]]:
@@ -110,18 +151,20 @@ def _lengths(vectors: Sequence[_Argument]) -> Lengths:
     )
 
 
-def _graphs(laws: Sequence[Bonds], far: Array, tolerance: float | None) -> Iterator[LawGraph]:
+def _graphs(
+    laws: Sequence[Bonds], far: Array, tolerance: float | None, thresholds: PolylineThresholds
+) -> Iterator[LawGraph]:
     """The laws as polylines; those of curved laws share the error by their areas."""
     area = sum(float(b.weights.sum()) for b in laws if exact_graph(b.law) is None)
     for b in laws:
-        aim = COARSE * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
-        yield law_graph(b.law, _argument(b, far), aim)
+        aim = thresholds.coarse * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
+        yield law_graph(b.law, _argument(b, far), aim, thresholds)
 
 
-def _near_graphs(laws: Sequence[Bonds], far: Array) -> Iterator[LawGraph]:
+def _near_graphs(laws: Sequence[Bonds], far: Array, thresholds: PolylineThresholds) -> Iterator[LawGraph]:
     """The laws as polylines near their tractions."""
     for b in laws:
-        yield near_graph(b.law, _argument(b, far), NEAR * b.law.traction_scale)
+        yield near_graph(b.law, _argument(b, far), thresholds.near * b.law.traction_scale, thresholds)
 
 
 def _argument(bonds: Bonds, far: Array) -> float:
@@ -130,10 +173,10 @@ def _argument(bonds: Bonds, far: Array) -> float:
     return float(np.max(arguments, initial=bonds.law.length_scale))
 
 
-def _far(laws: Sequence[Bonds]) -> float:
+def _far(laws: Sequence[Bonds], far: float) -> float:
     """A displacement beyond all that the laws tell apart."""
     sizes = [np.max(np.abs([b.law.length_scale, *b.law.breaks])) for b in laws]
-    return FAR * max([1.0, *map(float, sizes)])
+    return far * max([1.0, *map(float, sizes)])
 
 
 def _refuse_mixity(bonds: Bonds) -> None:

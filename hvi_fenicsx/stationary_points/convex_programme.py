@@ -15,13 +15,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..laws.arc import Arc
 from ..typing import Array, Integers
-
-MOST_STEPS = 40
-"""State changes before a proximal term is added."""
-MOST_PROXIMAL = 60
-"""Proximal steps before the programme is given up; the bound holds for any point."""
-ROUNDING = 1e-13
-"""A residual of this size, relative to the forces, is rounding."""
+from .thresholds import DEFAULT, ProgrammeThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +140,9 @@ class _Iterate:
     done: bool
 
 
-def minimise(a: Array, b: Array, chains: Chains, start: Array) -> Optimum:
+def minimise(
+    a: Array, b: Array, chains: Chains, start: Array, thresholds: ProgrammeThresholds = DEFAULT.programmes
+) -> Optimum:
     """Minimise ½ xᵀAx - bᵀx + Σ φᵢ(xᵢ).
 
     Args:
@@ -154,8 +150,9 @@ def minimise(a: Array, b: Array, chains: Chains, start: Array) -> Optimum:
         b: (n,).
         chains: φ.
         start: x (n,) to begin at.
+        thresholds: how many steps, and what is rounding.
     """
-    programme = _Programme(a, b, chains)
+    programme = _Programme(a, b, chains, thresholds)
     found = programme.active_set(np.clip(start, chains.low, chains.high))
     if not found.done:
         found = programme.proximal(found)
@@ -165,8 +162,8 @@ def minimise(a: Array, b: Array, chains: Chains, start: Array) -> Optimum:
 class _Programme:
     """One programme."""
 
-    def __init__(self, a: Array, b: Array, chains: Chains) -> None:
-        self._a, self._b, self._chains = a, b, chains
+    def __init__(self, a: Array, b: Array, chains: Chains, thresholds: ProgrammeThresholds) -> None:
+        self._a, self._b, self._chains, self._thresholds = a, b, chains, thresholds
         diagonal = np.diag(a)
         self._scale = np.maximum(diagonal, 1e-3 * float(np.max(diagonal)) or 1.0)
         self._rows = np.arange(len(b))
@@ -177,7 +174,7 @@ class _Programme:
         low, high = chains.interval(x)
         states = chains.states(x + np.clip(self._b - self._a @ x, low, high) / scale, scale)
         seen: set[bytes] = set()
-        for _ in range(MOST_STEPS):
+        for _ in range(self._thresholds.most_steps):
             solved = self._solved(states)
             if solved is None:
                 return _Iterate(x=x, done=False)
@@ -214,9 +211,9 @@ class _Programme:
     def proximal(self, found: _Iterate) -> _Iterate:
         """The same with a proximal term, which shrinks where the states settle."""
         best, least, weight = found, self._objective(found.x), 1.0
-        for _ in range(MOST_PROXIMAL):
+        for _ in range(self._thresholds.most_proximal):
             added = weight * self._scale
-            near = _Programme(self._a + np.diag(added), self._b + added * best.x, self._chains)
+            near = _Programme(self._a + np.diag(added), self._b + added * best.x, self._chains, self._thresholds)
             trial = near.active_set(best.x)
             value = self._objective(trial.x)
             if value <= least:
@@ -238,7 +235,7 @@ class _Programme:
 
     def _stationary(self, x: Array) -> bool:
         largest = float(np.max(np.abs(self._b), initial=1e-300))
-        return bool(np.max(np.abs(self._residual(x)), initial=0.0) <= ROUNDING * largest)
+        return bool(np.max(np.abs(self._residual(x)), initial=0.0) <= self._thresholds.rounding * largest)
 
     def bounded(self, found: _Iterate) -> Optimum:
         """The point with a bound that allows for its residual r and for rounding.

@@ -18,22 +18,15 @@ from ..typing import Array, Integers, Mask
 from . import motions
 from .scalar_problem import ScalarProblem
 
-REGULAR = 1e-10
-"""Eigenvalues of S below this share of the largest one are zero."""
-MOST_ROUNDS = 4
-"""How often what some unknowns do not need is given to the others."""
-SPARED = 0.98
-"""Share of the curvature along rigid motions that S - D does not need, which is not lent."""
 
-
-def kernel(stiffness: Array) -> Array:
+def kernel(problem: ScalarProblem) -> Array:
     """Orthonormal columns that S maps to zero, (n, k).
 
     Args:
-        stiffness: S.
+        problem: the problem with S.
     """
-    values, vectors = eigh(stiffness)
-    return np.asarray(vectors[:, values <= REGULAR * max(float(values[-1]), 0.0)])
+    values, vectors = eigh(problem.stiffness)
+    return np.asarray(vectors[:, values <= problem.thresholds.bounds.zero * max(float(values[-1]), 0.0)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +65,7 @@ class CurvatureShare:
 
     @cached_property
     def _kernel(self) -> Array:
-        return kernel(self._problem.stiffness)
+        return kernel(self._problem)
 
     @cached_property
     def shapes(self) -> Array:
@@ -150,7 +143,7 @@ class CurvatureShare:
         """D, (n + m,): in proportion to the weights, but no more than is needed."""
         added = np.zeros(len(weights))
         left = undecided[~self._moved(free)[undecided]]
-        for _ in range(MOST_ROUNDS):
+        for _ in range(self._problem.thresholds.bounds.most_rounds):
             if not left.size:
                 break
             inverse = self._inverse(matrix - np.diag(self._problem.diagonal(added)), free)
@@ -166,7 +159,8 @@ class CurvatureShare:
     def _needed(self, lent: Array, matrix: Array, inverse: Array) -> tuple[Array, Array]:
         """What S - D needs of the curvature lent, and S - D with it."""
         columns = self.shapes * np.sqrt(lent)
-        spared = min(1.0, SPARED / max(float(np.linalg.eigvalsh(columns.T @ inverse @ columns)[-1]), SPARED))
+        limit = self._problem.thresholds.bounds.spared
+        spared = min(1.0, limit / max(float(np.linalg.eigvalsh(columns.T @ inverse @ columns)[-1]), limit))
         return (1.0 - spared) * lent, matrix - spared * columns @ columns.T
 
     def _own(self, low: Array, slope: Array, drops: Mask) -> Array:
@@ -215,4 +209,5 @@ class CurvatureShare:
         if not rigid.shape[1]:
             return rigid
         values, vectors = np.linalg.eigh(rigid.T @ along @ rigid)
-        return np.asarray(rigid @ vectors[:, values <= REGULAR * self._scale])
+        zero = self._problem.thresholds.bounds.zero
+        return np.asarray(rigid @ vectors[:, values <= zero * self._scale])

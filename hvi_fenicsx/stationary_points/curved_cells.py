@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..typing import Array, Integers
-from . import stationarity
 from .balance_programme import Guide
 from .boxes import Box, clipped, fresh_box
 from .cell_parts import at_bounds
@@ -23,22 +22,6 @@ from .linear_points import is_singular, some_solution
 from .point_list import PointList, StationaryPoint
 from .regular_slopes import is_regular
 
-SMALLEST = 1e-9
-"""A cell whose sides are all shorter than this share of the displacements is not divided."""
-SMALL = 1e-2
-"""A cell shorter than this share of the displacements on a row of points in balance is not divided,"""
-TINY = 1e-6
-"""and one shorter than this is not where S plus slopes is next to singular."""
-STRAIGHT = 1e-13
-"""A range of slopes below this share of them is one slope."""
-SHARES = (0.2, 0.5, 0.8)
-"""Places between two points at which the balance is looked at."""
-MOST_STEPS = 10
-"""Steps of Krawczyk's operator on a cell."""
-SHORTER = 0.7
-"""The next step is made while some side shrinks to this share."""
-ROUNDINGS = 8.0
-"""Rounding errors of forces, in machine epsilons for each unknown and each part of their sizes."""
 EPSILON = float(np.finfo(float).eps)
 
 
@@ -50,7 +33,7 @@ class CurvedCells:
     """
 
     def __init__(self, laws: CurvedLaws) -> None:
-        self._laws, self._near = laws, laws.near
+        self._laws, self._near, self._thresholds = laws, laws.near, laws.near.thresholds.cells
 
     def point(self, x: Array) -> StationaryPoint | None:
         """The stationary point near one of the polylines; None where there is none.
@@ -89,7 +72,7 @@ class CurvedCells:
             x: a stationary point, (n,).
             y: another one, (n,).
         """
-        return all(self._laws.is_balanced(x + share * (y - x)) for share in SHARES)
+        return all(self._laws.is_balanced(x + share * (y - x)) for share in self._thresholds.shares)
 
     def _singular(self, cell: Box) -> Verdict:
         """What is known of a cell that may have several points."""
@@ -97,9 +80,9 @@ class CurvedCells:
         least, most = (ends[free] for ends in self._laws.slopes(cell.low, cell.high))
         # a jump, or a bound that bears, has an infinite slope
         finite = bool(np.all(np.isfinite([least, most])))
-        if finite and np.all(most - least <= STRAIGHT * np.maximum(np.abs(least), np.abs(most))):
+        if finite and np.all(most - least <= self._thresholds.straight * np.maximum(np.abs(least), np.abs(most))):
             matrix = self._near.stiffness[np.ix_(free, free)] + np.diag(least)
-            if is_singular(matrix):
+            if is_singular(matrix, self._thresholds.condition):
                 return self._straight(cell, free, matrix)
         return Verdict(undecided=True, points=points) if (points := self._degenerate(cell)) else self._left(cell)
 
@@ -118,7 +101,7 @@ class CurvedCells:
         """A point in a small cell at which S plus slopes is next to singular, if dividing the cell tells no more."""
         wide = float(np.max(cell.high - cell.low))
         size = 1.0 + float(np.max(np.abs([cell.low, cell.high])))
-        if wide > SMALL * size or (point := self._laws.point(0.5 * (cell.low + cell.high))) is None:
+        if wide > self._thresholds.small * size or (point := self._laws.point(0.5 * (cell.low + cell.high))) is None:
             return []
         near = np.all((point.x >= cell.low - wide) & (point.x <= cell.high + wide))
         if not near or (way := self._laws.soft_direction(point.x)) is None:
@@ -126,11 +109,12 @@ class CurvedCells:
         row = any(self._laws.is_balanced(point.x + step * way) for step in (wide, -wide))
         if row:
             return [replace(point, isolated=False)]
-        return [point] if wide <= TINY * size else []
+        return [point] if wide <= self._thresholds.tiny * size else []
 
     def _left(self, cell: Box) -> Verdict:
         guide = self._guide(cell)
-        small = np.max(cell.high - cell.low) <= SMALLEST * (1.0 + np.max(np.abs([cell.low, cell.high])))
+        size = 1.0 + np.max(np.abs([cell.low, cell.high]))
+        small = np.max(cell.high - cell.low) <= self._thresholds.smallest * size
         small = bool(small and np.all(np.isfinite(guide.law + guide.bound))) or self._is_unknown(cell)
         return Verdict(left=None if small else cell, guide=guide, undecided=small)
 
@@ -168,7 +152,7 @@ class CurvedCells:
 
     def _is_alone(self, cell: Box, x: Array) -> bool:
         """Whether the cell, together with a stationary point, has no other."""
-        close = stationarity.ACCURACY * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+        close = self._near.thresholds.points.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
         fixed = cell.low == cell.high
         wide = np.where(fixed & (np.abs(x - cell.low) <= close), 0.0, close)
         point, beside = np.where(wide > 0.0, x, cell.low), np.where(fixed, wide, 0.0)
@@ -190,12 +174,13 @@ class CurvedCells:
     def _is_regular(self, low: Array, high: Array) -> bool:
         least, most = self._laws.slopes(low, high)
         free = np.flatnonzero(low < high)
-        return is_regular(self._near.stiffness[np.ix_(free, free)], least[free], most[free])
+        stiffness = self._near.stiffness[np.ix_(free, free)]
+        return is_regular(stiffness, least[free], most[free], self._thresholds.least_width)
 
     def _smaller(self, cell: Box) -> Box | None:
         """What Krawczyk's operator leaves of a cell; None if it has no stationary point."""
         free = np.flatnonzero(cell.low < cell.high)
-        for _ in range(MOST_STEPS if free.size else 0):
+        for _ in range(self._thresholds.image_steps if free.size else 0):
             image = self._image(cell, free)
             if image is None:
                 break
@@ -206,7 +191,7 @@ class CurvedCells:
             # a side must not become a point: that would be a joint
             thin = (low == high) & (cell.low < cell.high)
             low, high = np.where(thin, cell.low, low), np.where(thin, cell.high, high)
-            shrinks = np.any(high - low < SHORTER * (cell.high - cell.low))
+            shrinks = np.any(high - low < self._thresholds.shorter_image * (cell.high - cell.low))
             cell = replace(cell, low=low, high=high, x=clipped(cell.x, low, high))
             if not shrinks:
                 break
@@ -237,4 +222,4 @@ class CurvedCells:
         near = self._near
         tractions, sizes = self._laws.tractions(x)
         sizes = sizes + np.abs(near.force) + np.abs(near.stiffness) @ np.abs(x)
-        return near.force - near.stiffness @ x - tractions, ROUNDINGS * len(x) * EPSILON * sizes
+        return near.force - near.stiffness @ x - tractions, self._thresholds.roundings * len(x) * EPSILON * sizes

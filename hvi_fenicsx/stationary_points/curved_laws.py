@@ -14,23 +14,6 @@ from .point_list import StationaryPoint
 from .scalar_problem import ScalarProblem
 from .stationarity import Subdifferential
 
-MOST_STEPS = 30
-"""Newton steps of one point."""
-FASTER = 0.5
-"""Newton's method goes on in a balance that is good enough while each step leaves less than this share of the rest; at
-a fold, where two points are one, a step leaves a quarter, where three are one 0.3, and never more than 1/e."""
-LONGEST = 0.1
-"""Way from the polylines' point, relative to its displacements, beyond which a point is another one."""
-
-ROUNDINGS = 64.0
-"""Rounding errors of forces, in machine epsilons for each unknown and each part of their sizes."""
-SOFT = 1e-4
-"""An eigenvalue of S plus slopes below this share of the largest stiffness is next to zero."""
-SINGULAR = 1e-12
-"""Singular values below this share of the largest are zero where a matrix cannot be factorised."""
-ROUNDED = 1e-12
-"""Places nearer than this share of their distance from zero are one."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class CurvedLaws:
@@ -52,20 +35,20 @@ class CurvedLaws:
         Args:
             x: displacements, (n,).
         """
-        near, start, best = self.near, x, None
+        near, start, best, limits = self.near, x, None, self.near.thresholds.points
         size = float(np.max(np.abs(near.force), initial=0.0)) or 1.0
-        for _ in range(MOST_STEPS):
+        for _ in range(limits.newton_steps):
             force, allowed = near.force - near.stiffness @ x, self.subdifferential(x)
             rest = force - np.clip(force, allowed.low, allowed.high)
             missing = float(np.max(np.abs(rest), initial=0.0))
-            if best is not None and missing >= FASTER * best[0] and best[0] <= stationarity.ACCURACY * size:
+            if best is not None and missing >= limits.faster * best[0] and best[0] <= limits.accuracy * size:
                 break
             best = missing, x, allowed
-            jumps = allowed.high - allowed.low > stationarity.ACCURACY * size
+            jumps = allowed.high - allowed.low > limits.accuracy * size
             x = np.clip(x + self._step(rest, allowed, ~jumps | (rest != 0.0)), near.lower, near.upper)
-            if not np.max(np.abs(x - start)) <= LONGEST * (1.0 + np.max(np.abs(start))):
+            if not np.max(np.abs(x - start)) <= limits.longest * (1.0 + np.max(np.abs(start))):
                 break
-        if best is None or not best[0] <= min(stationarity.ACCURACY * size, self.rounding(*best[1:])):
+        if best is None or not best[0] <= min(limits.accuracy * size, self.rounding(*best[1:])):
             return None
         return self._found(*best[1:])
 
@@ -85,14 +68,14 @@ class CurvedLaws:
         Args:
             x: displacements, (n,).
         """
-        allowed, near = self.subdifferential(x), self.near
+        allowed, near, limits = self.subdifferential(x), self.near, self.near.thresholds.points
         size = float(np.max(np.abs(near.force), initial=0.0)) or 1.0
-        free = np.flatnonzero(allowed.high - allowed.low <= stationarity.ACCURACY * size)
+        free = np.flatnonzero(allowed.high - allowed.low <= limits.accuracy * size)
         if not free.size:
             return None
         values, vectors = np.linalg.eigh(near.stiffness[np.ix_(free, free)] + np.diag(allowed.least[free]))
         k = int(np.argmin(np.abs(values)))
-        if abs(values[k]) > SOFT * float(np.max(np.diag(near.stiffness))):
+        if abs(values[k]) > limits.soft * float(np.max(np.diag(near.stiffness))):
             return None
         way = np.zeros(near.size)
         way[free] = vectors[:, k] / np.max(np.abs(vectors[:, k]))
@@ -108,7 +91,7 @@ class CurvedLaws:
         near = self.near
         stiffness = np.abs(near.stiffness) + np.diag(np.abs(allowed.least))
         sizes = self.tractions(x)[1] + np.abs(near.force) + stiffness @ np.abs(x)
-        return float(ROUNDINGS * len(x) * np.finfo(float).eps * np.max(sizes, initial=0.0))
+        return float(near.thresholds.points.roundings * len(x) * np.finfo(float).eps * np.max(sizes, initial=0.0))
 
     @property
     def bounded(self) -> bool:
@@ -131,13 +114,14 @@ class CurvedLaws:
             high: of the intervals, (n,).
         """
         least, most = np.zeros((2, self.near.size))
+        one_place = self.near.thresholds.points.one_place
         for bonds in self.problem.bonds:
             there = bonds.weights > 0.0
             at, signs, weights = bonds.unknowns[there, 0], bonds.signs[there, 0], bonds.weights[there]
             ends = np.sort(np.stack([signs * low[at], signs * high[at]]), axis=0)
             first, last = bonds.law.slope_range(*ends)
-            first = np.where(_inside(bonds.law.concave.kinks, ends), -np.inf, first)
-            last = np.where(_inside(bonds.law.convex.kinks, ends), np.inf, last)
+            first = np.where(_inside(bonds.law.concave.kinks, ends, one_place), -np.inf, first)
+            last = np.where(_inside(bonds.law.convex.kinks, ends, one_place), np.inf, last)
             np.add.at(least, at, weights * signs**2 * first)
             np.add.at(most, at, weights * signs**2 * last)
         bears = (low <= self.near.lower) | (high >= self.near.upper)
@@ -223,7 +207,7 @@ class CurvedLaws:
         try:
             step[free] = np.linalg.solve(matrix, rest[free])
         except np.linalg.LinAlgError:
-            step[free] = np.linalg.lstsq(matrix, rest[free], rcond=SINGULAR)[0]
+            step[free] = np.linalg.lstsq(matrix, rest[free], rcond=self.near.thresholds.points.singular)[0]
         return step
 
     def subdifferential(self, x: Array) -> Subdifferential:
@@ -232,7 +216,7 @@ class CurvedLaws:
         Args:
             x: displacements, (n,).
         """
-        close = stationarity.ACCURACY * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+        close = self.near.thresholds.points.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
         low, high, slope = np.zeros((3, self.near.size))
         falls = np.zeros(self.near.size, dtype=np.bool_)
         for bonds in self.problem.bonds:
@@ -243,9 +227,8 @@ class CurvedLaws:
             np.add.at(slope, at, bonds.weights * bonds.signs[:, 0] ** 2 * second)
             for kink in bonds.law.concave.kinks:
                 falls[at[(np.abs(argument - kink) <= close) & (bonds.weights > 0.0)]] = True
-        low = np.where(x <= self.near.lower + close, -np.inf, low)
-        high = np.where(x >= self.near.upper - close, np.inf, high)
-        return Subdifferential(low=low, high=high, falls=falls, least=slope, most=slope)
+        laws = Subdifferential(low=low, high=high, falls=falls, least=slope, most=slope)
+        return stationarity.with_bounds(self.near, x, laws)
 
 
 def _forces(bonds: Bonds, argument: Array, close: float) -> tuple[Array, Array]:
@@ -255,7 +238,7 @@ def _forces(bonds: Bonds, argument: Array, close: float) -> tuple[Array, Array]:
     return np.minimum(*ends), np.maximum(*ends)
 
 
-def _inside(kinks: Array, ends: Array) -> Mask:
+def _inside(kinks: Array, ends: Array, one_place: float) -> Mask:
     """Whether a kink is inside intervals, (m,); one that only rounding tells apart from an end is not."""
-    apart = ROUNDED * np.abs(kinks)
+    apart = one_place * np.abs(kinks)
     return np.asarray(((kinks - apart > ends[0][:, None]) & (kinks + apart < ends[1][:, None])).any(axis=1))

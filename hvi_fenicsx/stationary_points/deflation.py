@@ -18,15 +18,6 @@ from ..typing import Array
 from .arcs import Chain, on_interval
 from .scalar_problem import ScalarProblem
 
-MOST_STEPS = 40
-"""Newton steps of one attempt."""
-ACCURACY = 1e-11
-"""Residual of a root, relative to the largest force."""
-LONGEST = 10.0
-"""How much longer or shorter a step becomes by deflation at most."""
-LEAST_WEIGHT = 1e-12
-"""Weight of a displacement that meets no stiffness, over the largest; so a flat piece of its law has a length."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Graphs:
@@ -54,7 +45,7 @@ class Graphs:
     def of(cls, problem: ScalarProblem) -> Graphs:
         """The graphs of a problem without laws of lengths."""
         diagonal = np.diag(problem.stiffness)
-        weight = np.maximum(diagonal, LEAST_WEIGHT * (float(np.max(diagonal)) or 1.0))
+        weight = np.maximum(diagonal, problem.thresholds.systematic.least_weight * (float(np.max(diagonal)) or 1.0))
         ends = zip(problem.chains, problem.lower, problem.upper, weight, strict=True)
         rows = [_polyline(chain, float(low), float(high), float(k)) for chain, low, high, k in ends]
         most = max(map(len, rows))
@@ -123,18 +114,19 @@ class DeflatedNewton:
             attempt: the method begins near the start, at another place for each number.
         """
         problem, s, size = self.problem, self._parameters(start), reach * self._size
+        limits = problem.thresholds.systematic
         away = np.array([self._parameters(x) for x in known]).reshape(-1, problem.size)
         s = s + size * np.random.default_rng(attempt).uniform(-1.0, 1.0, problem.size)
-        for _ in range(MOST_STEPS):
+        for _ in range(limits.newton_steps):
             x, t, dx, dt = self._graphs.at(s)
             rest = problem.stiffness @ x + t - problem.force
-            if np.max(np.abs(rest)) <= ACCURACY * self._size:
+            if np.max(np.abs(rest)) <= limits.accuracy * self._size:
                 return x
             try:
                 step = np.linalg.solve(problem.stiffness * dx + np.diag(dt), -rest)
             except np.linalg.LinAlgError:
                 return None
-            s = np.asarray(s + _stretch((s - away) / size, np.asarray(step / size)) * step)
+            s = np.asarray(s + _stretch((s - away) / size, np.asarray(step / size), limits.longest) * step)
             if not np.all(np.isfinite(s)):
                 return None
         return None
@@ -145,13 +137,14 @@ class DeflatedNewton:
         return self._graphs.nearest(x, forces)
 
 
-def _stretch(apart: Array, step: Array) -> float:
+def _stretch(apart: Array, step: Array, longest: float) -> float:
     """By how much deflation makes a step longer or, negative, turns it round.
 
     Args:
         apart: differences from the known points, over the length within which these push away, (k, n).
         step: of Newton's method, over the same, (n,).
+        longest: factor at most.
     """
     squares = np.sum(apart**2, axis=1)
     total = 1.0 + 2.0 * float(np.sum(apart @ step / np.maximum(squares * (1.0 + squares), 1e-300)))
-    return float(np.clip(1.0 / total if total else LONGEST, -LONGEST, LONGEST))
+    return float(np.clip(1.0 / total if total else longest, -longest, longest))

@@ -11,17 +11,9 @@ from ..laws.arc import Arc
 from ..typing import Array
 from .arcs import Chain, on_interval
 from .convex_programme import Chains, minimise
+from .length_newton import LengthNewton
 from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
-
-MOST_STEPS = 60
-"""Convex programmes of one descent."""
-REACH = 10.0
-"""Falls as large as the last one with which an energy is reached at most."""
-SLOW = 1e-12
-"""Where laws act on lengths, a fall of the energy below this share of its parts is the last."""
-ROUNDING = 1e-13
-"""A fall of the energy below this share of its parts is none."""
 
 
 def majorant(arcs: Chain, low: float, high: float, x: float) -> Sequence[Arc]:
@@ -56,18 +48,18 @@ def descend(problem: ScalarProblem, low: Array, high: Array, x: Array, goal: flo
         x: where to begin, (n,).
         goal: a descent that comes down too slowly to reach this energy is given up.
     """
-    energy = problem.energy(x)
-    for _ in range(MOST_STEPS):
+    energy, limits = problem.energy(x), problem.thresholds.descent
+    for _ in range(limits.most_steps):
         at = problem.arguments(x)
         ends = zip(low, np.maximum(high, at), at, strict=True)
         chains = [majorant(c, *e) for c, e in zip(problem.chains, ends, strict=True)]
         found = _minimiser(problem, chains, x)
         after = problem.energy(found)
         fall, size = energy - after, problem.energy_size(x)
-        if not fall > ROUNDING * size:
+        if not fall > limits.rounding * size:
             break
         x, energy = found, after
-        if energy - goal > REACH * fall or (len(problem.lengths) and fall <= SLOW * size):
+        if energy - goal > limits.reach * fall or (len(problem.lengths) and fall <= limits.slow * size):
             break
     return np.asarray(x), energy
 
@@ -76,7 +68,7 @@ def _minimiser(problem: ScalarProblem, chains: list[Sequence[Arc]], x: Array) ->
     """The minimiser of a majorant. Of a law of a length ψ, the part that would fall is linearised along the vector."""
     lengths, n = problem.lengths, problem.size
     if not len(lengths):
-        return minimise(problem.stiffness, problem.force, Chains.of(chains), x).x
+        return minimise(problem.stiffness, problem.force, Chains.of(chains), x, problem.thresholds.programmes).x
     slopes = np.array([max(-c[0].rate(c[0].low), 0.0) for c in chains[n:]])
     size = lengths.of(x)
     felt = lengths.felt(lengths.vectors(x)) * lengths.factors
@@ -85,7 +77,7 @@ def _minimiser(problem: ScalarProblem, chains: list[Sequence[Arc]], x: Array) ->
     force[lengths.members] += pull[lengths.there]
     risen = [[_steeper(a, slope) for a in c] for c, slope in zip(chains[n:], slopes, strict=True)]
     programme = LengthProgramme.of(problem, problem.stiffness, force, [*chains[:n], *risen], np.zeros(len(lengths)))
-    return programme.minimiser(x)
+    return LengthNewton(programme).minimiser(x)
 
 
 def _steeper(arc: Arc, slope: float) -> Arc:

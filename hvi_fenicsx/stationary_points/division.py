@@ -38,5 +38,6 @@ def _halves_of_motion(relaxation: Relaxation, box: Box) -> list[Box]:
     j = int(np.argmax(box.motion_gaps))
     left, right = box.motion_high.copy(), box.motion_low.copy()
     here, joint = float(relaxation.shares(box.x)[j]), float(relaxation.joints[j])
-    left[j] = right[j] = motions.divided(float(right[j]), float(left[j]), joint, here)
+    limits = relaxation.problem.thresholds.bounds
+    left[j] = right[j] = motions.divided(float(right[j]), float(left[j]), joint, here, limits)
     return [replace(box, motion_high=left), replace(box, motion_low=right)]

@@ -7,11 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..typing import Array, Mask
+from .cell_thresholds import CellThresholds
 from .scalar_problem import ArcTable, ScalarProblem
-
-WIDENED = 1e-12
-"""Relative widening of what is found, for rounding."""
-
 
 Clip = Callable[[Array, Array], tuple[Array, Array] | None]
 """A pass over intervals: smaller ones, or None if one is empty."""
@@ -39,6 +36,20 @@ def clipped_again(
     return low, high
 
 
+def widened(low: Array, high: Array, first: Array, last: Array, thresholds: CellThresholds) -> tuple[Array, Array]:
+    """The part of intervals between two places each, and a little more.
+
+    Args:
+        low: of the intervals, (n,), finite.
+        high: of the intervals, (n,), finite.
+        first: the first place, (n,).
+        last: the last place, (n,).
+        thresholds: by how much more.
+    """
+    wide = np.maximum(thresholds.widened * (np.abs(first) + np.abs(last) + (high - low)), thresholds.least_widened)
+    return np.maximum(low, first - wide), np.minimum(high, last + wide)
+
+
 class GraphClip:
     """The graphs of a problem's laws and bounds, to which springs may be added.
 
@@ -46,11 +57,12 @@ class GraphClip:
         problem: the problem.
         springs: stiffness d of the springs, (n,).
         joints_at_ends: whether a joint at the end of an interval counts with all its tractions; if not, only where the
-            interval is that joint alone.
+            interval is that joint alone, or the end is a bound of the problem.
     """
 
     def __init__(self, problem: ScalarProblem, springs: Array, *, joints_at_ends: bool) -> None:
         self._problem, self._springs, self._joints_at_ends = problem, springs, joints_at_ends
+        self._cells = problem.thresholds.cells
         self._arcs = ArcTable.of(problem.chains[: problem.size])
 
     def clipped(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
@@ -74,8 +86,7 @@ class GraphClip:
         first, last = self._at_bounds(low, high, least, most, first, last)
         if np.any(first > last):
             return None
-        wide = WIDENED * (np.abs(first) + np.abs(last) + (high - low))
-        return np.maximum(low, first - wide), np.minimum(high, last + wide)
+        return widened(low, high, first, last, self._cells)
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
         """The ends of what is left of each arc; (inf, -inf) of those that are lost."""
@@ -98,7 +109,8 @@ class GraphClip:
         at = arcs.high[:, :-1]
         inside = (at >= low[:, None]) & (at <= high[:, None])
         if not self._joints_at_ends:
-            inside &= ((at > low[:, None]) & (at < high[:, None])) | (low == high)[:, None]
+            apart = (at > low[:, None]) & (at < high[:, None]) | (low == high)[:, None]
+            inside &= apart | (at == self._problem.lower[:, None]) | (at == self._problem.upper[:, None])
         with np.errstate(invalid="ignore"):
             a, b = arcs.before[:, :-1] + d * at, arcs.after[:, 1:] + d * at
             meets = inside & (np.minimum(a, b) <= most) & (np.maximum(a, b) >= least)
@@ -114,7 +126,9 @@ class GraphClip:
             k = arcs.at(at)
             pull = arcs.tractions[rows, k] + arcs.slopes[rows, k] * (at - arcs.anchors[rows, k]) + self._springs * at
             sizes = sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in (pull, least, most))
-            pushes = (most >= pull - WIDENED * sizes) if upper else (least <= pull + WIDENED * sizes)
+            pushes = (
+                (most >= pull - self._cells.widened * sizes) if upper else (least <= pull + self._cells.widened * sizes)
+            )
             stays = (at == bound) & pushes
             first, last = np.where(stays, np.minimum(first, at), first), np.where(stays, np.maximum(last, at), last)
         return first, last

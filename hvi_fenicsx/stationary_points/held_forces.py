@@ -16,9 +16,6 @@ from .convex_programme import Chains, minimise
 from .length_frames import left_out
 from .length_programme import LengthProgramme
 
-BEYOND = 10.0
-"""Vectors' unknowns without bounds end at this many times the largest displacement, and one unit."""
-
 
 def with_held_forces(programme: LengthProgramme, x: Array, springs: Array) -> tuple[Array, Array]:
     """The minimiser where the laws' forces on vectors stay as they are at a point, and the bounds' forces, (n,) each.
@@ -30,7 +27,8 @@ def with_held_forces(programme: LengthProgramme, x: Array, springs: Array) -> tu
     """
     held = _forces(programme, x)
     pull = programme.b - held + springs @ x
-    y = minimise(programme.a + springs, pull, Chains.of(_without_lengths(programme, x)), x).x
+    chains = Chains.of(_without_lengths(programme, x))
+    y = minimise(programme.a + springs, pull, chains, x, programme.thresholds).x
     return y, programme.bound_forces(y, held)
 
 
@@ -54,7 +52,7 @@ def _forces(programme: LengthProgramme, x: Array) -> Array:
 def _without_lengths(programme: LengthProgramme, x: Array) -> list[list[Arc]]:
     """The laws of the unknowns; of the vectors' ones their bounds."""
     chains = [list(c) for c in programme.chains[: len(x)]]
-    end = BEYOND * float(np.abs(x).max()) + 1.0
+    end = programme.thresholds.beyond * float(np.abs(x).max()) + 1.0
     for i in programme.lengths.members:
         low, high = max(float(programme.lower[i]), -end), min(float(programme.upper[i]), end)
         chains[i] = [Arc(low, high, 0.0, 0.0, 0.0, 0.0)]

@@ -14,21 +14,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..typing import Array, Integers
-
-MOST_STEPS = 36
-"""Steps of one programme."""
-CLOSE = 0.995
-"""Share of the way to the next zero of a share or a reduced cost."""
-ENOUGH = 1e-12
-"""Mean product of shares and reduced costs that ends the steps."""
-BALANCED = 1e-9
-"""Largest residual with that."""
-REGULAR = 1e-15
-"""What is added to each block, relative to its trace."""
-LEAST = 1e-12
-"""What is added besides."""
-LARGEST = 1e100
-"""Changes that are larger are rounding."""
+from .cell_thresholds import BalanceThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,32 +70,33 @@ class Iterate:
     residual: float
 
 
-def iterates(programme: Programme) -> Iterator[Iterate]:
+def iterates(programme: Programme, thresholds: BalanceThresholds) -> Iterator[Iterate]:
     """The steps of the method, until it ends or rounding stops it.
 
     Args:
         programme: the programme.
+        thresholds: how many steps, and what is enough.
     """
     n, z = len(programme.force), programme.start
     x: Array = np.zeros(n)
     u: Array = np.zeros((3, n))
     s: Array = np.maximum(np.abs(programme.cost), 1.0)
-    for _ in range(MOST_STEPS):
+    for _ in range(thresholds.most_steps):
         rest = _Rest.of(programme, x, u, z, s)
         value = float(0.5 * x @ programme.curvature @ x + programme.cost @ z)
         yield Iterate(x=x, duals=u, shares=z, reduced=s, value=value, residual=rest.largest)
-        if z @ s < ENOUGH * len(z) and rest.largest < BALANCED:
+        if z @ s < thresholds.enough * len(z) and rest.largest < thresholds.balanced:
             return
         try:
-            newton = _Newton(programme, z, s, rest)
+            newton = _Newton(programme, z, s, rest, thresholds)
         except LinAlgError:
             return
         with np.errstate(over="ignore", invalid="ignore"):
             changes = newton.step()
-        if not all(np.all(np.abs(change) < LARGEST) for change in changes):
+        if not all(np.all(np.abs(change) < thresholds.largest) for change in changes):
             return
         dx, du, dz, ds = changes
-        way = min(CLOSE * _most(z, dz), CLOSE * _most(s, ds))
+        way = min(thresholds.close * _most(z, dz), thresholds.close * _most(s, ds))
         x, u, z, s = x + way * dx, u + way * du, z + way * dz, s + way * ds
 
 
@@ -138,24 +125,24 @@ class _Rest:
 class _Newton:
     """A step of Newton's method, with its corrector."""
 
-    def __init__(self, programme: Programme, z: Array, s: Array, rest: _Rest) -> None:
+    def __init__(self, programme: Programme, z: Array, s: Array, rest: _Rest, thresholds: BalanceThresholds) -> None:
         self._programme, self._z, self._s, self._rest = programme, z, s, rest
         self._ratio = z / s
-        self._inverse = self._blocks()
+        self._inverse = self._blocks(thresholds)
         matrix, inverse = programme.matrix, self._inverse
         mixed = matrix.T * inverse[:, 0, 1]
         whole = programme.curvature + matrix.T @ (inverse[:, 0, 0][:, None] * matrix) + mixed + mixed.T
         whole[np.diag_indices_from(whole)] += inverse[:, 1, 1]
         self._factors = cho_factor(0.5 * (whole + whole.T), check_finite=False)
 
-    def _blocks(self) -> Array:
+    def _blocks(self, thresholds: BalanceThresholds) -> Array:
         """The inverse of each unknown's block, (n, 3, 3)."""
         factors, owner, n = self._programme.factors, self._programme.owner, len(self._programme.force)
         blocks = np.zeros((n, 3, 3))
         for i in range(3):
             for j in range(i + 1):
                 blocks[:, i, j] = blocks[:, j, i] = np.bincount(owner, factors[i] * factors[j] * self._ratio, n)
-        added = REGULAR * np.trace(blocks, axis1=1, axis2=2) + LEAST
+        added = thresholds.regular * np.trace(blocks, axis1=1, axis2=2) + thresholds.least
         return np.asarray(np.linalg.inv(blocks + added[:, None, None] * np.eye(3)))
 
     def step(self) -> tuple[Array, Array, Array, Array]:

@@ -20,13 +20,7 @@ from .convex_programme import Chains, minimise
 from .curved_laws import CurvedLaws
 from .descent import descend
 from .scalar_problem import ScalarProblem
-
-FIRST, GROWTH = 1e-3, 4.0
-"""The intervals on which slopes are bounded: the first, as a share of the least length of a law, and how they grow."""
-MOST_STEPS = 10
-"""Convex programmes of one descent of curved laws."""
-ROUNDING = 1e-13
-"""A fall of the energy below this share of its parts is none."""
+from .thresholds import DescentThresholds
 
 
 class Landscape(Protocol):
@@ -35,6 +29,10 @@ class Landscape(Protocol):
     @property
     def ends(self) -> tuple[Array, Array]:
         """Least and largest displacements, (n,) each."""
+
+    @property
+    def thresholds(self) -> DescentThresholds:
+        """How ways down are gone."""
 
     def energy(self, x: Array) -> float:
         """The energy.
@@ -74,7 +72,7 @@ class PolylineLandscape:
     """
 
     def __init__(self, problem: ScalarProblem) -> None:
-        self._problem = problem
+        self._problem, self.thresholds = problem, problem.thresholds.descent
         self.ends = _ends(problem)
 
     def energy(self, x: Array) -> float:
@@ -121,7 +119,7 @@ class CurvedLandscape:
     """
 
     def __init__(self, laws: CurvedLaws) -> None:
-        self._laws, self._near = laws, laws.near
+        self._laws, self._near, self.thresholds = laws, laws.near, laws.near.thresholds.descent
         self.ends = _ends(laws.near)
 
     def energy(self, x: Array) -> float:
@@ -146,11 +144,12 @@ class CurvedLandscape:
         Args:
             x: displacements, (n,).
         """
-        energy = self.energy(x)
-        for _ in range(MOST_STEPS):
-            found = minimise(self._near.stiffness, self._near.force, Chains.of(self.majorants(x)), x).x
+        energy, limits = self.energy(x), self.thresholds
+        for _ in range(limits.curved_steps):
+            chains, programmes = Chains.of(self.majorants(x)), self._near.thresholds.programmes
+            found = minimise(self._near.stiffness, self._near.force, chains, x, programmes).x
             after = self.energy(found)
-            if not energy - after > ROUNDING * self._near.energy_size(x):
+            if not energy - after > limits.rounding * self._near.energy_size(x):
                 break
             x, energy = found, after
         return x
@@ -198,9 +197,10 @@ class CurvedLandscape:
     @cached_property
     def _grown(self) -> Array:
         """Distances that grow up to all displacements."""
-        first = FIRST * min(b.law.length_scale for b in self._laws.problem.bonds)
+        limits = self.thresholds
+        first = limits.first_interval * min(b.law.length_scale for b in self._laws.problem.bonds)
         far = float(np.max(self.ends[1] - self.ends[0]))
-        return np.asarray(first * GROWTH ** np.arange(np.ceil(np.log(far / first) / np.log(GROWTH))))
+        return np.asarray(first * limits.growth ** np.arange(np.ceil(np.log(far / first) / np.log(limits.growth))))
 
 
 def _ends(problem: ScalarProblem) -> tuple[Array, Array]:

@@ -19,15 +19,10 @@ from ..laws.polyline import PolylineLaw
 from ..laws.smoothing.smoothed_law import PlusSmoothedLaw
 from ..laws.traction_graph import TractionGraph
 from ..typing import Array
+from .thresholds import DEFAULT, PolylineThresholds
 
-SAMPLES = 512
-"""Intervals of an interval between two nodes on which the difference is bounded."""
-MOST_NODES = 2000
-"""Nodes are not made denser beyond this number."""
-ROUNDED = 1e-12
-"""Places nearer than this share of their distance from zero are one."""
-Difference = Callable[[Superpotential, Array, Array], Array]
-"""Bounds of what a law and its polyline differ by on intervals: law, begins, ends."""
+Difference = Callable[[Superpotential, Array, Array, int], Array]
+"""Bounds of what a law and its polyline differ by on intervals: law, begins, ends, samples."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,45 +51,53 @@ def exact_graph(law: Superpotential) -> TractionGraph | None:
     return law.graph if isinstance(law, PolylineLaw | PlusSmoothedLaw) else None
 
 
-def law_graph(law: Superpotential, far: float, tolerance: float) -> LawGraph:
+def law_graph(
+    law: Superpotential, far: float, tolerance: float, thresholds: PolylineThresholds = DEFAULT.polylines
+) -> LawGraph:
     """The polyline of a law.
 
     Args:
         law: the law.
         far: displacements beyond it do not matter.
         tolerance: difference of energies per area that is aimed at, where the law is curved.
+        thresholds: how many nodes and samples.
     """
     offset = float(law.value(np.zeros(1))[0])
     if (graph := exact_graph(law)) is not None:
         return LawGraph(graph=graph, offset=offset, error=0.0)
-    nodes, error = _nodes(law, far, tolerance, _errors)
+    nodes, error = _nodes(law, far, tolerance, _errors, thresholds)
     return LawGraph(graph=_joined(law, nodes), offset=offset, error=error)
 
 
-def near_graph(law: Superpotential, far: float, tolerance: float) -> LawGraph:
+def near_graph(
+    law: Superpotential, far: float, tolerance: float, thresholds: PolylineThresholds = DEFAULT.polylines
+) -> LawGraph:
     """The polyline of a law whose traction is near the law's everywhere.
 
     Args:
         law: the law.
         far: displacements beyond it do not matter.
         tolerance: difference of tractions that is aimed at, where the law is curved.
+        thresholds: how many nodes and samples.
     """
     if (graph := exact_graph(law)) is not None:
         return LawGraph(graph=graph, offset=float(law.value(np.zeros(1))[0]), error=0.0)
-    nodes, traction_error = _nodes(law, far, tolerance, _traction_errors)
-    error = float(_errors(law, nodes[:-1], nodes[1:]).max())
+    nodes, traction_error = _nodes(law, far, tolerance, _traction_errors, thresholds)
+    error = float(_errors(law, nodes[:-1], nodes[1:], thresholds.samples).max())
     offset = float(law.value(np.zeros(1))[0])
     return LawGraph(graph=_joined(law, nodes), offset=offset, error=error, traction_error=traction_error)
 
 
-def _nodes(law: Superpotential, far: float, tolerance: float, differences: Difference) -> tuple[Array, float]:
+def _nodes(
+    law: Superpotential, far: float, tolerance: float, differences: Difference, thresholds: PolylineThresholds
+) -> tuple[Array, float]:
     """Nodes between which energies or tractions differ by at most a tolerance, and how far they do."""
-    first = _first_nodes(law, far)
+    first = _first_nodes(law, far, thresholds.one_place)
     begin, end = first[:-1], first[1:]
     kept, worst = [first[-1:]], 0.0
     while begin.size:
-        errors = differences(law, begin, end)
-        full = sum(map(len, kept)) + 2 * begin.size > MOST_NODES
+        errors = differences(law, begin, end, thresholds.samples)
+        full = sum(map(len, kept)) + 2 * begin.size > thresholds.most_nodes
         fine = (errors <= tolerance) | full
         worst = float(np.max(errors[fine], initial=worst))  # not a number stays so
         kept.append(begin[fine])
@@ -104,19 +107,19 @@ def _nodes(law: Superpotential, far: float, tolerance: float, differences: Diffe
     return np.sort(np.concatenate(kept)), worst
 
 
-def _first_nodes(law: Superpotential, far: float) -> Array:
+def _first_nodes(law: Superpotential, far: float, one_place: float) -> Array:
     """Breaks of a law, and distances from zero that double."""
     first = law.length_scale
     doubled = first * 2.0 ** np.arange(max(np.ceil(np.log2(far / first)), 1.0))
     known = np.concatenate([law.kinks, law.breaks, doubled, -doubled, [0.0, far, -far]])
-    return _apart(known[np.abs(known) <= far])
+    return _apart(known[np.abs(known) <= far], one_place)
 
 
-def _apart(places: Array) -> Array:
+def _apart(places: Array, one_place: float) -> Array:
     """Places in order; of those that only rounding tells apart, the one that is named first."""
     order = np.argsort(places, kind="stable")
     ordered = places[order]
-    begins = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > ROUNDED * np.abs(ordered))
+    begins = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > one_place * np.abs(ordered))
     return np.asarray(places[np.minimum.reduceat(order, begins)])
 
 
@@ -126,9 +129,9 @@ def _middle_tractions(law: Superpotential, begin: Array, end: Array) -> Array:
     return np.asarray(2.0 * (law.value(end) - law.value(begin)) / (end - begin) - ends)
 
 
-def _samples(begin: Array, end: Array) -> tuple[Array, Array]:
+def _samples(begin: Array, end: Array, samples: int) -> tuple[Array, Array]:
     """Shares of intervals, and the places there, (n, k)."""
-    share: Array = np.linspace(0.0, 1.0, SAMPLES + 1, dtype=np.float64)
+    share: Array = np.linspace(0.0, 1.0, samples + 1, dtype=np.float64)
     x = begin[:, None] + (end - begin)[:, None] * share
     x[:, -1] = end
     return share, x
@@ -151,9 +154,9 @@ def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
     return np.asarray(np.maximum(slope - below, above - slope) + rounding)
 
 
-def _traction_errors(law: Superpotential, begin: Array, end: Array) -> Array:
+def _traction_errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Array:
     """Bounds of the difference of the tractions on intervals, (n,)."""
-    share, x = _samples(begin, end)
+    share, x = _samples(begin, end, samples)
     traction = _polyline(law, begin, end, share)[1]
     after, before = (side(x.ravel()).reshape(x.shape) for side in (law.right, law.left))
     at_samples = np.maximum(np.abs(after - traction)[:, :-1], np.abs(before - traction)[:, 1:])
@@ -163,9 +166,9 @@ def _traction_errors(law: Superpotential, begin: Array, end: Array) -> Array:
     return np.asarray(most.max(axis=1) + rounding)
 
 
-def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
+def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Array:
     """Bounds of the difference of the energies on intervals, (n,)."""
-    share, x = _samples(begin, end)
+    share, x = _samples(begin, end, samples)
     energy, traction = _polyline(law, begin, end, share)
     value = law.value(x.ravel()).reshape(x.shape)
     difference = np.abs(energy + value[:, :1] - value)

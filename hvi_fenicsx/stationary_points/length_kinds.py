@@ -12,7 +12,7 @@ from .arcs import FREE, INF, Chain
 from .length_frames import Frames, left_out
 from .lengths import Lengths
 from .scalar_problem import ScalarProblem
-from .stationarity import ACCURACY, Kind, kind
+from .stationarity import Kind, kind
 
 
 def kind_of(problem: ScalarProblem, x: Array) -> Kind:
@@ -24,7 +24,7 @@ def kind_of(problem: ScalarProblem, x: Array) -> Kind:
     """
     if not len(problem.lengths):
         return kind(problem, x)
-    near = ACCURACY * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+    near = problem.thresholds.points.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
     lengths = problem.lengths
     vectors = lengths.vectors(x)
     rounded = x.copy()

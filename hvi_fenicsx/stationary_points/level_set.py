@@ -17,11 +17,6 @@ from .curvature import Curvature, kernel
 from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 
-MOST_FORCES = 24
-"""Forces τ that are tried, each a quarter of the one before."""
-SLACK = 1e-6
-"""Energy, relative to its parts, that is added to the level for what the relaxation's residual could hide."""
-
 
 def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: float) -> tuple[Array, Array]:
     """The ends of a box (n + m,) with all points of at most an energy.
@@ -35,13 +30,13 @@ def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: flo
     Raises:
         SolverError: no finite box was found.
     """
-    energy = level + SLACK * problem.energy_size(box.x)
+    energy = level + problem.thresholds.bounds.slack * problem.energy_size(box.x)
     root = np.sqrt(2.0 * max(energy - box.value, 0.0))
     n = problem.size
     low, high = box.x - root * curvature.radii[:n], box.x + root * curvature.radii[:n]
     free = np.flatnonzero(~np.isfinite(curvature.radii[:n]))
     if free.size:
-        motions = _apart(problem, kernel(problem.stiffness))
+        motions = _apart(problem, kernel(problem))
         spread = np.abs(motions[free]) @ _reach(problem, box, motions, energy)
         around = root * curvature.range_radii[free] + spread
         low[free], high[free] = box.x[free] - around, box.x[free] + around
@@ -69,7 +64,7 @@ def _reach(problem: ScalarProblem, box: Box, motions: Array, energy: float) -> A
 def _farthest(problem: ScalarProblem, box: Box, c: Array, energy: float) -> float:
     """A bound of c·x from above."""
     best, tau = np.inf, float(np.max(np.abs(problem.force), initial=1e-300))
-    for _ in range(MOST_FORCES):
+    for _ in range(problem.thresholds.bounds.most_forces):
         found, _ = Relaxation(replace(problem, force=problem.force + tau * c)).solve(replace(box, bound=-np.inf), 0.9)
         if not np.any(
             (found.x <= box.low[: problem.size]) & np.isneginf(problem.lower)

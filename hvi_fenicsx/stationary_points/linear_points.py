@@ -7,17 +7,15 @@ from scipy.optimize import linprog
 
 from ..typing import Array
 
-CONDITION = 1e12
-"""Condition number beyond which a linear system is singular."""
 
-
-def is_singular(matrix: Array) -> bool:
+def is_singular(matrix: Array, condition: float) -> bool:
     """Whether a linear system has no solution, or many.
 
     Args:
         matrix: of the system, (n, n).
+        condition: number beyond which it is singular.
     """
-    return not np.linalg.cond(matrix) < CONDITION
+    return not np.linalg.cond(matrix) < condition
 
 
 def some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:

@@ -16,11 +16,6 @@ from ..typing import Array, Integers
 from .arcs import on_interval
 from .scalar_problem import ScalarProblem
 
-HULL_ROUNDING = 1e-15
-"""Corners nearer to the hull than this share of the products compared are kept."""
-MANY = 8
-"""Where there are more corners than this, those inside the hull are left out."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class _Corners:
@@ -107,9 +102,10 @@ class LinearTest:
         """Corners (x, t) of the law's graph on an interval; at a joint alone all its tractions."""
         if low == high:
             return {(low, a.rate(low)) for a in self._problem.chains[i] if a.low <= low <= a.high}
+        limits = self._problem.thresholds.cells
         arcs = on_interval(self._problem.chains[i], low, high)
         corners = {(x, a.rate(x)) for a in arcs for x in (a.low, a.high)}
-        return corners if len(corners) <= MANY else _without_inner(corners)
+        return corners if len(corners) <= limits.many_corners else _without_inner(corners, limits.hull_rounding)
 
     def _columns(self, corners: _Corners) -> tuple[Array, Array]:
         """Equations of the shares of corners and rays: forces in balance, shares of each unknown sum to 1."""
@@ -122,23 +118,26 @@ class LinearTest:
         return columns, np.concatenate([problem.force, np.ones(n)])
 
 
-def _without_inner(corners: set[tuple[float, float]]) -> set[tuple[float, float]]:
+def _without_inner(corners: set[tuple[float, float]], rounding: float) -> set[tuple[float, float]]:
     """The corners of the hull (Andrew 1979, Information Processing Letters 9); one that rounding leaves is no harm."""
     ordered = sorted(corners)
-    return {*_lower_hull(ordered), *((x, -t) for x, t in _lower_hull([(x, -t) for x, t in ordered]))}
+    upper = _lower_hull([(x, -t) for x, t in ordered], rounding)
+    return {*_lower_hull(ordered, rounding), *((x, -t) for x, t in upper)}
 
 
-def _lower_hull(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def _lower_hull(ordered: list[tuple[float, float]], rounding: float) -> list[tuple[float, float]]:
     hull: list[tuple[float, float]] = []
     for x, t in ordered:
-        while len(hull) > 1 and _is_above(hull[-1], hull[-2], (x, t)):
+        while len(hull) > 1 and _is_above(hull[-1], hull[-2], (x, t), rounding):
             hull.pop()
         hull.append((x, t))
     return hull
 
 
-def _is_above(middle: tuple[float, float], first: tuple[float, float], last: tuple[float, float]) -> bool:
+def _is_above(
+    middle: tuple[float, float], first: tuple[float, float], last: tuple[float, float], rounding: float
+) -> bool:
     """Whether a point lies above the chord between two others by more than rounding."""
     x, t = middle[0] - first[0], middle[1] - first[1]
     dx, dt = last[0] - first[0], last[1] - first[1]
-    return t * dx - dt * x > HULL_ROUNDING * (abs(t * dx) + abs(dt * x))
+    return t * dx - dt * x > rounding * (abs(t * dx) + abs(dt * x))

@@ -26,23 +26,6 @@ from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 from .tightening import ForceIntervals
 
-PARTS = (0.9, 0.999)
-"""Shares of the largest curvature, in turn: the first leaves convexity to tighten with, the second bounds best."""
-MOST_ROUNDS = 6
-"""How often a box is tightened and bounded before it is divided."""
-WORTHWHILE = 0.15
-"""A round that closes less than this share of a box's gap is the last."""
-MOST_SKIPPED = 10
-"""Boxes from which no descent is made, between two from which one is."""
-LOST = 0.25
-"""Share of a box's gap that the chords of rigid motions may take off."""
-WIDENED = 1e-9
-"""Relative widening of radii, for rounding."""
-SHARE_USED = 0.999
-"""Share of the allowed gap that a search uses: so that rounding lifts no told gap above it."""
-ROUNDING = 1e-13
-"""Energies that differ by less than this share of their parts are equal."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
@@ -87,6 +70,7 @@ class LowestSearch:
     _numbers: Iterator[int] = field(default_factory=count)
 
     def __post_init__(self) -> None:
+        self._thresholds = self.problem.thresholds.lowest
         self._relaxation = Relaxation(self.problem)
         self._forces = ForceIntervals(self.problem)
         self._in_vain = self._next_descent = 0
@@ -107,7 +91,7 @@ class LowestSearch:
         self.x = self._inside(np.zeros(problem.size))
         for x in (self.x, *points):
             self._try(self._inside(x))
-        first, curvature = self._relaxation.solve(fresh_box(low, high, self.x), PARTS[0])
+        first, curvature = self._relaxation.solve(fresh_box(low, high, self.x), self._thresholds.parts[0])
         if self._far(first.x):
             raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
         self._enter_level_set(first, curvature)
@@ -125,7 +109,7 @@ class LowestSearch:
         """
         self._low, self._high = low, high
         self._try(self._inside(point))
-        self._enter_level_set(*self._relaxation.solve(fresh_box(low, high, self.x), PARTS[0]))
+        self._enter_level_set(*self._relaxation.solve(fresh_box(low, high, self.x), self._thresholds.parts[0]))
 
     def _enter_level_set(self, first: Box, curvature: Curvature) -> None:
         """Enter what a relaxation leaves of its box."""
@@ -191,7 +175,7 @@ class LowestSearch:
 
     @property
     def _allowed(self) -> float:
-        return max(SHARE_USED * self.gap * self._size, ROUNDING * self._parts)
+        return max(self._thresholds.share_used * self.gap * self._size, self._thresholds.rounding * self._parts)
 
     @property
     def _parts(self) -> float:
@@ -230,18 +214,18 @@ class LowestSearch:
         heapq.heappush(self.waiting, (found.bound, next(self._numbers), found))
 
     def _bounded(self, box: Box) -> Box | None:
-        for round_ in range(MOST_ROUNDS):
+        for round_ in range(self._thresholds.most_rounds):
             before = box.bound
-            for part in PARTS:
+            for part in self._thresholds.parts:
                 smaller = self._forces.tightened(box.low, box.high)
                 if smaller is None:
                     return None
                 box = replace(box, low=smaller[0], high=smaller[1], x=clipped(box.x, *smaller))
-                lost = LOST * (self.upper - box.bound) if math.isfinite(box.bound) else 0.0
+                lost = self._thresholds.lost * (self.upper - box.bound) if math.isfinite(box.bound) else 0.0
                 box, curvature = self._relaxation.solve(box, part, lost)
                 if self._closed(box):
                     return None
-                if part == PARTS[-1] and round_ == 0:
+                if part == self._thresholds.parts[-1] and round_ == 0:
                     self._try_at_times(box.x)
                     if self._closed(box):
                         return None
@@ -251,7 +235,7 @@ class LowestSearch:
                 box = self._motions_tightened(box, curvature)
                 if np.any(box.motion_low > box.motion_high) or np.any(box.low > box.high):
                     return None
-            if box.tight or box.bound - before < WORTHWHILE * (self.upper - box.bound):
+            if box.tight or box.bound - before < self._thresholds.worthwhile * (self.upper - box.bound):
                 break
         return box
 
@@ -271,7 +255,7 @@ class LowestSearch:
 
     def _radius(self, box: Box) -> float:
         """How far lower points are from the relaxation's minimiser, in the norm of its matrix."""
-        return math.sqrt(2.0 * max(self.upper - box.value, 0.0)) * (1.0 + WIDENED)
+        return math.sqrt(2.0 * max(self.upper - box.value, 0.0)) * (1.0 + self._thresholds.widened)
 
     def _closed(self, box: Box) -> bool:
         return box.bound >= self.upper - self._allowed
@@ -282,7 +266,7 @@ class LowestSearch:
             return
         before = self.upper
         self._try(x)
-        self._in_vain = 0 if self.upper < before else min(self._in_vain + 1, MOST_SKIPPED)
+        self._in_vain = 0 if self.upper < before else min(self._in_vain + 1, self._thresholds.most_skipped)
         self._next_descent = self.boxes + self._in_vain
 
     def _try(self, x: Array) -> None:

@@ -16,11 +16,6 @@ from .boxes import Box
 from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 
-PART = 0.9
-"""Share of the largest curvature."""
-WIDENED = 1e-9
-"""Relative widening of the radius, for rounding and for the residual of y."""
-
 
 def tightened(relaxation: Relaxation, box: Box) -> Box:
     """A smaller box with the same stationary points; empty (low > high) if there are none.
@@ -29,12 +24,13 @@ def tightened(relaxation: Relaxation, box: Box) -> Box:
         relaxation: of the problem.
         box: the box; its x and weights are where to begin.
     """
-    solved, curvature = relaxation.solve(box, PART)
-    y, problem = solved.x, relaxation.problem
+    problem, limits = relaxation.problem, relaxation.problem.thresholds.cells
+    solved, curvature = relaxation.solve(box, limits.part)
+    y = solved.x
     short = -np.minimum(_least_products(problem, box, y, curvature.added), 0.0).sum()
     size = float(np.abs(problem.force) @ np.abs(y)) + problem.energy_size(y)
     with np.errstate(invalid="ignore"):
-        reach = curvature.radii * np.sqrt(short * (1.0 + WIDENED) + 1e-14 * size)
+        reach = curvature.radii * np.sqrt(short * (1.0 + limits.widened_radius) + 1e-14 * size)
     reach = np.where(np.isfinite(curvature.radii), reach, np.inf)
     low, high = np.maximum(box.low, y - reach), np.minimum(box.high, y + reach)
     fixed = box.low == box.high

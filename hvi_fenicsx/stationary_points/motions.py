@@ -14,15 +14,7 @@ import numpy as np
 from ..typing import Array, Mask
 from .arcs import FREE, INF
 from .scalar_problem import ScalarProblem
-
-MOVED = 1e-9
-"""A motion whose part on the unknowns with laws is smaller than this moves none of them."""
-WIDENED = 1e-12
-"""Relative widening of intervals, for rounding."""
-GROWTH = 8.0
-"""Behind the laws' joints, parts of the interval of a share end this many times farther away than they begin."""
-MIDDLE = (0.2, 0.8)
-"""Where the interval of a share is divided else, between its ends."""
+from .thresholds import DEFAULT, BoundThresholds
 
 
 def shapes(problem: ScalarProblem, kernel: Array) -> Array:
@@ -35,20 +27,21 @@ def shapes(problem: ScalarProblem, kernel: Array) -> Array:
     with_law = np.array([c != FREE for c in problem.chains[: problem.size]], dtype=np.bool_)
     with_law[problem.lengths.members] = True
     columns, sizes, _ = np.linalg.svd(np.where(with_law[:, None], kernel, 0.0), full_matrices=False)
-    return np.asarray(columns[:, sizes > MOVED])
+    return np.asarray(columns[:, sizes > problem.thresholds.bounds.moved])
 
 
-def span(moved: Array, low: Array, high: Array) -> tuple[Array, Array]:
+def span(moved: Array, low: Array, high: Array, widened: float) -> tuple[Array, Array]:
     """The least and the largest shares of motions in a box, (k,) each.
 
     Args:
         moved: the motions' shapes, (n, k).
         low: of the unknowns, (n,).
         high: of the unknowns, (n,).
+        widened: relative widening, for rounding.
     """
     up, down = np.maximum(moved, 0.0).T, np.minimum(moved, 0.0).T
     least, most = up @ low + down @ high, up @ high + down @ low
-    slack = WIDENED * (np.abs(moved).T @ np.maximum(np.abs(low), np.abs(high)))
+    slack = widened * (np.abs(moved).T @ np.maximum(np.abs(low), np.abs(high)))
     return np.asarray(least - slack), np.asarray(most + slack)
 
 
@@ -70,20 +63,21 @@ def farthest_joints(problem: ScalarProblem, moved: Array) -> Array:
     return np.asarray(np.where(result > 0.0, result, np.inf))
 
 
-def long(low: Array, high: Array, joints: Array) -> Mask:
+def long(low: Array, high: Array, joints: Array, growth: float) -> Mask:
     """Which intervals of shares reach far behind the laws' joints, (k,).
 
     Args:
         low: their begins, (k,).
         high: their ends, (k,).
         joints: the farthest joints, (k,).
+        growth: so many times farther than where they begin is far.
     """
     return np.asarray(
-        (high > GROWTH * np.maximum(low, joints)) | (-low > GROWTH * np.maximum(-high, joints)), dtype=np.bool_
+        (high > growth * np.maximum(low, joints)) | (-low > growth * np.maximum(-high, joints)), dtype=np.bool_
     )
 
 
-def divided(low: float, high: float, joint: float, at: float) -> float:
+def divided(low: float, high: float, joint: float, at: float, thresholds: BoundThresholds = DEFAULT.bounds) -> float:
     """Where the interval of a share is divided: what is far behind the joints apart, and in growing parts.
 
     Args:
@@ -91,11 +85,13 @@ def divided(low: float, high: float, joint: float, at: float) -> float:
         high: its end.
         joint: the farthest joint.
         at: where it is divided best, if it is not long.
+        thresholds: how the parts grow.
     """
+    growth = thresholds.growth
     for sign, begin, end in ((1.0, low, high), (-1.0, -high, -low)):
-        if end > GROWTH * max(begin, joint):
-            return sign * (GROWTH * begin if begin >= joint else joint)
-    first, last = (low + share * (high - low) for share in MIDDLE)
+        if end > growth * max(begin, joint):
+            return sign * (growth * begin if begin >= joint else joint)
+    first, last = (low + share * (high - low) for share in thresholds.middle)
     return min(max(at, first), last)
 
 

@@ -20,15 +20,6 @@ from .landscapes import Landscape
 from .point_list import StationaryPoint
 from .stationarity import Kind
 
-MOST_DESCENTS = 60
-"""Descents that are made one after the other, each of several steps."""
-STEPS = tuple(10.0**-k for k in range(2, 10))
-"""Lengths of the first step off a saddle, relative to the displacements; the first that lowers the energy is taken."""
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Shares of this step at which the energy must be lower than at the saddle."""
-NEAR = 1e-4
-"""A descent that ends nearer than this share of the displacements to a minimiser has reached it, too."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Pass:
@@ -79,7 +70,7 @@ def _end(landscape: Landscape, points: Sequence[StationaryPoint], saddle: Statio
     if x is None or not minimisers:
         return -1
     places, before = np.array([points[i].x for i in minimisers]), None
-    for _ in range(MOST_DESCENTS):
+    for _ in range(landscape.thresholds.most_descents):
         distances = np.max(np.abs(places - x), axis=1)
         k = int(np.argmin(distances))
         if landscape.is_convex(np.minimum(x, places[k]), np.maximum(x, places[k])):
@@ -87,13 +78,13 @@ def _end(landscape: Landscape, points: Sequence[StationaryPoint], saddle: Statio
         if before is not None and np.array_equal(x, before):
             break
         before, x = x, landscape.lower(x)
-    return minimisers[k] if distances[k] < NEAR * size else -1
+    return minimisers[k] if distances[k] < landscape.thresholds.near * size else -1
 
 
 def _start(landscape: Landscape, saddle: StationaryPoint, way: Array) -> Array | None:
     """A place beside a saddle to which the energy falls; None if none is found."""
-    for step in STEPS:
-        places = [np.clip(saddle.x + share * step * way, *landscape.ends) for share in SHARES]
+    for step in landscape.thresholds.first_steps:
+        places = [np.clip(saddle.x + share * step * way, *landscape.ends) for share in landscape.thresholds.shares]
         if all(landscape.energy(x) < saddle.energy for x in places):
             return places[-1]
     return None

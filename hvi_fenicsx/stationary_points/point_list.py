@@ -10,9 +10,6 @@ import numpy as np
 from ..typing import Array
 from .stationarity import Kind
 
-SAME = 1e-7
-"""Points nearer than this share of the displacements are one."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class StationaryPoint:
@@ -36,12 +33,14 @@ class PointList:
 
     Args:
         size: number n of unknowns.
+        same: points nearer than this share of the displacements are one.
 
     Attributes:
         listed: the points, as they were added.
     """
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, same: float) -> None:
+        self._same = same
         self.listed: list[StationaryPoint] = []
         self._places: Array = np.empty((0, size))
 
@@ -73,7 +72,7 @@ class PointList:
         Args:
             x: the point, (n,).
         """
-        return bool(np.any(self.distances(x) < SAME * (1.0 + float(np.max(np.abs(x), initial=0.0)))))
+        return bool(np.any(self.distances(x) < self._same * (1.0 + float(np.max(np.abs(x), initial=0.0)))))
 
     def add(self, point: StationaryPoint) -> None:
         """Put a point at the end.

@@ -12,12 +12,9 @@ from .cell_parts import at_bounds
 from .cell_verdict import Verdict
 from .convex_programme import Chains, minimise
 from .linear_points import is_singular, some_solution
-from .point_list import SAME, PointList, StationaryPoint
+from .point_list import PointList, StationaryPoint
 from .relaxation import envelopes
 from .scalar_problem import ScalarProblem
-
-REGULAR = 1e-6
-"""Least pivot, relative to the largest, of a matrix that counts as positive definite."""
 
 
 class PolylineCells:
@@ -46,7 +43,7 @@ class PolylineCells:
             return Verdict(left=cell)
         slopes = arcs.least_slope(cell.low, cell.high)
         matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
-        if _positive(matrix):
+        if _positive(matrix, problem.thresholds.cells.regular):
             return self._done(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
         if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(at_bounds(problem, cell)[free]):
             return Verdict(left=cell)
@@ -61,7 +58,7 @@ class PolylineCells:
         """
         problem = self._problem
         x = np.clip(x, problem.lower, problem.upper)
-        if stationarity.imbalance(problem, x) > stationarity.ACCURACY:
+        if stationarity.imbalance(problem, x) > problem.thresholds.points.accuracy:
             return None
         kind = stationarity.kind(problem, x)
         return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
@@ -82,8 +79,9 @@ class PolylineCells:
 
     def _minimum(self, cell: Box, added: Array) -> Array:
         """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
-        chains = Chains.of(envelopes(self._problem, cell.low, cell.high, added))
-        return minimise(self._problem.stiffness - np.diag(added), self._problem.force, chains, cell.x).x
+        problem, chains = self._problem, Chains.of(envelopes(self._problem, cell.low, cell.high, added))
+        programmes = problem.thresholds.programmes
+        return minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x, programmes).x
 
     def _linear(self, cell: Box, free: Integers, matrix: Array) -> Verdict:
         """The solutions of a cell in which every law is on one arc."""
@@ -93,9 +91,9 @@ class PolylineCells:
         held = np.setdiff1d(rows, free)
         right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
         x, low, high = cell.low.copy(), cell.low[free], cell.high[free]
-        if not is_singular(matrix):
+        if not is_singular(matrix, problem.thresholds.cells.condition):
             x[free] = np.linalg.solve(matrix, right)
-            near = SAME * (1.0 + np.abs(x[free]))
+            near = problem.thresholds.points.same * (1.0 + np.abs(x[free]))
             inside = np.all((x[free] >= low - near) & (x[free] <= high + near))
             return self._done(x) if inside else Verdict()
         if (inner := some_solution(matrix, right, np.column_stack([low, high]))) is None:
@@ -104,10 +102,10 @@ class PolylineCells:
         return self._done(x, isolated=False)
 
 
-def _positive(matrix: Array) -> bool:
-    """Whether a matrix is positive definite, and not nearly singular."""
+def _positive(matrix: Array, regular: float) -> bool:
+    """Whether a matrix is positive definite, its least pivot above a share of the largest."""
     try:
         pivots = np.diag(cholesky(matrix, lower=True))
     except LinAlgError:
         return False
-    return bool(pivots.min() > REGULAR * pivots.max())
+    return bool(pivots.min() > regular * pivots.max())

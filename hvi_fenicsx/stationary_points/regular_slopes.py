@@ -13,27 +13,27 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array
+from .thresholds import DEFAULT
 
-LEAST_WIDTH = 1e-9
-"""Ranges of slopes are widened to this share of the stiffness at least."""
 EPSILON = float(np.finfo(float).eps)
 
 
-def is_regular(stiffness: Array, least: Array, most: Array) -> bool:
+def is_regular(stiffness: Array, least: Array, most: Array, least_width: float = DEFAULT.cells.least_width) -> bool:
     """Whether S + E is regular for all diagonal E from least to most.
 
     Args:
         stiffness: S, symmetric, (n, n).
         least: -inf where no bound is known, (n,).
         most: inf where there is none, (n,).
+        least_width: share of the stiffness to which ranges are widened at least.
     """
     if not len(least) or not np.all(np.isfinite(least)):
         return not len(least)
     scale = float(np.max(np.diag(stiffness))) or 1.0
     ends = np.isfinite(most)
-    half = np.maximum(0.5 * (np.where(ends, most, least) - least), LEAST_WIDTH * scale)
+    half = np.maximum(0.5 * (np.where(ends, most, least) - least), least_width * scale)
     matrix = stiffness + np.diag(least + np.where(ends, half, 0.0))
-    spring = np.where(ends, 0.0, np.maximum(np.diag(matrix), LEAST_WIDTH * scale))
+    spring = np.where(ends, 0.0, np.maximum(np.diag(matrix), least_width * scale))
     first, second = matrix + np.diag(spring), matrix - np.diag(spring)
     second[ends] = np.diag(half)[ends]
     weights = np.where(ends, half, 2.0 * spring) ** -0.5

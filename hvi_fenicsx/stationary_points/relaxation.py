@@ -17,18 +17,10 @@ from .convex_programme import Chains, minimise
 from .curvature import Curvature, CurvatureShare
 from .dual_bound import DualBound
 from .held_forces import with_held_forces
+from .length_newton import LengthNewton
 from .length_programme import LengthProgramme
 from .motions import Lent
 from .scalar_problem import ScalarProblem
-
-MOST_MOTIONS = 1
-"""Rigid motions of unknowns with laws along which curvature is lent; the parts of several multiply."""
-MOST_PARTS = 64
-"""Parts of the interval of a rigid motion's share that are worth the curvature along it."""
-TIGHT = 1e-14
-"""An envelope below its law by less than this share of the energy's parts is tight."""
-LEAST_WEIGHT = 0.1
-"""Share of the weights of D that does not follow from where envelopes were not tight."""
 
 
 def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> list[Array]:
@@ -64,7 +56,7 @@ class Relaxation:
     """
 
     def __init__(self, problem: ScalarProblem) -> None:
-        self.problem = problem
+        self.problem, self._thresholds = problem, problem.thresholds.bounds
         self._share = CurvatureShare(problem)
 
     def undecided(self, low: Array, high: Array) -> Integers:
@@ -86,7 +78,7 @@ class Relaxation:
             high: of the box, (n + m,).
         """
         n = self.problem.size
-        return motions.span(self._share.shapes, low[:n], high[:n])
+        return motions.span(self._share.shapes, low[:n], high[:n], self._thresholds.widened)
 
     @cached_property
     def joints(self) -> Array:
@@ -117,7 +109,7 @@ class Relaxation:
         stack = Chains.of(chains)
         x, value, bound = self._minimised(box, curvature, lent, chains, stack)
         gaps = np.zeros(len(box.motion_low))
-        gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), TIGHT * problem.energy_size(x))
+        gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), self._thresholds.tight * problem.energy_size(x))
         box = replace(
             box,
             motion_gaps=np.where(wanted, np.inf, gaps),
@@ -142,14 +134,14 @@ class Relaxation:
         """The curvature, and the rigid motions whose shares are to be divided before any is lent along them, (k,)."""
         given, wide = (box.low, box.high, undecided, weights, part), box.motion_high - box.motion_low
         wanted: Mask = np.zeros(len(wide), dtype=np.bool_)
-        if lost > 0.0 and 0 < len(wide) <= MOST_MOTIONS:
-            wanted = motions.long(box.motion_low, box.motion_high, self.joints)
+        if lost > 0.0 and 0 < len(wide) <= self._thresholds.most_motions:
+            wanted = motions.long(box.motion_low, box.motion_high, self.joints, self._thresholds.growth)
             if undecided.size and not wanted.any():
                 curvature = self._share.share(*given, lend=True)
                 cost = curvature.lent * wide**2 / 8.0
                 if cost.sum() <= lost:
                     return curvature, wanted
-                wanted = (cost >= 0.5 * cost.max()) & (cost.sum() <= MOST_PARTS**2 * lost)
+                wanted = (cost >= 0.5 * cost.max()) & (cost.sum() <= self._thresholds.most_parts**2 * lost)
         return self._share.share(*given), wanted
 
     def lent(self, box: Box, curvature: Curvature) -> Lent:
@@ -171,13 +163,14 @@ class Relaxation:
         a = problem.stiffness - np.diag(problem.diagonal(curvature.added)) + lent.matrix
         b = problem.force + lent.force
         if not len(problem.lengths):
-            found = minimise(a, b, stack, box.x)
+            found = minimise(a, b, stack, box.x, problem.thresholds.programmes)
             bound = found.bound + lent.constant
             return found.x, bound, bound
         programme = LengthProgramme.of(problem, a, b, list(map(arcs_of, chains)), curvature.added[problem.size :])
-        x = programme.minimiser(box.x)
+        newton = LengthNewton(programme)
+        x = newton.minimiser(box.x)
         dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
-        multipliers = programme.multipliers(x)
+        multipliers = newton.multipliers(x)
         value = bound = dual.at(x, multipliers)
         if np.any(np.abs(self.shares(x)) > self.joints):
             y, pushes = with_held_forces(programme, x, self._share.springs)
@@ -193,7 +186,7 @@ class Relaxation:
         seen = box.weights[undecided]
         most = float(seen.max(initial=0.0))
         weights = np.zeros(len(low))
-        weights[undecided] = strength * (seen / most + LEAST_WEIGHT if most > 0.0 else 1.0)
+        weights[undecided] = strength * (seen / most + self._thresholds.least_weight if most > 0.0 else 1.0)
         return weights
 
     def _examined(self, box: Box, x: Array, stack: Chains, curvature: Curvature, undecided: Integers) -> Box:
@@ -204,7 +197,7 @@ class Relaxation:
         begin, end = stack.ends[rows, k], stack.ends[rows, k + 1]
         gaps = problem.arcs.energy(at) + 0.5 * curvature.added * at * at - stack.energy(at)
         loose = np.zeros(len(at), dtype=bool)
-        loose[undecided] = gaps[undecided] > TIGHT * problem.energy_size(x)
+        loose[undecided] = gaps[undecided] > self._thresholds.tight * problem.energy_size(x)
         with np.errstate(invalid="ignore", divide="ignore"):
             spread = np.where(loose, 0.5 * (at - begin) * (end - at), 0.0)
         weights = 0.5 * (box.weights + spread) if box.weights.any() else spread

@@ -12,15 +12,9 @@ import numpy as np
 from scipy.linalg import qr
 
 from ..typing import Array
-from .graph_clip import WIDENED, GraphClip, clipped_again
+from .graph_clip import GraphClip, clipped_again
 from .scalar_problem import ArcTable, ScalarProblem
 
-RIGID = 1e-11
-"""Eigenvalues of S below this share of the largest are those of rigid motions."""
-MOST_ROUNDS = 20
-"""Passes over all unknowns."""
-PROGRESS = 0.1
-"""A pass that makes no interval shorter by this share is the last."""
 EPSILON = float(np.finfo(float).eps)
 
 
@@ -36,10 +30,11 @@ class RigidBalance:
 
     def __init__(self, problem: ScalarProblem) -> None:
         self._problem, n = problem, problem.size
+        self._widened = problem.thresholds.cells.widened
         self._arcs = ArcTable.of(problem.chains[:n])
         self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
         values, vectors = np.linalg.eigh(problem.stiffness)
-        rigid = values <= RIGID * values[-1]
+        rigid = values <= problem.thresholds.cells.rigid * values[-1]
         shapes, elastic = vectors[:, rigid], vectors[:, ~rigid]
         self.pivots = qr(shapes.T, pivoting=True, mode="r")[1][: shapes.shape[1]]
         self._motions = shapes @ np.linalg.inv(shapes[self.pivots])
@@ -66,12 +61,13 @@ class RigidBalance:
             low: of the cell, (n,), finite.
             high: of the cell, (n,), finite.
         """
-        return clipped_again(self._once, low, high, most_rounds=MOST_ROUNDS, progress=PROGRESS)
+        limits = self._problem.thresholds.cells
+        return clipped_again(self._once, low, high, most_rounds=limits.rigid_passes, progress=limits.rigid_progress)
 
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
             return None
-        rounding = WIDENED * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
+        rounding = self._widened * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
         slack = rounding + self._problem.force_error
         ends = self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)
         return None if ends is None else self._elastic(*ends, *forces)
@@ -85,7 +81,7 @@ class RigidBalance:
             ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
         least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
         most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
-        wide = WIDENED * (np.abs(least) + np.abs(most)) + problem.force_error
+        wide = self._widened * (np.abs(least) + np.abs(most)) + problem.force_error
         return (
             np.where(low <= problem.lower, -np.inf, least - wide),
             np.where(high >= problem.upper, np.inf, most + wide),
@@ -117,12 +113,12 @@ class RigidBalance:
             others = np.delete(np.arange(len(begin)), j)
             rest_low, rest_high = _product(self._motions[np.ix_(i, others)], begin[others], end[others])
             ways = np.sort(np.stack([low[i] - last[i] - rest_high, high[i] - first[i] - rest_low]) / motion[i], axis=0)
-            slack = WIDENED * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
+            slack = self._widened * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
             begin[j], end[j] = max(begin[j], ways[0].max() - slack), min(end[j], ways[1].min() + slack)
         if np.any(begin > end):
             return None
         moved_low, moved_high = _product(self._motions, begin, end)
-        slack = WIDENED * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
+        slack = self._widened * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
         low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
         return None if np.any(low > high) else (low, high)
 

@@ -15,12 +15,7 @@ from ..laws.arc import Arc
 from ..typing import Array, Integers, Mask
 from .arcs import INF, ROUNDING, Chain
 from .lengths import Lengths
-
-FAR = 1e6
-"""Ends of the first box, relative to the problem's displacements; what is found must stay off them."""
-
-BENT = 0.01
-"""A share of the largest traction by which a traction bends or jumps where it has a joint."""
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +33,7 @@ class ScalarProblem:
         error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
         force_error: the forces of the laws differ from those of the chains by this at most, (n,).
         farthest: displacements up to which this is known.
+        thresholds: the numbers that tune the search.
     """
 
     stiffness: Array
@@ -50,11 +46,12 @@ class ScalarProblem:
     error: float = 0.0
     force_error: Array | float = 0.0
     farthest: float = INF
+    thresholds: Thresholds = DEFAULT
 
     @property
     def far(self) -> float:
         """A displacement far beyond all joints of the chains: the end of what is searched."""
-        return min(FAR * self.reach, self.farthest)
+        return min(self.thresholds.polylines.far * self.reach, self.farthest)
 
     @cached_property
     def reach(self) -> float:
@@ -70,7 +67,7 @@ class ScalarProblem:
         places = np.where(np.isfinite(at), np.abs(at), 0.0)
         bends = rises + np.abs(np.diff(arcs.slopes, axis=1)) * places
         peaks = np.maximum(np.abs(arcs.before), np.abs(arcs.after)).max(axis=1)
-        seen = places[np.isfinite(at) & (places > 0.0) & (bends > BENT * peaks[:, None])]
+        seen = places[np.isfinite(at) & (places > 0.0) & (bends > self.thresholds.polylines.bent * peaks[:, None])]
         return float(seen.max(initial=0.0)) or 1.0
 
     @property

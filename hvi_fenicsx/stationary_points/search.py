@@ -20,11 +20,9 @@ from .point_list import PointList, StationaryPoint
 from .progress_words import Clock, all_in_words, counted
 from .scalar_problem import ScalarProblem
 from .search_lowest import bounded, lowest
-from .search_task import MOST_BOXES, Task, stacked
+from .search_task import Task, stacked
 from .stationarity import Kind
 
-MOST_VAIN = 100
-"""Attempts in a row to find a new point, where a proof goes on after them."""
 NO_POINT = "no equilibrium, proven"
 
 
@@ -87,7 +85,7 @@ def _left_of_all(search: Enumeration) -> Saved:
 def _fresh(task: Task) -> Enumeration:
     """A search for all points; of curved laws with polylines near their tractions."""
     curved = task.wanted.curved
-    return Enumeration(problem=task.problem if curved is None else curved.near, laws=curved)
+    return Enumeration(problem=task.problem if curved is None else curved.near, laws=curved, cut=task.stop)
 
 
 def _resumed(task: Task, saved: Saved) -> Enumeration:
@@ -104,7 +102,7 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
 def _started(task: Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> None:
     """A few cells, which often are all; else what is found without a proof."""
     search.start()
-    if not search.run(lambda: search.cells >= MOST_BOXES or task.stop(), tell):
+    if not search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell) and not task.stop():
         for x in systematic.candidates(search.problem, search.points.listed, _patience(task, search.points)):
             search.enter(x)
 
@@ -117,7 +115,7 @@ def _patience(task: Task, known: PointList) -> Callable[[], bool]:
         nonlocal before, vain
         vain = vain + 1 if len(known) == before else 0
         before = len(known)
-        return vain > MOST_VAIN or task.stop()
+        return vain > task.problem.thresholds.systematic.most_vain or task.stop()
 
     return over
 
@@ -159,7 +157,7 @@ def _landscape(task: Task) -> Landscape:
 def _without_proof(task: Task) -> Found:
     """What is found where it cannot be proven that these are all: laws of lengths, or of unknown slopes."""
     problem = task.problem
-    if cells := _cells_of_none(task, MOST_BOXES):
+    if cells := _cells_of_none(task, task.most_boxes):
         return _none(cells)
     task.report("a search without a proof that nothing is missed")
     below = bounded(task, [])

@@ -14,12 +14,7 @@ from .lowest import LowestSearch, Progress
 from .point_list import StationaryPoint
 from .progress_words import Clock, counted, lowest_in_words
 from .scalar_problem import ScalarProblem
-from .search_task import MOST_BOXES, Task, stacked
-
-SIDES = 2.1
-"""How often the gap counts the difference of energies of laws and their polylines: on both sides, and some more."""
-OWN_GAP = 0.05
-"""The least share of the gap that a search may leave where laws are curved."""
+from .search_task import Task, stacked
 
 
 def lowest(task: Task) -> Found:
@@ -53,8 +48,8 @@ def _own_gap(problem: ScalarProblem, wanted: Wanted) -> float:
     """The gap that a search may leave: what the polylines of curved laws differ, on both sides, is taken off."""
     if not problem.error or wanted.start is None:
         return wanted.gap
-    size = abs(wanted.start.energy) or 1.0
-    return max(wanted.gap - SIDES * problem.error / size, OWN_GAP * wanted.gap)
+    size, limits = abs(wanted.start.energy) or 1.0, problem.thresholds.lowest
+    return max(wanted.gap - limits.sides * problem.error / size, limits.own_gap * wanted.gap)
 
 
 def _begin(search: LowestSearch, known: Start | None) -> None:
@@ -137,5 +132,5 @@ def bounded(task: Task, points: list[Array]) -> LowestSearch | None:
         search.start(points)
     except SolverError:
         return None
-    search.run(lambda: search.boxes > MOST_BOXES or task.stop(), lambda _: None)
+    search.run(lambda: search.boxes > task.most_boxes or task.stop(), lambda _: None)
     return search

@@ -11,9 +11,6 @@ from ..typing import Array
 from .found import Keep, Saved, Wanted
 from .scalar_problem import ScalarProblem
 
-MOST_BOXES = 50
-"""Boxes that are bounded for the gap where what was asked for is not proven."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
@@ -25,6 +22,11 @@ class Task:
     report: Callable[[str], None]
     saved: Saved | None
     keep: Keep
+
+    @property
+    def most_boxes(self) -> int:
+        """Boxes that are bounded for the gap where what was asked for is not proven."""
+        return self.problem.thresholds.lowest.most_boxes
 
 
 def stacked(boxes: list[tuple[Array, Array, Array]]) -> dict[str, Array]:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from ..typing import Array, Integers, Mask
 from .scalar_problem import ScalarProblem
-
-ACCURACY = 1e-9
-"""Forces in balance to this share of the largest one, and displacements on a joint to this share of the largest."""
-REGULAR = 1e-10
-"""Eigenvalues below this share of the largest are zero."""
 
 
 class Kind(StrEnum):
@@ -50,21 +45,42 @@ def subdifferential(problem: ScalarProblem, x: Array) -> Subdifferential:
         problem: the problem.
         x: the point, (n,).
     """
-    arcs, near = problem.arcs, ACCURACY * (1.0 + np.max(np.abs(x), initial=0.0))
+    arcs, accuracy = problem.arcs, problem.thresholds.points.accuracy
+    near = accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
     here = (arcs.low <= x[:, None] + near) & (arcs.high >= x[:, None] - near)
     at = np.clip(x[:, None], np.where(here, arcs.low, -np.inf), np.where(here, arcs.high, np.inf))
     t = arcs.tractions + arcs.slopes * (at - arcs.anchors)
     low, high = np.where(here, t, np.inf).min(axis=1), np.where(here, t, -np.inf).max(axis=1)
     drop = (
-        here[:, :-1] & here[:, 1:] & (t[:, :-1] - t[:, 1:] > ACCURACY * np.max(np.abs(problem.force), initial=1e-300))
+        here[:, :-1] & here[:, 1:] & (t[:, :-1] - t[:, 1:] > accuracy * np.max(np.abs(problem.force), initial=1e-300))
     )
-    return Subdifferential(
-        low=np.where(x <= problem.lower + near, -np.inf, low),
-        high=np.where(x >= problem.upper - near, np.inf, high),
-        falls=np.asarray(drop.any(axis=1)),
-        least=np.where(here, arcs.slopes, np.inf).min(axis=1),
-        most=np.where(here, arcs.slopes, -np.inf).max(axis=1),
+    return with_bounds(
+        problem,
+        x,
+        Subdifferential(
+            low=low,
+            high=high,
+            falls=np.asarray(drop.any(axis=1)),
+            least=np.where(here, arcs.slopes, np.inf).min(axis=1),
+            most=np.where(here, arcs.slopes, -np.inf).max(axis=1),
+        ),
     )
+
+
+def with_bounds(problem: ScalarProblem, x: Array, laws: Subdifferential) -> Subdifferential:
+    """What laws and bounds allow at a point; a drop that a bound keeps the unknown on is none.
+
+    Args:
+        problem: the stiffness, the force and the bounds.
+        x: the point, (n,).
+        laws: what the laws allow there.
+    """
+    near = problem.thresholds.points.accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
+    force = problem.force - problem.stiffness @ x
+    below, above = x <= problem.lower + near, x >= problem.upper - near
+    kept = (below & above) | (below & (force <= laws.low)) | (above & (force >= laws.high))
+    low, high = np.where(below, -np.inf, laws.low), np.where(above, np.inf, laws.high)
+    return replace(laws, low=low, high=high, falls=laws.falls & ~kept)
 
 
 def imbalance(problem: ScalarProblem, x: Array) -> float:
@@ -135,7 +151,7 @@ def unstable_directions(problem: ScalarProblem, x: Array, here: Subdifferential)
 def _free(problem: ScalarProblem, x: Array, here: Subdifferential) -> tuple[Integers, Integers]:
     """Unknowns that can move to first order for certain, and those that perhaps can."""
     force = problem.force - problem.stiffness @ x
-    near = ACCURACY * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
+    near = problem.thresholds.points.accuracy * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
     jumps = here.high - here.low > near
     inside = jumps & (force > here.low + near) & (force < here.high - near)
     return np.flatnonzero(~jumps), np.flatnonzero(~inside)
@@ -152,4 +168,4 @@ def _definite(problem: ScalarProblem, free: Integers, slopes: Array) -> int:
 
 def _zero(problem: ScalarProblem, largest: float) -> float:
     """Eigenvalues of at most this size are zero beside the largest."""
-    return REGULAR * max(abs(largest), float(np.trace(problem.stiffness)) / problem.size)
+    return problem.thresholds.points.zero * max(abs(largest), float(np.trace(problem.stiffness)) / problem.size)

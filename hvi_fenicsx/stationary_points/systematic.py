@@ -21,22 +21,6 @@ from .length_kinds import kind_of
 from .point_list import StationaryPoint
 from .scalar_problem import ScalarProblem
 
-PROGRAMMES = ((0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0), (2.0, 1.5, 1.0), (4.0, 2.0, 1.0), (-1.0, 0.0, 1.0))
-"""Load factors, one after the other; each programme begins at rest."""
-MULTIPLES = (0.0, 0.5, 2.0, 5.0, 20.0)
-"""Multiples of the state that loading leads to."""
-MOST_SHIFTS = 16
-"""By how many different numbers of pieces unknowns are moved."""
-FRONTS = 8
-"""How many fronts are tried on each piece of the laws."""
-REACHES = (0.1, 1.0, 10.0)
-"""How far known points push away in deflation."""
-MOST_POINTS = 100
-"""Points from which further ones are looked for, one after the other."""
-FAILURES = 3
-"""Attempts without a new point after which a start is given up."""
-SAME = 1e-4
-"""Where points are not exact, or were made so, those nearer than this share of the displacements are one."""
 Exact = Callable[[Array], StationaryPoint | None]
 """The stationary point near a given one, (n,); None where there is none."""
 
@@ -57,7 +41,7 @@ def candidates(problem: ScalarProblem, known: Sequence[StationaryPoint], stop: C
         if newton is not None:
             yield from _deflated(newton, start, known, stop)
     tried = 0
-    while newton is not None and tried < len(known) < MOST_POINTS:
+    while newton is not None and tried < len(known) < problem.thresholds.systematic.most_points:
         yield from _deflated(newton, known[tried].x, known, stop)
         tried += 1
 
@@ -66,9 +50,10 @@ def _deflated(
     newton: DeflatedNewton, start: Array, known: Sequence[StationaryPoint], stop: Callable[[], bool]
 ) -> Iterator[Array]:
     """Points from near one start, for each reach until several attempts find no new one."""
-    for reach in REACHES:
+    limits = newton.problem.thresholds.systematic
+    for reach in limits.reaches:
         failures = attempt = 0
-        while failures < FAILURES and not stop():
+        while failures < limits.failures and not stop():
             before, attempt = len(known), attempt + 1
             found = newton.root(start, [p.x for p in known], reach, attempt)
             if found is not None and not _far(newton.problem, found):
@@ -87,10 +72,10 @@ def near_stationary(
         stop: asked before each attempt.
         exact: makes points of polylines those of curved laws; None: a solver is to make points exact.
     """
-    points = list[StationaryPoint]()
+    points, same = list[StationaryPoint](), problem.thresholds.systematic.same
     for x in itertools.chain(known, candidates(problem, points, stop)):
         point = None if _far(problem, x) else _as_it_is(problem, x) if exact is None else exact(x)
-        if point is not None and not any(_same(p.x, point.x) for p in points):
+        if point is not None and not any(_same(p.x, point.x, same) for p in points):
             points.append(point)
     return sorted(points, key=lambda p: p.energy)
 
@@ -99,15 +84,17 @@ def _as_it_is(problem: ScalarProblem, x: Array) -> StationaryPoint:
     return StationaryPoint(x=x, energy=problem.energy(x) + problem.error, kind=kind_of(problem, x), isolated=True)
 
 
-def _same(one: Array, other: Array) -> bool:
-    return bool(np.max(np.abs(one - other)) < SAME * (1.0 + np.max(np.abs(other), initial=0.0)))
+def _same(one: Array, other: Array, same: float) -> bool:
+    return bool(np.max(np.abs(one - other)) < same * (1.0 + np.max(np.abs(other), initial=0.0)))
 
 
 def _starts(problem: ScalarProblem) -> Iterator[Array]:
-    loaded = [_loaded(problem, programme) for programme in PROGRAMMES]
-    yield from loaded
-    yield from (factor * loaded[0] for factor in MULTIPLES)
-    yield from _on_pieces(problem, loaded[0])
+    limits = problem.thresholds.systematic
+    first = _loaded(problem, limits.programmes[0])
+    yield first
+    yield from (_loaded(problem, programme) for programme in limits.programmes[1:])
+    yield from (factor * first for factor in limits.multiples)
+    yield from _on_pieces(problem, first)
 
 
 def _loaded(problem: ScalarProblem, programme: Sequence[float]) -> Array:
@@ -120,13 +107,14 @@ def _loaded(problem: ScalarProblem, programme: Sequence[float]) -> Array:
 
 def _on_pieces(problem: ScalarProblem, loaded: Array) -> Iterator[Array]:
     """The balance of forces with laws of one component on one piece each, those that moved most beyond."""
-    n, arcs = problem.size, problem.arcs
+    n, arcs, limits = problem.size, problem.arcs, problem.thresholds.systematic
     here, last = arcs.at(problem.arguments(loaded))[:n], np.array([len(c) - 1 for c in problem.chains[:n]])
     order = np.argsort(-np.abs(loaded) * (last > 0), kind="stable")
     moved = int(np.count_nonzero(last))
     most = int(last.max(initial=0))
-    for beyond in sorted({round(shift) for shift in np.linspace(-most, most, min(2 * most, MOST_SHIFTS) + 1)} - {0}):
-        for count in sorted({round(moved * share) for share in np.linspace(0.0, 1.0, FRONTS + 1)} - {0}):
+    shifts = np.linspace(-most, most, min(2 * most, limits.most_shifts) + 1)
+    for beyond in sorted({round(shift) for shift in shifts} - {0}):
+        for count in sorted({round(moved * share) for share in np.linspace(0.0, 1.0, limits.fronts + 1)} - {0}):
             pieces = here.copy()
             pieces[order[:count]] += beyond
             start = _balanced(problem, np.clip(pieces, 0, last))

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array
-from .graph_clip import WIDENED, GraphClip, clipped_again
+from .graph_clip import GraphClip, clipped_again
 from .scalar_problem import ArcTable, ScalarProblem
-
-MOST_ROUNDS = 8
-"""Passes over all unknowns."""
-PROGRESS = 1e-3
-"""A pass that makes no interval shorter by this share is the last."""
 
 
 class ForceIntervals:
@@ -37,7 +32,8 @@ class ForceIntervals:
             low: of the box, (n + m,), finite.
             high: of the box, (n + m,), finite.
         """
-        return clipped_again(self._once, low, high, most_rounds=MOST_ROUNDS, progress=PROGRESS)
+        limits = self._problem.thresholds.cells
+        return clipped_again(self._once, low, high, most_rounds=limits.force_passes, progress=limits.force_progress)
 
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         n = self._problem.size
@@ -63,7 +59,7 @@ class ForceIntervals:
         if not len(lengths):
             return box
         factors, there = np.abs(lengths.factors), lengths.there
-        wide = 1.0 + WIDENED
+        wide = 1.0 + self._problem.thresholds.cells.widened
         reach = np.divide((high * wide)[:, None], factors, out=np.zeros_like(factors), where=there)
         first, last = box[0].copy(), box[1].copy()
         opening = lengths.opens[:, None] & (np.arange(3) == 0)
@@ -81,5 +77,6 @@ class ForceIntervals:
         force = self._problem.force
         least = force - self._positive @ high - self._negative @ low - others
         most = force - self._positive @ low - self._negative @ high + others
-        slack = WIDENED * (np.abs(least) + np.abs(most) + np.abs(force)) + self._problem.force_error
+        widened = self._problem.thresholds.cells.widened
+        slack = widened * (np.abs(least) + np.abs(most) + np.abs(force)) + self._problem.force_error
         return self._graphs.clipped(low, high, least - slack, most + slack)

@@ -18,12 +18,11 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Mask
-from .graph_clip import WIDENED
+from .cell_thresholds import CellThresholds
+from .graph_clip import widened
 from .scalar_problem import ScalarProblem
 
 EPSILON = float(np.finfo(float).eps)
-ROUNDINGS = 4.0
-"""Rounding errors of a sum, in machine epsilons for each unknown and each part of its size."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +110,7 @@ class Weighed:
         least: the least of each h, (n,).
         total: the sum of all least values, less what it may be at a stationary point, and less its rounding.
         rounding: what was taken off for it.
+        thresholds: by how much what is left is widened for rounding.
     """
 
     graphs: Graphs
@@ -120,6 +120,7 @@ class Weighed:
     least: Array
     total: float
     rounding: float
+    thresholds: CellThresholds
 
     @property
     def excludes(self) -> bool:
@@ -138,8 +139,7 @@ class Weighed:
         first, last = first.min(axis=1), last.max(axis=1)
         if np.any(first > last):
             return None
-        wide = WIDENED * (np.abs(first) + np.abs(last) + (high - low))
-        return np.maximum(low, first - wide), np.minimum(high, last + wide)
+        return widened(low, high, first, last, self.thresholds)
 
     def _below(self, most: Array) -> tuple[Array, Array]:
         """The first and the last place on each arc where h is at most this; (inf, -inf) where it is nowhere."""
@@ -174,7 +174,8 @@ def weighed(problem: ScalarProblem, split: Split, ends: tuple[Array, Array], wei
     off = _rounding(problem, split, graphs, (low, high), y, point)
     off += float(np.sum(problem.force_error * np.maximum(np.abs(low + y), np.abs(high + y))))
     total = float(least.sum() - point @ bent - y @ problem.force) - off
-    return Weighed(graphs=graphs, a=a, b=b, c=c, least=least, total=total, rounding=off)
+    cells = problem.thresholds.cells
+    return Weighed(graphs=graphs, a=a, b=b, c=c, least=least, total=total, rounding=off, thresholds=cells)
 
 
 def allowed(problem: ScalarProblem, low: Array, high: Array, weights: Array) -> Array:
@@ -207,4 +208,4 @@ def _rounding(
     weight, bent = np.abs(y), np.abs(split.matrix) @ np.abs(point)
     size = (3.0 * np.abs(point) + 2.0 * far) @ bent + far @ (np.abs(problem.stiffness) @ weight)
     size += (far + weight) @ (np.abs(problem.force) + graphs.size()) + np.abs(split.diagonal) @ far**2
-    return ROUNDINGS * len(y) * EPSILON * float(size) + split.short * float(apart @ apart)
+    return problem.thresholds.balance.roundings * len(y) * EPSILON * float(size) + split.short * float(apart @ apart)

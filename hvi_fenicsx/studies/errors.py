@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 from ..errors import ExitCode, HviError
 
 
@@ -13,12 +11,6 @@ class NoReferenceError(HviError):
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
         self.exit_code = code
-
-
-class NotStoredError(HviError):
-    """A point's files cannot be written: the study ends, and the point is not finished."""
-
-    exit_code = os.EX_IOERR
 
 
 class StudyInterruptedError(HviError):

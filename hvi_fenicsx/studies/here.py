@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
-from ..errors import HviError
+from ..errors import HviError, NotWrittenError
 from ..runtime.mpi import on_root
-from .errors import NotStoredError
 from .measured_point import MeasuredPoint
 from .plan import Plan
 from .run import check_reference
@@ -28,7 +27,7 @@ def run_here(plan: Plan, store: Store, comm: MPI.Comm, repeat: int) -> None:
 
     Raises:
         NoReferenceError: no solution exists (3), or the reference is not certified (4); on all ranks alike.
-        NotStoredError: the files cannot be written; on all ranks alike.
+        NotWrittenError: files cannot be written; on all ranks alike.
     """
     on_root(comm, store.open)
     finest, done = plan.reference[0], {store.name(plan.reference[0])}
@@ -46,7 +45,7 @@ def _measure(setting: Setting, store: Store, comm: MPI.Comm, repeat: int, *, sti
     point = MeasuredPoint(scene=setting.scene, comm=comm, accuracy=setting.accuracy, stiffness=stiffness)
     try:
         point.measure(store.path(setting), repeat)
-    except NotStoredError:
+    except NotWrittenError:
         raise
     except HviError as error:
         record = failed(str(error), error.exit_code)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,17 +13,16 @@ from scipy import sparse
 from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
-from ..errors import InputError
 from ..report.solution_arrays import SolutionArrays, save
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
+from ..runtime import writing
 from ..runtime.mpi import largest, on_root
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solution import Solution
 from ..workflow import solve
 from . import cost
-from .errors import NotStoredError
 from .solution_fields import fields, width
 from .stiffness import stiffness
 from .store import write_json
@@ -56,7 +54,7 @@ class MeasuredPoint:
             repeat: repetitions at most.
 
         Raises:
-            NotStoredError: they cannot be written, on all ranks alike.
+            NotWrittenError: they cannot be written, on all ranks alike.
         """
         first = self._solved(Timer())
         record = summary(first)
@@ -68,7 +66,7 @@ class MeasuredPoint:
         if converged:
             times = self._repeated(repeat, times)
         record["cost"] = cost.cost_record(times)
-        self._store(lambda: write_json(result.with_suffix(".json"), record))
+        on_root(self.comm, lambda: write_json(result.with_suffix(".json"), record))
 
     def _solved(self, timer: Timer) -> Solution:
         """The scene on its mesh, or on one made for an accuracy. Collective."""
@@ -85,14 +83,7 @@ class MeasuredPoint:
         matrix = stiffness(solution) if self.stiffness else None
         if found is not None:
             record["h"] = width(found.points, fields(found).corners)
-        self._store(lambda: _save(result, found, matrix))
-
-    def _store(self, write: Callable[[], None]) -> None:
-        """Write files on rank 0. Collective."""
-        try:
-            on_root(self.comm, write)
-        except InputError as error:
-            raise NotStoredError(str(error)) from None
+        on_root(self.comm, lambda: _save(result, found, matrix))
 
     def _repeated(self, repeat: int, times: list[dict[str, float]]) -> list[dict[str, float]]:
         """Times of further runs until their median is steady; the first, which filled the caches, only if it is alone.
@@ -113,4 +104,5 @@ def _save(result: Path, found: SolutionArrays | None, matrix: sparse.csr_array |
     if found is not None:
         save(result.with_suffix(".npz"), found)
     if matrix is not None:
-        sparse.save_npz(result.with_suffix(".stiffness.npz"), matrix, compressed=False)
+        with writing.whole(result.with_suffix(".stiffness.npz")) as aside, aside.open("wb") as file:
+            sparse.save_npz(file, matrix, compressed=False)

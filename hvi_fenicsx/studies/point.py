@@ -2,18 +2,20 @@
 
 Writes RESULT.npz (the solution), then RESULT.json (what it cost), each whole or not at all; with ``--stiffness`` also
 RESULT.stiffness.npz. Exit code 0 whatever the outcome of the solve; 2 for a scene that does not fit its mesh; that of
-:class:`.errors.NotStoredError` where its files cannot be written.
+:func:`.runtime.writing.hand_over` where its files cannot be written.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
 from mpi4py import MPI
 
-from ..errors import HviError
+from ..errors import HviError, NotWrittenError
+from ..runtime import writing
 from ..runtime.mpi import ended_together, on_root
 from ..scene import read_scene
 from .measured_point import MeasuredPoint
@@ -34,6 +36,8 @@ def main() -> int:
     try:
         with ended_together(COMM):
             _point(options)
+    except NotWrittenError as error:
+        return writing.hand_over(error) if COMM.rank == 0 else os.EX_IOERR
     except HviError as error:
         if COMM.rank == 0:
             print(f"{COMPLAINT}{error}", file=sys.stderr)

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ExitCode
-from ..report.errors import PageError
+from ..report.errors import ReportError
 from ..report.html import study_page
 from ..results.folder import inputs_of
 from ..results.output_folder import Existing, OutputFolder
-from ..runtime import terminal
+from ..runtime import terminal, writing
 from ..runtime.manifest import MARKS
 from ..runtime.versions import __version__, versions
 from ..scene import read_scene
@@ -25,7 +25,7 @@ from .progress import StudyProgress
 from .runner import PointRun, Runner, watched
 from .sentences import headlines, percent, sentences, share_of_epsilon
 from .setting import Setting
-from .store import Store, write_json, write_text
+from .store import Store, write_json
 from .study import Study, evaluate
 from .thresholds import DEFAULT
 
@@ -87,10 +87,10 @@ def fill(folder: OutputFolder, study: Study, store: Store) -> list[str]:
 
 
 def _failed_page(folder: Path) -> Iterator[str]:
-    """Write the page; why it is not there costs a line, not the study."""
+    """Write the page; why it cannot be made costs a line, not the study."""
     try:
         study_page.write(folder)
-    except PageError as error:
+    except ReportError as error:
         yield str(error)
 
 
@@ -135,7 +135,7 @@ def write(study: Study, folder: Path) -> None:
         study: what was found.
         folder: where to.
     """
-    write_text(folder / "study.csv", table.as_csv(study.rows))
+    writing.text(folder / "study.csv", table.as_csv(study.rows))
     write_json(folder / MARK, as_data(study))
 
 

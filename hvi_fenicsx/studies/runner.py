@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from ..errors import ExitCode, InputError
-from ..runtime import processes
+from ..errors import ExitCode
+from ..runtime import processes, writing
 from ..scene import dump_scene
-from .errors import NotStoredError, StudyInterruptedError
+from .errors import StudyInterruptedError
 from .progress import StudyProgress
 from .setting import Setting
-from .store import Store, failed, is_whole, write_json, write_text
+from .store import Store, failed, is_whole, write_json
 from .thresholds import DEFAULT, Thresholds
 
 _OWN_FAULTS = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
@@ -129,7 +129,7 @@ class Runner:
         path, began = self.store.path(one.setting), self.progress.seconds
         self.store.announce(one.setting)
         path.with_suffix(".json").unlink(missing_ok=True)
-        write_text(path.with_suffix(".toml"), dump_scene(one.setting.scene))
+        writing.text(path.with_suffix(".toml"), dump_scene(one.setting.scene))
         words = [*_python(self.store.ranks), "-m", "hvi_fenicsx.studies.point", *self._arguments(one, path)]
         try:
             code, errors = self._ended(words, path, self._limit(one))
@@ -159,13 +159,10 @@ class Runner:
         One that was killed from outside is listed too, but not finished.
 
         Raises:
-            InputError: its files could not be written: nor can those of the others.
+            NotWrittenError: its files could not be written: nor can those of the others.
         """
+        writing.raise_handed_over(code, errors)
         reason = _reason(errors, code)
-        if code == NotStoredError.exit_code:
-            raise InputError(
-                f"--out {self.store.folder}: {reason}; finished points are kept, --resume goes on from there"
-            )
         record = failed(reason, code)
         if (killer := _killer(code)) is not None:
             record |= {"reason": f"killed from outside ({killer.name}); --resume runs it again", "killed": True}

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -16,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..runtime import manifest
+from ..runtime import manifest, writing
 from ..runtime.manifest import Manifest
 from ..runtime.versions import __version__
 from ..scene import dump_scene
@@ -80,7 +79,7 @@ class Store:
         """List a point's files as the program's own, before they are there.
 
         Raises:
-            OSError: the list cannot be written.
+            NotWrittenError: the list cannot be written.
         """
         names = [f"{POINTS}/{self.name(setting)}{ending}" for ending in _ENDINGS]
         manifest.add(self.folder, names, changing=True)
@@ -116,17 +115,8 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
     Args:
         path: the file.
         data: what it says.
+
+    Raises:
+        NotWrittenError: it cannot be written.
     """
-    write_text(path, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text, whole or not at all.
-
-    Args:
-        path: the file.
-        text: what it says.
-    """
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    aside.write_text(text, encoding="utf-8")
-    os.replace(aside, path)
+    writing.text(path, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")

@@ -8,17 +8,18 @@ are, one unknown for each such motion stays. Where these are many, the stiffness
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from dolfinx import fem
 from petsc4py import PETSc
 
 from ..errors import SolverError
-from ..runtime.mpi import total
 from ..typing import Array, Integers
 from . import carriers, condensed_laws, factor_counts, loading
+from .body_forces import BodyForces
 from .carriers import Carriers
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
@@ -30,21 +31,6 @@ from .rigid_defect import RigidMotions
 from .system import System
 
 
-@dataclass(frozen=True, kw_only=True)
-class CondensedForces:
-    """Forces on the whole body, condensed.
-
-    Attributes:
-        body: on this rank's unknowns off the supports, (local unknowns,).
-        kept: on all unknowns of Γc that the body keeps, (n of the interior,).
-        condensed: on the condensed unknowns, (n,).
-    """
-
-    body: Array
-    kept: Array
-    condensed: Array
-
-
 class Condensation:
     """A condensed system, which expands condensed unknowns to the whole body. Creation is collective.
 
@@ -54,16 +40,25 @@ class Condensation:
             None: all but the obstacles, which stay where they have been moved to.
         largest_dense: unknowns of Γc's vertices up to which S is formed, unless factors have far fewer numbers; None:
             it is always formed.
+        interrupted: whether to stop (collective), asked while S is formed.
 
     Attributes:
         problem: the arrays. Its unknowns x are those of Γc without λ times the obstacles' shift: their bounds stand.
+        forces: on the whole body, and condensed.
 
     Raises:
         InputError: on all ranks alike: a name in ``scaled`` is none; a law on |u_t| cannot be condensed.
         SolverError: a body without contact is not held.
+        Interrupted: on all ranks alike: it is to stop.
     """
 
-    def __init__(self, system: System, scaled: Collection[str] | None = None, largest_dense: int | None = None) -> None:
+    def __init__(
+        self,
+        system: System,
+        scaled: Collection[str] | None = None,
+        largest_dense: int | None = None,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> None:
         self._system, self._loading = system, loading.make(system, scaled)
         kept = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))
         self._form = form_of(system, PREFIX)
@@ -75,8 +70,9 @@ class Condensation:
             found, laws = found.of(chosen), laws.renumbered(chosen, interior.size)
             elastic = self._unformed()
         else:
-            elastic = self._formed(interior.stiffness(), found.carrying)
+            elastic = self._formed(interior.stiffness(interrupted), found.carrying)
         self.problem = self._condensed(elastic, found, laws)
+        self.forces = BodyForces(system, self._interior, self._elimination)
 
     def _is_large(self, most: int, carrying: int) -> bool:
         """Whether Γc has more unknowns, or products with S of those that carry take longer than solves with factors."""
@@ -195,6 +191,18 @@ class Condensation:
         found.array[:] = self._interior.expand(self.values(x, factor), right)
         return found
 
+    def displacement(self, x: Array, factor: float = 1.0) -> fem.Function:
+        """The displacement field of the whole body in equilibrium with condensed unknowns. Collective.
+
+        Args:
+            x: the condensed unknowns, (n,).
+            factor: λ.
+        """
+        unknowns = self.expand(x, factor)
+        found = self._system.displacement(unknowns)
+        unknowns.destroy()
+        return found
+
     def restricted(self, u: PETSc.Vec, factor: float = 1.0) -> Array:
         """The condensed unknowns of a displacement of the whole body, (n,). Collective.
 
@@ -226,70 +234,8 @@ class Condensation:
         found = np.asarray(out.array_r - self._loading.lifted @ weights)
         applied = self._loading.applied @ weights
         found[fixed] = self._system.holding.at_prescribed(u, self._system.rotation) - applied[fixed]
+        out.destroy()
         return found
-
-    def carried(self, x: Array, factor: float) -> PETSc.Vec:
-        """What contact and laws carry, S x - f at their unknowns, in the components of the unknowns. Collective.
-
-        Args:
-            x: the condensed unknowns, (n,).
-            factor: λ.
-        """
-        return self.spread(self.problem.elastic @ x - self.problem.load(factor))
-
-    def spread(self, forces: Array) -> PETSc.Vec:
-        """Forces on the condensed unknowns as forces on the whole body, in the components of the unknowns.
-
-        Args:
-            forces: (n,).
-        """
-        interior, whole = self._interior, np.zeros(self._interior.size)
-        whole[self._elimination.stay] = forces
-        found = self._system.load.duplicate()
-        found.array[interior.kept] = interior.own_part(whole)
-        return found
-
-    def condensed(self, forces: Array) -> CondensedForces:
-        """Forces on the whole body as forces on the condensed unknowns. Collective.
-
-        Args:
-            forces: on this rank's unknowns, in their components, (local unknowns,).
-        """
-        body = self._free(forces)
-        kept = self._interior.loads(body[:, None])[:, 0]
-        return CondensedForces(body=body, kept=kept, condensed=self._elimination.reduced(kept))
-
-    def change(self, x: Array, forces: CondensedForces) -> Array:
-        """How the unknowns of the whole body change, in balance with forces, where condensed ones do. Collective.
-
-        Args:
-            x: change of the condensed unknowns, (n,).
-            forces: on the body.
-
-        Returns:
-            The change of this rank's unknowns, (local unknowns,).
-        """
-        return self._interior.expand(self._elimination.completed(x, forces.kept), forces.body)
-
-    def _free(self, forces: Array) -> Array:
-        """Forces off the supports, which carry the others, (local unknowns,)."""
-        found = np.array(forces)
-        found[self._system.problem.fixed_here] = 0.0
-        return found
-
-    def unbalanced(self, reaction: PETSc.Vec, carried: PETSc.Vec) -> float:
-        """What is left of forces on the body once contact and laws carry theirs. Collective.
-
-        Args:
-            reaction: internal forces minus loads of the whole body, in the components of the unknowns.
-            carried: by contact and laws, likewise.
-
-        Returns:
-            The Euclidean norm off the supports.
-        """
-        left = reaction.array - carried.array
-        left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
-        return float(np.sqrt(total(self._system.comm, float(left @ left))))
 
     def free(self) -> None:
         """Free the PETSc objects, those of the problem's stiffness too. Collective."""

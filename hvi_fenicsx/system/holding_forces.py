@@ -48,7 +48,10 @@ class HoldingForces:
             x: the unknowns.
             rotation: Q with u = Q x; None where both are the same.
         """
-        self._rows.mult(x if rotation is None else rotation * x, self._product)
+        cartesian = x if rotation is None else rotation * x
+        self._rows.mult(cartesian, self._product)
+        if cartesian is not x:
+            cartesian.destroy()
         return np.array(self._product.array_r)
 
     def pull(self, prescribed: PETSc.Vec) -> PETSc.Vec:

@@ -9,7 +9,7 @@ volumetric stiffnesses. "Inner" rows are this rank's unknowns, followed by its p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TypeVar
 
@@ -19,7 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, vstack
 
-from ..errors import SolverError
+from ..errors import Interrupted, SolverError
 from ..runtime.mpi import agree
 from ..typing import Array, Integers
 from .factorisation import FactorForm, Factorisation
@@ -115,11 +115,20 @@ class Interior:
         found[: len(right)] = right
         return found
 
-    def response(self) -> Array:
-        """A_ki A_ii⁻¹ A_ik: forces on Γc by the body inside, for unit displacements of Γc, (n, n). Collective."""
+    def response(self, interrupted: Callable[[], bool] = lambda: False) -> Array:
+        """A_ki A_ii⁻¹ A_ik: forces on Γc by the body inside, for unit displacements of Γc, (n, n). Collective.
+
+        Args:
+            interrupted: whether to stop (collective), asked every few columns.
+
+        Raises:
+            Interrupted: on all ranks alike: it is to stop.
+        """
         columns, at_once = self.coupling.tocsc(), self._system.thresholds.dense_columns
         found = np.zeros((self.size, self.size))
         for start in range(0, self.size, at_once):
+            if interrupted():
+                raise Interrupted
             block = slice(start, start + at_once)
             found[:, block] = self.coupling.T @ self.solve(columns[:, block].toarray())
         self._comm.Allreduce(MPI.IN_PLACE, found)
@@ -130,12 +139,19 @@ class Interior:
         rows = self.form.contact_rows
         return csr_matrix(self._columns(rows.bulk)[np.searchsorted(rows.dofs, self.kept)])
 
-    def stiffness(self) -> Array:
-        """The Schur complement S, (n, n). Collective."""
+    def stiffness(self, interrupted: Callable[[], bool] = lambda: False) -> Array:
+        """The Schur complement S, (n, n). Collective.
+
+        Args:
+            interrupted: whether to stop (collective), asked every few columns.
+
+        Raises:
+            Interrupted: on all ranks alike: it is to stop.
+        """
         found = np.zeros((self.size, self.size))
         found[self.here] = self.own().toarray()
         self._comm.Allreduce(MPI.IN_PLACE, found)
-        found -= self.response()
+        found -= self.response(interrupted)
         return np.asarray(0.5 * (found + found.T))
 
     def is_held(self) -> bool:

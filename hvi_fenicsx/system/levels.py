@@ -69,6 +69,12 @@ class Level:
         held = at[weights > self.finer.thresholds.held_weight].astype(np.int32)
         own.set_restricted(moved @ own_axes.transpose(0, 2, 1), held)
 
+    def free(self) -> None:
+        """Free the system and the way to it; what other problems on the mesh share stays. Collective."""
+        self.__dict__.pop("_masked", None)
+        del self.prolongation
+        self.system.free()
+
     @cached_property
     def _axes(self) -> tuple[Array, Array]:
         """The local axes at the vertices of Γc on the finer level and on this one, rows, (m, d, d)."""

@@ -112,7 +112,10 @@ def _column(system: System, chosen: Collection[str]) -> tuple[Array, Array, Arra
         turn(vector, system.rotation)
     lifted, pulled = applied.array_r - pull.array_r, np.zeros(applied.local_size)
     lifted[fixed], pulled[fixed] = prescribed.array_r[fixed], pull.array_r[fixed]
-    return np.array(applied.array_r), np.array(prescribed.array_r), lifted, pulled
+    own = np.array(applied.array_r), np.array(prescribed.array_r)
+    for vector in (applied, prescribed, pull):
+        vector.destroy()
+    return *own, lifted, pulled
 
 
 def _check_overlap(system: System, prescribed: Array, chosen: Collection[str]) -> None:

@@ -1,7 +1,7 @@
-"""A problem assembled: PETSc matrix, load, bounds, and the law terms' residual, tangent and energy on top of them.
+"""A problem assembled: PETSc matrix, load, bounds and laws, in the components of its unknowns.
 
 The bulk matrix A is assembled once. Laws and active sets touch only the diagonal blocks of Γc's vertices
-(:mod:`.contact_rows`); residuals are computed from the rows of A itself there.
+(:mod:`.contact_rows`). What the equations give at some unknowns is in :mod:`.equations`.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from petsc4py import PETSc
 from ..problem import references
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
-from ..problem.vectors import assembled, new_vector, turn
+from ..problem.vectors import assembled, new_vector, product, turn
 from ..rigid import Mode
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import existence, free_motions, local_frames, near_null_space
+from .equations import Equations
 from .free_motions import FreeMotions
 from .holding_forces import HoldingForces
 from .jacobian import Jacobian
-from .law_model import LawModel
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -47,6 +47,7 @@ class System:
         terms: the problem's laws, in the unknowns' components.
         bounds: the problem's bounds, likewise.
         jacobian: the bulk stiffness with the laws' tangent and the held unknowns.
+        equations: residual, tangent and energy.
         load: b, lifted; the Dirichlet rows contain the prescribed values.
         lower: lower bounds of u; infinite on Dirichlet rows.
         upper: upper bounds, likewise.
@@ -70,7 +71,7 @@ class System:
             self.references = references.of(problem, self._sum_of(self.forces))
             self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))
             self._lift = self._lifted_by()
-        self._work = self.load.duplicate()
+        self.equations = Equations(self.jacobian, self.terms, self.load)
         self.lower, self.upper = self._box()
 
     @property
@@ -162,15 +163,15 @@ class System:
         found.load.array[fixed] = self.load.array_r[fixed]
         if self.free_motions is not None:
             self.free_motions.null_space.remove(found.load)
+        given.destroy()
+        found.equations = self.equations.with_load(found.load)
         return found
 
     def displacement(self, x: PETSc.Vec) -> fem.Function:
         """The displacement field of unknowns x: Cartesian, in units of u0, ghosts updated. Collective."""
         u = fem.Function(self.problem.space, name="displacement")
-        cartesian = x if self.rotation is None else self.rotation * x
-        if self.problem.coupling is not None:
-            cartesian = self.problem.coupling.matrix * cartesian
-        u.x.array[: x.local_size] = cartesian.array_r
+        coupling = self.problem.coupling
+        u.x.array[: x.local_size] = product(x, self.rotation, None if coupling is None else coupling.matrix)
         u.x.scatter_forward()
         return u
 
@@ -208,7 +209,9 @@ class System:
         """What the prescribed values took off the load at the vertices of Γc. Collective."""
         load, at = self._unlifted(), self.jacobian.rows.dofs
         turn(load, self.rotation)
-        return np.asarray(load.array_r[at] - self.load.array_r[at])
+        found = np.asarray(load.array_r[at] - self.load.array_r[at])
+        load.destroy()
+        return found
 
     def holding_forces(self, x: PETSc.Vec) -> Array:
         """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
@@ -232,6 +235,7 @@ class System:
         set_bc(prescribed, list(self.problem.conditions))
         rows = (self.problem.fixed_here + load.owner_range[0]).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
+        prescribed.destroy()
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         return matrix, load
@@ -252,81 +256,17 @@ class System:
         lower.array[owned], upper.array[owned] = -np.inf, np.inf
         return lower, upper
 
-    def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[LawModel]) -> None:
-        """The residual A u - b + W τ(u). Collective.
-
-        Args:
-            x: the unknowns u.
-            out: where it is written; must have ghosts.
-            models: what takes the place of the laws, by term.
-        """
-        self.jacobian.elastic_product(x, out)
-        out.axpy(-1.0, self.load)
-        with out.localForm() as local:
-            local.array_w[out.local_size :] = 0.0
-        for term, model in zip(self.terms, models, strict=True):
-            u = x.array_r
-            term.add_force(out, u, model.derivative(term.argument(u)))
-        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-
-    def tangents(self, x: PETSc.Vec, models: Sequence[LawModel], foundation: float = 0.0) -> list[Array]:
-        """The tangent stiffness K of the laws, (m, d, d) by term.
-
-        Args:
-            x: the unknowns u.
-            models: what takes the place of the laws, by term.
-            foundation: stiffness added in all directions that are not prescribed: laws without any hold no motion.
-        """
-        u = x.array_r
-        arguments = [term.argument(u) for term in self.terms]
-        return [
-            term.rate(u, model.derivative(a), model.second(a))
-            + foundation * term.free[:, :, None] * np.eye(term.free.shape[1])
-            for term, model, a in zip(self.terms, models, arguments, strict=True)
-        ]
-
-    def energy(self, x: PETSc.Vec, models: Sequence[LawModel]) -> float:
-        """The energy ½ a(u, u) - <g, u> + Σ w j(u), up to a constant of the prescribed displacements. Collective.
-
-        Args:
-            x: the unknowns u.
-            models: what takes the place of the laws j, by term.
-        """
-        self.jacobian.elastic_product(x, self._work)
-        u = x.array_r
-        local = 0.0
-        for term, model in zip(self.terms, models, strict=True):
-            local += float(np.sum(term.energy_weights * model.value(term.argument(u))))
-        return 0.5 * float(x.dot(self._work)) - float(self.load.dot(x)) + float(self.comm.allreduce(local))
-
-    @cached_property
-    def _stiffness_norm(self) -> float:
-        """‖A + W K‖ in the maximum norm, with nothing held. Collective when first used."""
-        self.jacobian.hold(np.empty(0, np.int32))
-        return float(self.jacobian.matrix.norm(PETSc.NormType.INFINITY))
-
-    def energy_rounding(self, x: PETSc.Vec) -> float:
-        """By how much rounding may change the energy at u: a few ε_machine ‖A‖ ‖u‖². Collective."""
-        return 4 * float(np.finfo(float).eps) * self._stiffness_norm * float(x.norm()) ** 2
-
-    def rounding_sample(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """A sample of the rounding error of a residual: A times ±ε_machine u, the signs at random. Collective.
-
-        Args:
-            x: the unknowns u.
-            out: where it is written.
-        """
-        shuffled = x.duplicate()
-        signs = np.random.default_rng(self.comm.rank).choice([-1.0, 1.0], x.local_size)
-        shuffled.array[:] = x.array_r * signs * np.finfo(float).eps
-        self.jacobian.elastic_product(shuffled, out)
-        shuffled.destroy()
-
     def free(self) -> None:
-        """Free the PETSc objects: those too that systems made of this one share. Collective."""
-        for vector in (self.load, self.lower, self.upper, self._work, *self.forces.values()):
+        """Free the PETSc objects, those too that systems made of this one share, and what solving has left. Collective.
+
+        On several ranks Python alone frees nothing: what no rank refers to any more waits for being freed together.
+        """
+        for vector in (self.load, self.lower, self.upper, *self.forces.values()):
             vector.destroy()
         if self.rotation is not None:
             self.rotation.destroy()
+        self.equations.free()
         self.jacobian.free()
         self.holding.free()
+        PETSc.garbage_cleanup(self.comm)
+        PETSc.garbage_cleanup(self.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one

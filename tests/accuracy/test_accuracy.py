@@ -403,10 +403,10 @@ class Stopwatch(Timer):
 @pytest.mark.parametrize("accuracy", [None, 1e-6])
 def test_a_mesh_whose_solve_outlasts_the_budget_leaves_the_last_one(accuracy: float | None) -> None:
     """The time passes in the solve on the third mesh, whatever its forecast was."""
-    clock, lines = Stopwatch(), list[str]()
+    clock, lines, asked = Stopwatch(), list[str](), itertools.count()
 
     def passing() -> bool:
-        clock.now = 1e4 if len(lines) == 2 else 0.0
+        clock.now = 1e4 if len(lines) == 2 and next(asked) else 0.0  # asked before the mesh is made, too
         return False
 
     goal, solver = Goal(accuracy, seconds=1e3), AdaptiveSolver(timer=clock, interrupted=passing)
@@ -420,6 +420,21 @@ def test_a_mesh_whose_solve_outlasts_the_budget_leaves_the_last_one(accuracy: fl
     assert reached.exit_code == (0 if accuracy is None else 4)
     assert reached.more is not None
     assert reached.more.accuracy == (accuracy or reached.steps[-1].error / 10)
+
+
+@pytest.mark.parametrize("at", ["between two meshes", "in a solve"])
+def test_a_signal_leaves_the_last_mesh_with_an_error(at: str) -> None:
+    """The mesh whose solve was stopped was given, whatever its error."""
+    lines, asked = list[str](), itertools.count()
+    start = {"between two meshes": 0, "in a solve": 1}[at]
+    solver = AdaptiveSolver(timer=Timer(), interrupted=lambda: len(lines) >= 2 and next(asked) >= start)
+    scene = Scene.model_validate(STRONG).with_solver(degree=1)
+    reached = control.solve_to_goal(scene, COMM, Goal(1e-6, seconds=1e3), solver, lines.append)
+    assert len(reached.steps) == 2
+    assert reached.solution.converged
+    assert reached.level.dofs == reached.steps[-1].dofs
+    assert reached.why == lines[-1] == "interrupted"
+    assert reached.exit_code == 130
 
 
 @pytest.mark.parametrize("ranks", RANKS[1:])

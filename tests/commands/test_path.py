@@ -16,6 +16,7 @@ import pytest
 from runs import ROOT, command, hvi
 
 from hvi_fenicsx import prepare, read_scene
+from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.load_path import LoadPath
 from hvi_fenicsx.path import journal
 from hvi_fenicsx.path.following import Control, PathRun
@@ -67,13 +68,19 @@ def follow(run: PathRun, stop: int | None = None, known: list[Record] | None = N
     return run.follow(control, known or []), kept
 
 
+def test_a_path_that_is_interrupted_while_its_body_is_condensed_ends_there() -> None:
+    with pytest.raises(Interrupted):
+        PathRun(prepare(read_scene(BAR, ["domain.cells=[25, 1]"])), PathTable(), lambda: True)
+
+
 def test_a_path_that_is_interrupted_goes_on_to_the_same_end_with_energies_in_balance() -> None:
     """Loaded, unloaded and loaded again, with memory."""
     scene = read_scene(BAR, ["domain.size=[0.05, 0.001]", "domain.cells=[25, 1]", "path.to=[1.0, 0.3, 1.05]"])
     prepared, wanted = prepare(scene), scene.path or PathTable()
     whole, every = follow(PathRun(prepared, wanted))
     assert whole.converged
-    assert follow(PathRun(prepared, wanted), None, every)[0].end == whole.end  # killed after its last row
+    ended, _ = follow(PathRun(prepared, wanted), None, every)  # killed after its last row
+    assert (ended.end, [row.event for row in ended.rows]) == (whole.end, [row.event for row in whole.rows])
     assert whole.examined == len(whole.rows)
     assert [row.event for row in whole.rows].count("turn") == 2
     for stop in (1, 9, len(whole.rows) - 2):

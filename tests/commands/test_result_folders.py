@@ -16,7 +16,7 @@ from damage import grid, msh
 from runs import command, hvi, summary, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx.report.errors import PageError
+from hvi_fenicsx.report.errors import ResultError
 from hvi_fenicsx.report.html import render
 from hvi_fenicsx.results.output_folder import OutputFolder
 
@@ -118,7 +118,7 @@ def test_a_page_that_could_not_be_written_is_not_recommended(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(folder: Path) -> Path:
-        raise PageError("no page today")
+        raise ResultError("no page today")
 
     assert "open report.html there" in run(scene, tmp_path / "r").stdout
     monkeypatch.setattr(render, "write", refused)

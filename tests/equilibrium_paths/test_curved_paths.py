@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from hvi_fenicsx.equilibrium_paths.graphs import Passed, remembering
 from hvi_fenicsx.equilibrium_paths.kinds import ArcLengthKind, ExactKind, kind_of
 from hvi_fenicsx.equilibrium_paths.programme import Follower
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
+from hvi_fenicsx.equilibrium_paths.thresholds import CurveThresholds
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
 from hvi_fenicsx.laws.smoothing import create
@@ -104,6 +106,59 @@ def test_piecewise_linear_paths_are_the_exact_ones(follow: Follow) -> None:
         assert follower.end is exact.end
         assert peak(states) == pytest.approx(peak(wanted), rel=1e-12)
         assert states[-1].work == pytest.approx(wanted[-1].work, rel=1e-9)
+
+
+def floating(law: Superpotential, gaps: Any, seed: int, row: int = 3) -> CondensedProblem:
+    """A row of points with gaps below them, and slips that nothing but their law holds."""
+    generator = np.random.default_rng(seed)
+    coupling = 0.06 * generator.standard_normal((row, row))
+    coupling -= coupling.mean(axis=0)
+    coupling -= coupling.mean(axis=1, keepdims=True)
+    stiffness = np.block([[chain(row, 1.0), coupling], [coupling.T, chain(row, 2.0)]])
+    press = generator.standard_normal(row)
+    press -= press.mean() + 0.5
+    lower = np.r_[-np.broadcast_to(np.asarray(gaps, dtype=float), row), np.full(row, -np.inf)]
+    load = np.r_[press, generator.standard_normal(row)]
+    return problem(stiffness, load, bonds(law, np.arange(row, 2 * row)), lower=lower)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_body_that_nothing_touches_falls_where_the_exact_path_has_it(seed: int) -> None:
+    given = floating(graph([(0, 0), (1, 1), (1.5, 0.2)]), np.random.default_rng(seed).uniform(0.1, 2.0, 3), seed)
+    exact = ExactFollower(given, PathOptions(programme=(3.0,)))
+    wanted = list(exact.states())
+    follower, states = path(given, programme=(3.0,))
+    assert follower.end is exact.end
+    np.testing.assert_allclose(states[0].x, wanted[0].x, atol=1e-9)
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+def test_a_body_that_rolls_on_its_floor_has_no_first_state_and_is_not_said_to_come_off(kind: type[Follower]) -> None:
+    """A beam of three points that rests on its middle one, where the load is: in balance at any inclination."""
+    bent = np.array([1.0, -2.0, 1.0])
+    given = problem(np.outer(bent, bent), [0.0, -1.0, 0.0], lower=[-np.inf, -0.5, -np.inf])
+    follower = kind(given, PathOptions(programme=(1.0,)))
+    assert list(follower.states()) == []
+    assert follower.end is End.LOST
+    assert follower.reason.startswith("nothing holds the body at rest, and")
+
+
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+def test_a_body_that_a_small_load_takes_away_comes_off(kind: type[Follower]) -> None:
+    follower = kind(problem(chain(3, 1.0), [1.0, 1.0, 1.0], lower=-0.5), PathOptions(programme=(1.0,)))
+    assert list(follower.states()) == []
+    assert follower.end is End.ESCAPES
+
+
+@pytest.mark.parametrize("gap", [0.3, 1e3])
+def test_how_far_a_body_is_above_its_floor_does_not_matter(gap: float) -> None:
+    law = Exponential(1.0, 0.2, 0.5)
+    follower, states = path(floating(law, gap, 0), programme=(3.0,))
+    there, wanted = path(floating(law, 0.0, 0), programme=(3.0,))
+    assert follower.end is there.end
+    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
+    np.testing.assert_allclose(states[0].x, wanted[0].x - np.r_[np.full(3, gap), np.zeros(3)], atol=1e-9)
 
 
 def test_a_closed_curve_is_gone_round_once() -> None:
@@ -225,6 +280,25 @@ def test_a_curved_law_softens_as_its_closed_form_says() -> None:
     assert largest_imbalance(given, states) < 1e-8
 
 
+@pytest.mark.parametrize("follow", Follow)
+def test_a_curved_path_has_a_state_at_each_wanted_factor_that_it_comes_to(follow: Follow) -> None:
+    """A bond on a spring, up, round two limit points where it is followed exactly, and back: λ = x + t(x)."""
+    law, wanted = Exponential(2.0, 0.1, 0.5), (0.9, 1.6, 7.0)
+    given = problem(1.0, 1.0, bonds(law, 0))
+    plain = path(given, programme=(3.0, 0.5), follow=follow)[1]
+    times = {
+        f: sum((a.factor - f) * (b.factor - f) < 0.0 for a, b in pairwise(plain) if b.event is not Event.JUMP)
+        for f in wanted
+    }
+    states = path(given, programme=(3.0, 0.5), follow=follow, stops=wanted)[1]
+    assert {f: sum(s.factor == f for s in states) for f in wanted} == times
+    assert max(times.values()) > 1
+    assert times[7.0] == 0
+    for state in (s for s in states if s.factor in wanted):
+        least, most = law.interval(state.x, 1e-12)
+        assert least[0] - 1e-9 <= state.factor - state.x[0] <= most[0] + 1e-9
+
+
 def test_the_derivatives_of_the_forces_are_those_of_the_matrix() -> None:
     """Along random directions, at the states of a path on which slips turn."""
     generator = np.random.default_rng(5)
@@ -240,9 +314,9 @@ def test_a_curve_is_followed_with_few_factorisations(monkeypatch: pytest.MonkeyP
     made = []
 
     class Counted(Bordered):
-        def __init__(self, matrix: Array) -> None:
+        def __init__(self, matrix: Array, thresholds: CurveThresholds) -> None:
             made.append(1)
-            super().__init__(matrix)
+            super().__init__(matrix, thresholds)
 
     monkeypatch.setattr(equations, "Bordered", Counted)
     given, options = line(Exponential(1.0, 0.2, 0.5), 8), {"programme": (9.0,), "follow": Follow.EXACT}

@@ -15,11 +15,11 @@ from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.equilibrium_paths import basis
 from hvi_fenicsx.equilibrium_paths.bonds import BondTable
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.segments import Segment
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
+from hvi_fenicsx.equilibrium_paths.thresholds import ExactThresholds, Thresholds
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.system.condensation import Condensation
 from hvi_fenicsx.system.condensed_problem import CondensedProblem
@@ -137,8 +137,7 @@ def test_what_hardly_moves_does_not_drive_and_the_path_is_the_same(monkeypatch: 
     monkeypatch.setattr(np.linalg, "inv", counted)
     _, states = path(given, follow=Follow.EXACT)
     kept = len(made)
-    monkeypatch.setattr(basis, "WEAK", 0.0)
-    _, others = path(given, follow=Follow.EXACT)
+    _, others = path(given, follow=Follow.EXACT, thresholds=Thresholds(exact=ExactThresholds(weak=0.0)))
     assert len(states) == len(others) > 100
     for one, other in zip(states, others, strict=True):
         assert (one.event, one.unstable) == (other.event, other.unstable)

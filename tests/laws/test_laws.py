@@ -418,6 +418,8 @@ def test_names_are_unique_and_properties_cannot_be_hidden() -> None:
         type("Other", (laws.Graph,), {"name": "tresca"})
     with pytest.raises(InputError, match="'peak' is taken by a property"):
         type("Hidden", (laws.Graph,), {"name": "hidden", "__annotations__": {"peak": "float"}})
+    with pytest.raises(InputError, match="'kinks' is taken by a property"):
+        type("Hidden", (laws.Graph,), {"name": "hidden", "__annotations__": {"kinks": "float"}})
     assert "hidden" not in laws.available()
 
 

@@ -134,6 +134,7 @@ def test_a_script_that_ends_gmsh_or_never_ends_is_refused(command: str, tmp_path
     assert str(tmp_path / "m.geo") in str(refused.value)
 
 
+@pytest.mark.long
 def test_a_script_that_fills_the_memory_is_refused(tmp_path: Path) -> None:
     """The machine's other programs lose nothing: gmsh gets a share of what is free, here 1.5 GB."""
     thresholds = Thresholds(gmsh_share=1500 / memory.free())

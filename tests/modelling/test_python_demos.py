@@ -40,6 +40,7 @@ def test_the_force_of_the_load_loop_ends_at_the_weakened_friction(tmp_path: Path
     assert (tmp_path / "force.png").exists()
 
 
+@pytest.mark.long
 def test_the_fibre_composite_has_the_compliance_of_its_constants(tmp_path: Path) -> None:
     """Without friction the stress is uniform, and the strain follows from the tensor's inverse."""
     block = demo("fibres_3d")

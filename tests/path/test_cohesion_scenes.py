@@ -44,13 +44,18 @@ def written(folder: Path, table: Table) -> Path:
 
 def rows(folder: Path) -> tuple[list[str], npt.NDArray[np.float64]]:
     """The events, and factor, work and the forces of the pull, by row."""
-    with (folder / "path.csv").open(encoding="utf-8") as stream:
-        found = list(csv.DictReader(stream))
+    found = csv_of(folder / "path.csv")
     keys = ("factor", "work", "dissipated", "pull.fx", "pull.fy")
     found = [row for row in found if row["event"] != "step"]  # where a curve is sampled is nothing that has to agree
     return [row["event"] for row in found], np.array([[float(row[key]) for key in keys] for row in found])
 
 
+def csv_of(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.mark.long
 def test_a_joint_whose_vertices_all_soften_at_once_comes_off_at_its_strength() -> None:
     """S = 3e7 / sqrt(sin⁴ 30° + (sin 30° cos 30° / 0.7)²); the limit points of 28 vertices are 1e-10 apart."""
     path = hvi_fenicsx.follow(hvi_fenicsx.read_scene(ROOT / "demos" / "scarf_joint.toml"), to=1.3)
@@ -72,6 +77,19 @@ def test_a_path_ends_where_a_run_at_its_end_does(mixity: Table, tmp_path: Path) 
     assert summary(tmp_path / "path")["path"]["uncertified"] == 0
     wanted = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))["resultants"]["pull"]
     assert values[-1, 3:] == pytest.approx(wanted, rel=1e-6)
+
+
+def test_what_is_written_of_a_factor_within_a_curved_path_is_what_a_run_at_this_load_finds(tmp_path: Path) -> None:
+    table = blocks() | {"path": {"contact_at": [0.9], "memory": False}}
+    assert hvi("path", written(tmp_path, table), "--out", tmp_path / "path", "--no-pictures").returncode == 0
+    part = blocks()
+    part["boundary"]["pull"]["displacement"] = [0.9 * 5.2e-6, "0.9*1.75e-5*(x - 0.3)"]
+    assert hvi("run", written(tmp_path, part), "--out", tmp_path / "run", "--no-pictures").returncode == 0
+    found, wanted = (csv_of(tmp_path / name) for name in ("path/path_contact.csv", "run/contact.csv"))
+    assert len(found) == len(wanted) > 5
+    for name in ("u_n", "u_t1", "sigma_n", "friction_t1"):
+        ours, theirs = (np.array([float(row[name]) for row in rows]) for rows in (found, wanted))
+        np.testing.assert_allclose(ours, theirs, atol=1e-6 * np.max(np.abs(theirs)))
 
 
 @pytest.mark.long

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ RECORDS: list[dict[str, Any]] = [
 
 
 def write(path: Path, identity: str = "this") -> None:
-    with Journal(path, identity) as opened:
+    with closing(Journal(path, identity)) as opened:
         for record in RECORDS:
             opened.append(record)
 
@@ -46,7 +47,7 @@ def test_wherever_the_end_is_torn_off_the_whole_records_stay_and_the_next_follow
     counts = set()
     for length in range(len(whole)):
         (tmp_path / "j").write_bytes(whole[:length])
-        with Journal(tmp_path / "j", "this") as opened:
+        with closing(Journal(tmp_path / "j", "this")) as opened:
             counts.add(len(opened.records))
             opened.append(RECORDS[1])
         assert journal.read(tmp_path / "j", "this")[-1]["event"] == "end"

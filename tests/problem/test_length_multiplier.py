@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pieces import LIFTED, TENSILE, assert_equal, solved
+from pieces import LIFTED, TENSILE, assert_equal, assert_same_equilibria, solved
 from scenes import DELTA, STEEL, Table, block, model, quadratic_linear, two_blocks
 
 import hvi_fenicsx as hvi
@@ -62,10 +62,7 @@ def test_paths_and_all_equilibria_follow_the_lengths() -> None:
     formula, pieces = (
         hvi.Scene.model_validate(t) for t in both(model(4, 6e6), {"friction": quadratic_linear(1e7, 4e-6)})
     )
-    one, two = hvi.equilibria(formula), hvi.equilibria(pieces)
-    assert one.complete
-    assert len(one.solutions) == len(two.solutions) > 1
-    assert [s.energy for s in one.solutions] == pytest.approx([s.energy for s in two.solutions], rel=1e-9)
+    assert_same_equilibria(formula, pieces)
     paths = [hvi.follow(scene, follow="exact") for scene in (formula, pieces)]
     rows = [[(row.factor, row.energy) for row in path.rows] for path in paths]
     np.testing.assert_allclose(rows[0], rows[1], rtol=1e-8)

@@ -138,6 +138,17 @@ def test_the_folder_itself_stays_so_that_a_shell_in_it_does_too(tmp_path: Path) 
     assert (tmp_path / "r").stat().st_ino == before
 
 
+def test_a_folder_that_may_not_be_written_is_refused_before_anything_is_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "r").mkdir()
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everywhere
+    folder = OutputFolder(tmp_path / "r", "result")
+    with pytest.raises(InputError, match="r: could not be written: Permission denied; choose another folder"):
+        folder.check("refuse")
+    assert names(tmp_path) == ["r"]
+
+
 def test_an_input_is_never_replaced(tmp_path: Path) -> None:
     written(tmp_path / "r", summary="1", a="1")
     folder = OutputFolder(tmp_path / "r", "result")

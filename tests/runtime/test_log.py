@@ -13,6 +13,7 @@ from runs import command, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import Scene, solve
+from hvi_fenicsx.errors import NotWrittenError
 from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.runtime import log
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
@@ -70,7 +71,7 @@ def test_a_record_that_cannot_be_written_is_told_when_the_log_is_finished() -> N
     with log.Handlers(full):
         log.logger("commands").info("a line")
         log.logger("commands").info("another")
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(NotWrittenError, match="No space left"):
         full.finish()
 
 

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 SUPPORT = Path(__file__).parents[1] / "support"
 FEWEST = 100
 """Byte codes that the program runs after a first signal, or more."""
@@ -25,6 +27,7 @@ def test_a_stop_while_python_runs_a_text_ends_with_the_code_of_an_interruption()
     assert (done.returncode, done.stderr) == (130, "hvi: interrupted; nothing was written\n")
 
 
+@pytest.mark.long
 def test_a_second_stop_never_shows_as_another_signal() -> None:
     """At each byte code from the first one on, also where the first has been caught already."""
     done = stops("twice")

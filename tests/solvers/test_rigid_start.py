@@ -67,7 +67,7 @@ def test_a_body_at_rest_is_borne_by_as_many_vertices_as_it_has_motions() -> None
     system, rested = prepared.system, at_rest(context_of(prepared), [], lambda _: [], 1e-10)
     assert rested is not None
     residual = system.load.duplicate()
-    system.residual(rested[0], residual, [])
+    system.equations.residual(rested[0], residual, [])
     forces = residual.array_r[system.jacobian.rows.dofs]
     bearing = np.flatnonzero(np.abs(forces) > 1e-6 * np.max(np.abs(forces)))
     assert len(bearing) == 2

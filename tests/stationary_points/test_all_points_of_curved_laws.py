@@ -68,6 +68,24 @@ def test_all_points_of_two_laws_with_bounds_are_those_of_a_scan(seed: int) -> No
     assert len(enumerated(problem).points) == scanned(problem)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_bonds_that_can_all_stick_have_the_point_at_rest(seed: int) -> None:
+    """No bond's load is above its peak, so that rest is an equilibrium; there bounds and jumps of laws meet."""
+    random = np.random.default_rng(seed)
+    n = 2 + seed % 2
+    factor = random.normal(size=(n, n))
+    peaks = random.uniform(0.5, 1.5, n)
+    bonds = [condensed.bonds(laws.Exponential(p, 0.2 * p, random.uniform(0.3, 2.0)), [i]) for i, p in enumerate(peaks)]
+    problem = condensed.problem(
+        0.3 * factor @ factor.T + 0.02 * np.eye(n),
+        random.uniform(-0.5, 0.99, n) * peaks,
+        *bonds,
+        lower=np.where(random.uniform(size=n) < 0.5, 0.0, -np.inf),
+    )
+    points = enumerated(problem).points
+    assert min(float(np.max(np.abs(point.x))) for point in points) < 1e-9
+
+
 def condensed_scene(table: Table) -> CondensedProblem:
     return Condensation(prepare(Scene.model_validate(table)).system).problem
 
@@ -127,7 +145,11 @@ def index_sum(problem: CondensedProblem, points: Array) -> int:
 
 
 @pytest.mark.parametrize(
-    ("smoothing", "epsilon", "count"), [("chks", 0.05, 23), ("chks", 0.02, 31), ("log_exp", 0.02, 33)]
+    ("smoothing", "epsilon", "count"),
+    [
+        ("chks", 0.05, 23),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in [("chks", 0.02, 31), ("log_exp", 0.02, 33)]),
+    ],
 )
 def test_a_support_that_gives_way_has_no_points_but_those_listed(smoothing: str, epsilon: float, count: int) -> None:
     """Random starts reach two thirds of them, and no other; that none of the rest is missing, the indices tell."""
@@ -267,6 +289,7 @@ def test_two_blocks_that_slide_together_are_a_continuum_beside_an_isolated_point
     assert sliding.x[0] - sliding.x[1] == pytest.approx(0.2, rel=1e-9)
 
 
+@pytest.mark.long
 def test_what_is_balanced_to_rounding_alone_is_not_called_proven() -> None:
     """An exponential law comes to its residual only at infinity; far away the rest is below rounding."""
     stiffness = [[1.0, -1.0], [-1.0, 1.0]]

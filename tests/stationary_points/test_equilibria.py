@@ -78,7 +78,7 @@ def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(
     assert barrier["heights"] == pytest.approx([saddle - first, saddle - second], rel=1e-6)
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "All equilibria, proven: 3." in page
-    assert f"{saddle:.10g}".replace("-", "−") in page
+    assert f"{saddle:.10g}".replace("-", "\N{MINUS SIGN}") in page
     assert b"\r" not in (out / "equilibria.csv").read_bytes()
     assert main(words) == 2
     capsys.readouterr()

@@ -9,7 +9,6 @@ from curved import LAWS, enumerated, random_pair, two_bonds
 from flooding import assert_levels, flooded_levels, joined_levels
 
 from hvi_fenicsx.laws.smoothing import registered
-from hvi_fenicsx.stationary_points import landscapes
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
 from hvi_fenicsx.stationary_points.found import Wanted
@@ -18,11 +17,13 @@ from hvi_fenicsx.stationary_points.passes import Pass, passes
 from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.search import find
 from hvi_fenicsx.stationary_points.stationarity import Kind
+from hvi_fenicsx.stationary_points.thresholds import DEFAULT, DescentThresholds, Thresholds
 from hvi_fenicsx.system.condensed_problem import CondensedProblem
 
 
-def landscape(problem: CondensedProblem) -> CurvedLandscape:
-    return CurvedLandscape(CurvedLaws(near=scalar_problem(problem, tractions=True), problem=problem))
+def landscape(problem: CondensedProblem, thresholds: Thresholds = DEFAULT) -> CurvedLandscape:
+    near = scalar_problem(problem, tractions=True, thresholds=thresholds)
+    return CurvedLandscape(CurvedLaws(near=near, problem=problem))
 
 
 def found(problem: CondensedProblem) -> tuple[list[StationaryPoint], tuple[Pass, ...]]:
@@ -34,7 +35,7 @@ CASES = [
     ("narrow chks", (1.7, 1.6), 4),
     ("narrow chks", (2.4, 1.9), 3),
     ("teeth", (1.7, 1.6), 6),
-    ("teeth", (2.4, 1.9), 12),
+    pytest.param("teeth", (2.4, 1.9), 12, marks=pytest.mark.long),
     ("paper", (1.7, 1.6), 4),
     ("exponential", (1.7, 1.6), 2),
     ("smoothed exponential", (1.7, 1.6), 2),
@@ -70,11 +71,12 @@ def test_a_majorant_is_nowhere_below_the_laws_and_equal_to_them_at_its_point(see
             assert min(abs(a.at(float(x[i]))) for a in chains[i] if a.low <= x[i] <= a.high) < 1e-12
 
 
-def test_a_step_down_is_nowhere_higher_than_its_begin(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(landscapes, "MOST_STEPS", 1)
+@pytest.mark.long
+def test_a_step_down_is_nowhere_higher_than_its_begin() -> None:
+    one_step = Thresholds(descent=DescentThresholds(curved_steps=1))
     problem = two_bonds(LAWS["teeth"], 0.7)
     points, _ = found(problem)
-    land, share = landscape(problem), np.linspace(0.0, 1.0, 201)[:, None]
+    land, share = landscape(problem, one_step), np.linspace(0.0, 1.0, 201)[:, None]
     for saddle in (p for p in points if p.kind is Kind.SADDLE):
         x = saddle.x + np.array([1e-3, -2e-3])
         for _ in range(100):

@@ -10,10 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 import pytest
+from array_enumeration import stationary
+from condensed import bonds, graph
+from condensed import problem as condensed
 from enumeration import Floor, polyline
 from scenes import DELTA, block, model
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import Scene, prepare, solve
 from hvi_fenicsx.errors import SolverError
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.all_points import Enumeration
@@ -23,12 +26,14 @@ from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.envelopes import envelopes
 from hvi_fenicsx.stationary_points.found import Wanted
 from hvi_fenicsx.stationary_points.lowest import LowestSearch
+from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.rigid_balance import RigidBalance
 from hvi_fenicsx.stationary_points.scalar_problem import ArcTable, ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.system.condensed_problem import Bonds
 
 Array = npt.NDArray[np.float64]
 Graph = Sequence[tuple[float, float]]
@@ -117,6 +122,70 @@ def test_cells_made_smaller_by_the_balance_of_bodies_keep_all_points(case: Case)
             ends = balance.tightened(low, high)
             assert ends is not None
             assert np.all((point.x >= ends[0]) & (point.x <= ends[1]))
+
+
+def test_bonds_that_stick_keep_their_point_however_often_its_cell_is_clipped() -> None:
+    """Points that hardly give way bear the block: they stick at zero, about which all cells close again and again."""
+    teeth = [[0, 0], [3e-6, 120], [3e-6, 40], [9e-6, 60], [9e-6, 30]]
+    table = block(2, 150.0, 100.0, {"law": "graph", "points": teeth})
+    table["domain"]["size"] = [1.0, 0.5]
+    table["material"] |= {"youngs_modulus": 6e7, "poisson_ratio": 0.0}
+    table["boundary"]["floor"]["support"] = {"law": "tresca", "yield_traction": 347.7}
+    del table["boundary"]["floor"]["contact"]
+    scene = Scene.model_validate(table)
+    known = solve(scene, estimate=False)
+    assert known.converged
+    points = found(scalar_problem(Condensation(prepare(scene).system).problem)).points
+    wanted = known.energy / known.problem.scales.energy
+    assert min(abs(point.energy / wanted - 1.0) for point in points) < 1e-9
+
+
+def random_bonds(random: np.random.Generator, unknown: int) -> tuple[Bonds, float]:
+    """A law with drops, now and then with a jump at rest, and one of its joints."""
+    points = [[0.0, 0.0]]
+    if random.random() < 0.4:
+        points.append([0.0, random.uniform(0.1, 1.0) * random.choice([1.0, 1.0, -1.0])])
+    for x in np.sort(random.uniform(0.2, 2.0, random.integers(1, 3))):
+        points += [[x, random.uniform(0.0, 1.5)], [x, random.uniform(0.0, 1.0)]]
+    law = graph(points, one_sided=bool(random.random() < 0.3))
+    return bonds(law, [unknown], 1.0, random.choice([1.0, -1.0])), points[random.integers(0, len(points))][0]
+
+
+QUICK = [5, 13, 16, 28, 29, 38]
+MANY = [pytest.param(seed, marks=pytest.mark.long) for seed in range(100) if seed not in QUICK]
+
+
+@pytest.mark.parametrize("seed", [*QUICK, *MANY])
+def test_all_points_where_bounds_lie_on_joints_are_those_of_brute_force(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    n = int(random.integers(1, 4))
+    half = random.normal(size=(n, n))
+    laws, joints = zip(*(random_bonds(random, i) for i in range(n)), strict=True)
+    kept = random.uniform(size=(2, n)) < 0.4
+    given = condensed(
+        half @ half.T + 0.05 * np.eye(n),
+        random.normal(size=n),
+        *laws,
+        lower=np.where(kept[0], -np.array(joints), -np.inf),
+        upper=np.where(kept[1], np.array(joints), np.inf),
+    )
+    problem = scalar_problem(given)
+    wanted = stationary(problem)
+    points = found(problem).points
+    listed = [p.x for p in points]
+    assert all(min(np.max(np.abs(x - y)) for y in listed) < 1e-8 * (1.0 + np.max(np.abs(x))) for x in wanted)
+    assert all(min(np.max(np.abs(x - y)) for y in wanted) < 1e-8 * (1.0 + np.max(np.abs(x))) for x in listed)
+    for point in points:
+        _check_kind(problem, point, random)
+
+
+def _check_kind(problem: ScalarProblem, point: StationaryPoint, random: np.random.Generator) -> None:
+    """About a minimiser no energy is lower; about a saddle one is."""
+    ways = np.vstack([np.eye(problem.size), -np.eye(problem.size), random.normal(size=(2000, problem.size))])
+    places = [np.clip(point.x + 1e-5 * way, problem.lower, problem.upper) for way in ways]
+    fall = point.energy - min(map(problem.energy, places))
+    if point.kind is not Kind.UNDECIDED:
+        assert (fall > 1e-14) == (point.kind is Kind.SADDLE)
 
 
 def test_the_balance_of_bodies_knows_that_all_bonds_must_bear_nearly_their_peak() -> None:

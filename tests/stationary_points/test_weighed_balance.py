@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -81,8 +83,8 @@ def condensed_floor(cells: int, press: float = 6e6) -> ScalarProblem:
     return scalar_problem(Condensation(prepare(Scene.model_validate(model(cells, press, 1e6, law))).system).problem)
 
 
-def searched(problem: ScalarProblem) -> Enumeration:
-    search = Enumeration(problem=problem)
+def searched(problem: ScalarProblem, cut: Callable[[], bool] = lambda: False) -> Enumeration:
+    search = Enumeration(problem=problem, cut=cut)
     search.start()
     assert search.run(lambda: False, lambda _: None)
     return search
@@ -127,6 +129,18 @@ def test_a_cell_behind_the_drops_has_no_point() -> None:
     low = np.maximum(problem.lower, -20.0)
     cell = fresh_box(low, np.maximum(np.full(problem.size, -5.0), low + 1.0), np.zeros(problem.size))
     assert BalanceTest(Relaxation(problem)).look(cell) is None
+
+
+def test_a_test_that_is_cut_short_excludes_less_and_loses_no_point() -> None:
+    """As where a signal ends the search: what is left of each cell is kept."""
+    problem = condensed_floor(6)
+    low = np.maximum(problem.lower, -20.0)
+    cell = fresh_box(low, np.maximum(np.full(problem.size, -5.0), low + 1.0), np.zeros(problem.size))
+    assert BalanceTest(Relaxation(problem)).look(cell, lambda: True) is not None
+    whole, turn = searched(problem), itertools.cycle([False] * 7 + [True])
+    hurried = searched(problem, lambda: next(turn))
+    assert sorted(p.energy for p in hurried.points) == pytest.approx(sorted(p.energy for p in whole.points))
+    assert hurried.cells > whole.cells
 
 
 def test_a_joint_alone_has_all_tractions_of_its_arcs() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -12,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from full_disk import room_for
 from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import read_scene
-from hvi_fenicsx.report.errors import PageError
+from hvi_fenicsx.report.errors import ResultError
 from hvi_fenicsx.report.html import study_page
 from hvi_fenicsx.results.output_folder import OutputFolder
 from hvi_fenicsx.runtime import processes
@@ -65,7 +65,7 @@ def test_what_the_study_did_not_write_stays(way: str, copy: Path, monkeypatch: p
 
 def test_a_page_that_cannot_be_written_costs_a_line(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(folder: Path) -> Path:
-        raise PageError("no page today")
+        raise ResultError("no page today")
 
     monkeypatch.setattr(study_page, "write", refused)
     done = study(copy, "--resume")
@@ -124,12 +124,8 @@ def test_a_full_disk_ends_a_study_in_one_message_and_nothing_finished_is_lost(
     if room == 100:
         (copy / "out" / "points" / next(iter(names(copy / "out" / "points")))).unlink()
     before = {name: (copy / "out" / name).read_bytes() for name in names(copy / "out") if name != "manifest.json"}
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
-    try:
+    with room_for(room):
         done = study(copy, "--resume", *further)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("hvi: --out")
     assert "could not be written: File too large" in done.stderr

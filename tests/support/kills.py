@@ -20,29 +20,31 @@ PAUSE = 0.2
 """Seconds between two signals: the first has come when the second does."""
 LONGEST = 60
 """Seconds within which all processes of a run that was ended are gone."""
+MARK = ("HVI_KILLS_OF", str(os.getpid()))
+"""In the environment of a run and of all that it starts; this process has one run at a time."""
 
 
 def started(words: list[str], environment: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
     """A run in a session of its own."""
+    marked = {**(os.environ if environment is None else environment), MARK[0]: MARK[1]}
     return subprocess.Popen(
-        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        words, env=marked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
 
 
 def end(process: subprocess.Popen[str], way: str, chance: random.Random) -> None:
     """End a run in one of the ways, and wait until its processes are gone; a request to stop is met in words."""
-    kin = family(process.pid)
     if way == "SIGKILL":
         os.killpg(process.pid, signal.SIGKILL)
     elif way == "one rank":
-        os.kill(chance.choice(kin), signal.SIGKILL)
+        os.kill(chance.choice(family(process.pid)), signal.SIGKILL)
     else:
         name, _, twice = way.partition(" ")
         for _ in range(2 if twice else 1):
             process.send_signal(getattr(signal, name))
             time.sleep(PAUSE)
     _, errors = process.communicate(timeout=120)
-    wait_for_end(kin)
+    wait_for_end()
     print(f"ended by {way}: {process.returncode}")
     assert "Traceback" not in errors, (way, process.args, errors)
     if way in SOFT or way in TWICE:
@@ -66,9 +68,17 @@ def children(pid: int) -> list[int]:
         return []
 
 
-def wait_for_end(processes: list[int]) -> None:
-    """Ranks whose launcher was killed end a little later, and hold the folder until then."""
+def wait_for_end() -> None:
+    """Ranks whose launcher was killed end a little later, and hold the folder until then; some start after the kill."""
     late = time.monotonic() + LONGEST
-    while any(Path(f"/proc/{process}").exists() for process in processes):
+    while any(is_marked(process) for process in Path("/proc").glob("[0-9]*")):
         assert time.monotonic() < late, "processes stay"
         time.sleep(0.1)
+
+
+def is_marked(process: Path) -> bool:
+    """Whether a process belongs to a run of this one, while it lives."""
+    try:
+        return f"\0{'='.join(MARK)}\0".encode() in b"\0" + (process / "environ").read_bytes()
+    except OSError:
+        return False

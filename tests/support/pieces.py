@@ -28,3 +28,11 @@ def assert_equal(one: hvi.Solution, two: hvi.Solution, parts: tuple[str, str], i
     for column in ("friction", "pressure"):
         whole, left = (getattr(s.contact[p], column)[inside] for s, p in zip((one, two), parts, strict=True))
         np.testing.assert_allclose(whole[: len(left)], left, rtol=1e-6, atol=1e-6 * abs(left).max())
+
+
+def assert_same_equilibria(one: hvi.Scene, two: hvi.Scene) -> None:
+    """All equilibria of two scenes, more than one, with the same energies."""
+    first, second = hvi.equilibria(one), hvi.equilibria(two)
+    assert first.complete
+    assert len(first.solutions) == len(second.solutions) > 1
+    assert [s.energy for s in first.solutions] == pytest.approx([s.energy for s in second.solutions], rel=1e-9)

@@ -115,7 +115,7 @@ def test_energies_differ_by_what_those_of_the_whole_body_differ_by(name: str) ->
     system, condensation = condensed(name)
     whole, reduced = [], []
     for x in samples(condensation):
-        whole.append(system.energy(condensation.expand(x), [Right(t.law) for t in system.terms]))
+        whole.append(system.equations.energy(condensation.expand(x), [Right(t.law) for t in system.terms]))
         reduced.append(condensation.problem.energy(x))
     assert reduced[1] - reduced[0] == pytest.approx(whole[1] - whole[0], rel=1e-9)
 
@@ -127,7 +127,7 @@ def test_forces_are_those_of_the_whole_body(name: str) -> None:
     problem, residual = condensation.problem, system.load.duplicate()
     for x in samples(condensation):
         u = condensation.expand(x)
-        system.residual(u, residual, [Right(t.law) for t in system.terms])
+        system.equations.residual(u, residual, [Right(t.law) for t in system.terms])
         whole = np.array(residual.array_r)
         reduced = problem.stiffness @ x - problem.load(1.0) + tractions(condensation, x)
         size = np.max(np.abs(reduced))
@@ -245,9 +245,9 @@ def test_forces_are_condensed_by_one_solve_and_followed_by_another(monkeypatch: 
     solves, solve = [], Interior.solve
     monkeypatch.setattr(Interior, "solve", lambda self, right: solves.append(1) or solve(self, right))
     forces = np.random.default_rng(5).standard_normal(system.load.local_size)
-    found = condensation.condensed(forces)
+    found = condensation.forces.condensed(forces)
     change, product = system.undisplaced(), system.load.duplicate()
-    change.array[:] = condensation.change(np.ones_like(found.condensed), found)
+    change.array[:] = condensation.forces.change(np.ones_like(found.condensed), found)
     system.jacobian.elastic_product(change, product)
     inner = np.setdiff1d(np.arange(len(forces)), np.union1d(system.jacobian.rows.dofs, system.problem.fixed))
     assert np.max(np.abs(product.array_r - forces)[inner]) < 1e-12 * np.max(np.abs(product.array_r))

@@ -61,6 +61,7 @@ def test_solutions_and_negative_eigenvalues_are_those_of_the_matrix_itself(table
     assert told["negative"][0] == told["negative"][1] > 0
 
 
+@pytest.mark.long
 def test_on_several_ranks_too() -> None:
     told = on_ranks(3, str(Path(__file__).parent / "factorisation_ranks.py"), json.dumps(cube(4)))
     assert min(told["pressures"]) > 0

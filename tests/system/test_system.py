@@ -62,7 +62,7 @@ def random_state(prepared: Preparation, seed: int = 1) -> PETSc.Vec:
 
 def residual(prepared: Preparation, x: PETSc.Vec, models: list[Any]) -> Array:
     out = prepared.system.load.duplicate()
-    prepared.system.residual(x, out, models)
+    prepared.system.equations.residual(x, out, models)
     found: Array = out.array_r.copy()
     return found
 
@@ -85,7 +85,7 @@ def test_the_residual_is_the_gradient_of_the_energy(name: str) -> None:
     r, size = residual(prepared, x, models), x.local_size
     for i in np.flatnonzero(free(prepared)):
         step = h * np.eye(1, size, i).ravel()
-        up, down = (prepared.system.energy(moved(x, s * step), models) for s in (1, -1))
+        up, down = (prepared.system.equations.energy(moved(x, s * step), models) for s in (1, -1))
         assert (up - down) / (2 * h) == pytest.approx(r[i], abs=1e-6 * np.max(np.abs(r)))
 
 
@@ -95,9 +95,9 @@ def test_the_matrix_is_the_derivative_of_the_residual(name: str) -> None:
     prepared = ready(model(4, 3e6, 1e6, STRONG, **SMOOTHED[name]))
     system = prepared.system
     models = [Smooth(t.law) for t in system.terms]
-    system.jacobian.set_rates(system.tangents(random_state(prepared, 5), models))
+    system.jacobian.set_rates(system.equations.tangents(random_state(prepared, 5), models))
     x, h = random_state(prepared), 1e-7
-    system.jacobian.set_rates(system.tangents(x, models))
+    system.jacobian.set_rates(system.equations.tangents(x, models))
     for seed in range(5):
         direction = np.random.default_rng(seed).normal(size=x.local_size) * free(prepared)
         product = system.jacobian.matrix * moved(0.0 * x, direction)

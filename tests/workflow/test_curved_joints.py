@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
-from runs import RANKS, summary
+from runs import LONG_RANKS, summary
 from runs import hvi as command
 
 import hvi_fenicsx as hvi
@@ -195,7 +195,7 @@ def test_an_accuracy_is_kept_where_refined_sides_follow_their_curves(tmp_path: P
     assert summary(out)["accuracy"]["estimated"] < accuracy
 
 
-@pytest.mark.parametrize("ranks", RANKS[1:])
+@pytest.mark.parametrize("ranks", LONG_RANKS[1:])
 def test_curved_joints_are_the_same_on_ranks(ranks: int, tmp_path: Path) -> None:
     file = tmp_path / "rings.geo"
     file.write_text(RINGS.format(size=0.25, other=0.2, order=2))

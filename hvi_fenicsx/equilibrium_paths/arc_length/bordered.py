@@ -13,11 +13,7 @@ import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...typing import Array, Integers
-
-_ACROSS = 1e-3
-"""A row that hardly changes along the direction, beside its size, costs digits: it wants factors of its own."""
-_MOST_EXCHANGES = 40
-"""So many exchanges cost as much as new factors, and digits."""
+from ..thresholds import DEFAULT, CurveThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +40,7 @@ class Bordered:
 
     Args:
         matrix: the equations, n rows, and the row, (n + 1, n + 1); overwritten if its columns are contiguous.
+        thresholds: what costs digits.
 
     Attributes:
         along: the direction in which the equations stay satisfied, the row growing by 1, (n + 1,).
@@ -52,7 +49,8 @@ class Bordered:
         numpy.linalg.LinAlgError: the matrix is singular.
     """
 
-    def __init__(self, matrix: Array) -> None:
+    def __init__(self, matrix: Array, thresholds: CurveThresholds = DEFAULT.curve) -> None:
+        self._thresholds = thresholds
         self._row = matrix[-1].copy()
         self._exchanges: list[_Exchange] = []
         self._factors, self._pivots, singular = dgetrf(matrix, overwrite_a=1)
@@ -78,12 +76,12 @@ class Bordered:
             columns: their numbers, (k,).
             values: the new ones, (n, k).
         """
-        if len(self._exchanges) == _MOST_EXCHANGES:
+        if len(self._exchanges) == self._thresholds.exchanges:
             return False
         spike = np.stack([self._solved(np.append(v, self._row[i])) for i, v in zip(columns, values.T, strict=True)], 1)
         own = spike[columns]
         size = float(np.max(np.abs(spike)))
-        if not np.isfinite(size) or np.linalg.svd(own, compute_uv=False)[-1] <= _ACROSS * size:
+        if not np.isfinite(size) or np.linalg.svd(own, compute_uv=False)[-1] <= self._thresholds.across * size:
             return False
         spike[columns] -= np.eye(len(columns))
         self._exchanges.append(
@@ -105,7 +103,7 @@ class Bordered:
         Args:
             row: the row, (n + 1,).
         """
-        return abs(float(row @ self.along)) > _ACROSS * float(np.linalg.norm(row)) * self._length
+        return abs(float(row @ self.along)) > self._thresholds.across * float(np.linalg.norm(row)) * self._length
 
     def step(self, left: Array, row: Array, value: float) -> Array:
         """The change that takes out what is left of the equations and of another row, (n + 1,).

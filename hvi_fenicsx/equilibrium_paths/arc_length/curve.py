@@ -16,14 +16,9 @@ from contextlib import suppress
 import numpy as np
 
 from ...typing import Array
-from .equations import ROUNDING, STANDING, UNDECIDED, Refused
-from .events import LEAST, Events, Move, Outcome
+from .equations import Refused
+from .events import Events, Move, Outcome
 from .sites import Sites
-
-_LARGEST_TURN = 0.9
-"""Least cosine of the angle between the tangents at both ends of a step."""
-_FAR = 1e4
-"""A displacement that is infinite, in units of those where the body was."""
 
 
 class Curve(Events):
@@ -47,7 +42,7 @@ class Curve(Events):
         self, constant: Array, rate: Array, sites: Sites, z: Array, factor: float, fineness: float = 1.0
     ) -> None:
         super().__init__(constant, rate, sites, z, factor)
-        self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, LEAST
+        self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, self.limits.shortest
         self._next = self.length
         self.disagreement: Callable[[Move], float] = lambda move: 0.0
         self._size = self._extent()
@@ -83,9 +78,10 @@ class Curve(Events):
         nearest = min(float(np.min(distances, initial=np.inf)), self._until(aim))
         if not self.sites.bent:
             return not np.isfinite(nearest)
-        if self.factor_rate == 0.0 and nearest > _FAR * self._size and self._is_straight(_FAR * self._size):
+        far = self.limits.far * self._size
+        if self.factor_rate == 0.0 and nearest > far and self._is_straight(far):
             return True
-        return not np.isfinite(nearest) and bool(np.max(np.abs(self.here.values.s), initial=0.0) > _FAR * self._size)
+        return not np.isfinite(nearest) and bool(np.max(np.abs(self.here.values.s), initial=0.0) > far)
 
     def _is_straight(self, way: float) -> bool:
         """Whether the equations stay satisfied so far along the tangent: a body slides on, and no force changes."""
@@ -101,8 +97,8 @@ class Curve(Events):
         rates = self.sites.rates(self.here.y[:-1], self.here.tangent[:-1])
         largest = float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, sites.high, sites.low)
-        there = np.abs(ends - s) <= ROUNDING * (1.0 + np.abs(s))
-        moves = np.abs(rates) > np.where(there & sites.bent, UNDECIDED, STANDING) * largest
+        there = np.abs(ends - s) <= self.limits.rounding * (1.0 + np.abs(s))
+        moves = np.abs(rates) > np.where(there & sites.bent, self.limits.undecided, self.limits.standing) * largest
         found = np.full(len(sites), np.inf)
         found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)
         return found, ends
@@ -118,7 +114,8 @@ class Curve(Events):
         ways, ends = self._ends()
         first, until, safe = float(np.min(ways, initial=np.inf)), self._until(aim), self._safe()
         way = min(first, until, safe)
-        if until <= way * (1.0 + 0.1 * ROUNDING):  # what ends with the factor at its aim goes on from there, if at all
+        # what ends with the factor at its aim goes on from there, if at all
+        if until <= way * (1.0 + 0.1 * self.limits.rounding):
             way = until
             outcome, site, condition = Outcome.FACTOR, None, self.at_factor(aim)
         elif way == first:
@@ -177,7 +174,7 @@ class Curve(Events):
         if not self.sites.bent:
             return move
         short = way < 1e-7
-        if not short and float(self.here.tangent @ move.after.tangent) < _LARGEST_TURN:
+        if not short and float(self.here.tangent @ move.after.tangent) < self.limits.least_turn:
             raise Refused
         disagreement = self.disagreement(move)
         if not short and disagreement > 1.0:

@@ -13,9 +13,6 @@ from .felt import factors, felt
 from .sites import Sites
 from .vertex_laws import vertex_laws
 
-_RANK = 1e-12
-"""Singular values so small beside the greatest are zero: a body that slides takes any place."""
-
 
 class CurvedGraphs:
     """A state in the coordinates along its graphs.
@@ -56,8 +53,8 @@ class CurvedGraphs:
         Raises:
             numpy.linalg.LinAlgError: the equations are singular.
         """
-        matrix = self._sites.jacobian(self._sites.values(self._z))
-        self._z = self._z + np.linalg.lstsq(matrix, load / self._factors, rcond=_RANK)[0]
+        matrix, rank = self._sites.jacobian(self._sites.values(self._z)), self._sites.thresholds.curve.rank
+        self._z = self._z + np.linalg.lstsq(matrix, load / self._factors, rcond=rank)[0]
         s = self._sites.s(self._z)
         for k in np.flatnonzero((s < self._sites.low) | (s > self._sites.high)):
             self._pass_end(int(k), forward=bool(s[k] > self._sites.high[k]))

@@ -10,12 +10,8 @@ import numpy as np
 from ...laws import Superpotential
 from ...typing import Array, Integers, Mask
 from ..segments import Segment
+from ..thresholds import CurveThresholds
 from .vertex_laws import VertexLaw
-
-_INSET = 1e-12
-"""The law itself is taken so far inside the ends of its pieces, beside their length."""
-_REACH = 0.25
-"""A step changes the argument of a curved law by this part of its length scale and of the argument at most."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,20 +77,20 @@ class _Group:
     ends: Array
     at: _Live | None = None
 
-    def gathered(self) -> _Live:
+    def gathered(self, share: float) -> _Live:
         """The vertices where the law is on its curve."""
         if self.at is None:
             rows = np.flatnonzero(self.live)
             low, high = self.ends[rows].T
             ended = np.isfinite(high - low)
-            inset = np.where(ended, _INSET * np.where(ended, high - low, 0.0), 0.0)
+            inset = np.where(ended, share * np.where(ended, high - low, 0.0), 0.0)
             self.at = _Live(
                 sites=self.sites[rows],
                 signs=self.signs[rows],
                 weights=self.weights[rows],
                 low=low + inset,
                 high=high - inset,
-                inset=np.where(ended, 0.0, _INSET),
+                inset=np.where(ended, 0.0, share),
                 chords=self.chords[rows].T,
             )
         return self.at
@@ -105,9 +101,11 @@ class Deviations:
 
     Args:
         laws: of each site.
+        thresholds: how far inside the ends of pieces the law is taken, and how far steps go.
     """
 
-    def __init__(self, laws: Sequence[Sequence[VertexLaw]]) -> None:
+    def __init__(self, laws: Sequence[Sequence[VertexLaw]], thresholds: CurveThresholds) -> None:
+        self._thresholds = thresholds
         self._m = len(laws)
         curved = [(k, law) for k, several in enumerate(laws) for law in several if law.curved]
         numbers = sorted({law.group for _, law in curved})
@@ -145,7 +143,7 @@ class Deviations:
         """
         found, slopes = np.zeros(self._m), np.zeros(self._m)
         for group in self._groups:
-            live = group.gathered()
+            live = group.gathered(self._thresholds.inset)
             if live.sites.size:
                 lacking, steeper = live.lacks(group.law, x[live.sites])
                 found += np.bincount(live.sites, lacking, minlength=self._m)
@@ -160,8 +158,8 @@ class Deviations:
         """
         found = np.full(self._m, np.inf)
         for group in self._groups:
-            sites = group.gathered().sites
-            np.minimum.at(found, sites, _REACH * (group.law.length_scale + np.abs(x[sites])))
+            sites = group.gathered(self._thresholds.inset).sites
+            np.minimum.at(found, sites, self._thresholds.reach * (group.law.length_scale + np.abs(x[sites])))
         return found
 
 

@@ -9,11 +9,9 @@ import numpy as np
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
 from ..state import PathState
+from ..thresholds import DEFAULT
 from .felt import factors, felt
 from .law_rows import LawRows, law_rows
-
-_ROUNDING = 1e-10
-"""A displacement this near to a break of a law, or to a bound, may be there, relative to itself and to lengths."""
 
 
 class CurvedDistances:
@@ -22,9 +20,13 @@ class CurvedDistances:
     Args:
         problem: the problem.
         remember: numbers of the problem's bonds that remember.
+        rounding: a displacement this near to a break of a law, or to a bound, may be there.
     """
 
-    def __init__(self, problem: CondensedProblem, remember: Collection[int]) -> None:
+    def __init__(
+        self, problem: CondensedProblem, remember: Collection[int], rounding: float = DEFAULT.curve.near_break
+    ) -> None:
+        self._rounding = rounding
         self._factors = factors(problem)
         self._problem = felt(problem, self._factors)
         self._laws = law_rows(self._problem, remember)
@@ -56,45 +58,46 @@ class CurvedDistances:
             unknowns = rows.bonds.unknowns
             if rows.bonds.radial:
                 lower = problem.lower[unknowns[:, 0]] if rows.bonds.opens else np.full(len(unknowns), -np.inf)
-                worst = max(worst, float(np.max(_off(rows, x[unknowns], force[unknowns], lower, memory), initial=0.0)))
+                off = _off(rows, x[unknowns], force[unknowns], lower, memory, self._rounding)
+                worst = max(worst, float(np.max(off, initial=0.0)))
                 rest[unknowns] = 0.0
             else:
-                least, most = _interval(rows, x[unknowns[:, 0]], memory)
+                least, most = _interval(rows, x[unknowns[:, 0]], memory, self._rounding)
                 np.add.at(low, unknowns[:, 0], least)
                 np.add.at(high, unknowns[:, 0], most)
-        allowed = _ROUNDING * float(np.max(np.abs(x), initial=0.0))
+        allowed = self._rounding * float(np.max(np.abs(x), initial=0.0))
         low[x <= problem.lower + allowed], high[x >= problem.upper - allowed] = -np.inf, np.inf
         beyond = np.maximum(np.maximum(problem.lower - x, x - problem.upper), 0.0) * np.diag(problem.stiffness)
         away = np.maximum(np.maximum(low - rest, rest - high), 0.0) + beyond
         return max(worst, float(np.max(away, initial=0.0)))
 
 
-def _interval(rows: LawRows, x: Array, memory: Array) -> tuple[Array, Array]:
+def _interval(rows: LawRows, x: Array, memory: Array, rounding: float) -> tuple[Array, Array]:
     """The least and the greatest forces at coordinates, but for their rounding, (r,) each."""
-    near = _ROUNDING * (np.abs(x) + rows.law.length_scale)
+    near = rounding * (np.abs(x) + rows.law.length_scale)
     ends = rows.traction(x - near, "left", memory), rows.traction(x + near, "right", memory)
     return rows.bonds.weights * np.minimum(*ends), rows.bonds.weights * np.maximum(*ends)
 
 
-def _off(rows: LawRows, u: Array, force: Array, lower: Array, memory: Array) -> Array:
+def _off(rows: LawRows, u: Array, force: Array, lower: Array, memory: Array, rounding: float) -> Array:
     """How far forces are from those that a law on a length gives: along u, of a size of its graph, (r,).
 
     An opening that is not positive has none, but for what its bound pushes.
     """
-    near = _ROUNDING * (np.max(np.abs(u), axis=1) + rows.law.length_scale)
+    near = rounding * (np.max(np.abs(u), axis=1) + rows.law.length_scale)
     pushed = np.zeros(len(u))
     if rows.bonds.opens:
         shut, pressed = u[:, 0] <= near, u[:, 0] <= lower + near
         pushed[shut & ~pressed] = np.maximum(-force[shut & ~pressed, 0], 0.0)
         force[shut, 0], u[shut, 0] = np.maximum(force[shut, 0], 0.0), 0.0
     length = np.linalg.norm(u, axis=1)
-    least, most = (_energies(rows, u) * end for end in _interval(rows, length, memory))
+    least, most = (_energies(rows, u) * end for end in _interval(rows, length, memory, rounding))
     at_rest = np.maximum(np.linalg.norm(force, axis=1) - np.maximum(np.abs(least), np.abs(most)), 0.0)
     directions = np.divide(u, length[:, None], out=np.zeros_like(u), where=length[:, None] > 0.0)
     along = np.sum(force * directions, axis=1)
     across = np.linalg.norm(force - along[:, None] * directions, axis=1)
     moved = np.maximum(np.maximum(least - along, along - most), 0.0) + across
-    return np.asarray(np.where(length <= _ROUNDING * rows.law.length_scale, at_rest, moved) + pushed)
+    return np.asarray(np.where(length <= rounding * rows.law.length_scale, at_rest, moved) + pushed)
 
 
 def _energies(rows: LawRows, u: Array) -> Array:

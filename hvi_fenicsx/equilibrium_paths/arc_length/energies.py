@@ -13,8 +13,6 @@ from .events import Move
 from .sites import Sites, Values
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-_AGREED = 3e-10
-"""By how much the work along a step may miss what the energies say, relative to the energies."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +154,7 @@ class Balance:
         change = sum(sign * (e.energy - e.elastic + e.dissipated) for sign, e in zip((-1.0, 1.0), ends, strict=True))
         change += self._strained(move)
         size = max(self._size, *(e.size for e in ends))
-        return abs(change - self._moved(move, unit)) / (_AGREED * size or 1.0)
+        return abs(change - self._moved(move, unit)) / (self._sites.thresholds.curve.agreed * size or 1.0)
 
     def _strained(self, move: Move) -> float:
         """The change of ½ xᵀ S x, without the rounding that large displacements leave in each of its ends."""

@@ -11,25 +11,6 @@ from ...typing import Array
 from .bordered import Bordered
 from .sites import Sites, Values
 
-ROUNDING = 1e-10
-"""A coordinate this near to the end of its segment is there; a factor whose rate is this small stands."""
-STANDING = 1e-11
-"""A site whose rate is this small beside the largest stands."""
-UNDECIDED = 1e-7
-"""A rate this small beside the largest may have the wrong sign where the curve bends: the step tells where it goes."""
-_ROUNDS = 40
-"""Corrections of the directions in which vertices at rest set out, at most."""
-_SLOW = 1e-2
-"""Factors of a point nearby serve where a correction is at most this part of the last one."""
-_DIGITS = 1e-15
-"""Forces that the last digits of coordinates make, in their units and beside the largest coordinate."""
-_PART = 1e-6
-"""Where no more is left, corrections that no longer fall are rounding if they are this part of the step at most."""
-_STEPS = 12
-"""Corrections of a point, at most."""
-_REFINEMENTS = 6
-"""Those of a tangent by factors of a point nearby, at most."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
@@ -70,10 +51,12 @@ class Equations:
         sites: where all sites are.
         here: the present point.
         unit: of the factor; a power of 2, so that no factor is rounded.
+        limits: what is rounding, and how many corrections are made.
     """
 
     def __init__(self, constant: Array, rate: Array, sites: Sites, z: Array, factor: float) -> None:
         self._rate, self.sites, self._most = rate, sites, 0.0
+        self.limits = sites.thresholds.curve
         largest = float(np.max(np.abs(rate) / sites.forces, initial=0.0))
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
@@ -91,7 +74,7 @@ class Equations:
     def factor_rate(self) -> float:
         """How it changes along the curve, in its unit; 0 where that is rounding."""
         rate, tangent = float(self.here.tangent[-1]), self.here.tangent
-        return rate if abs(rate) > ROUNDING * float(np.max(np.abs(tangent))) else 0.0
+        return rate if abs(rate) > self.limits.rounding * float(np.max(np.abs(tangent))) else 0.0
 
     def at_rest(self, small: float) -> bool:
         """Whether no law or bound carries a force any more.
@@ -128,7 +111,7 @@ class Equations:
         matrix[:n, n] = -self.unit * self._rate / self.sites.forces
         matrix[n] = row
         self._factors = None
-        self._factors = Bordered(matrix)
+        self._factors = Bordered(matrix, self.limits)
         return self._factors
 
     def _change(self, values: Values, direction: Array) -> Array:
@@ -150,7 +133,7 @@ class Equations:
             numpy.linalg.LinAlgError: the function stands along the curve.
         """
         found = self._tangent(values, row, sign)
-        for _ in range(_ROUNDS):
+        for _ in range(self.limits.directions):
             setting_out = self.sites.setting_out(values, found[:-1])
             if setting_out is None or np.allclose(setting_out.energies, values.energies, rtol=1e-14, atol=0.0):
                 break
@@ -170,10 +153,10 @@ class Equations:
     def _refined(self, factors: Bordered, values: Values) -> Array | None:
         """The direction in which the equations stay satisfied, by factors of a point nearby; None: they are too far."""
         found, last, size = factors.along, np.inf, float(np.max(np.abs(factors.along)))
-        for _ in range(_REFINEMENTS):
+        for _ in range(self.limits.refinements):
             step = factors.across(self._change(values, found))
             change = float(np.max(np.abs(step)))
-            if not change <= _SLOW * last:
+            if not change <= self.limits.slow * last:
                 return found if change <= 1e-13 * size else None
             found, last = found - step, change
             if change <= 1e-15 * size:
@@ -190,26 +173,26 @@ class Equations:
         Raises:
             Refused: the method does not converge, or comes to a point whose equations are singular.
         """
-        value, gradient = condition
+        (value, gradient), limits = condition, self.limits
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
         length = float(np.max(np.abs(y - self.here.y)))
         noise = max(1e-10 * (1.0 + length), 1e-14 / self._sharpness(gradient(y)) * size)
-        expected = _SLOW * length
-        for _ in range(_STEPS):
+        expected = self.limits.slow * length
+        for _ in range(limits.corrections):
             values = self.sites.values(y[:-1])
             left, off = self.residual(y, values), value(y)
-            digits = float(np.max(np.abs(left))) <= _DIGITS * size
-            if not self.sites.bent and digits and abs(off) <= _DIGITS * size:
+            digits = float(np.max(np.abs(left))) <= limits.digits * size
+            if not self.sites.bent and digits and abs(off) <= limits.digits * size:
                 return y
             step = self._correction(values, left, gradient(y), off, expected)
             change = float(np.max(np.abs(step)))
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
             y = y - step
-            allowed = max(noise, _PART * length) if digits else noise
+            allowed = max(noise, limits.part * length) if digits else noise
             if change <= 1e-14 * size or (change <= allowed and change >= 0.1 * last):
                 return y
-            last, expected = change, _SLOW * change
+            last, expected = change, self.limits.slow * change
         if last <= noise:
             return y
         raise Refused

@@ -14,10 +14,7 @@ import numpy as np
 from scipy.optimize import toms748
 
 from ...typing import Array
-from .equations import ROUNDING, STANDING, UNDECIDED, Equations, Place, Refused
-
-LEAST = 1e-11
-"""The shortest step."""
+from .equations import Equations, Place, Refused
 
 
 class Outcome(Enum):
@@ -77,7 +74,7 @@ class Events(Equations):
         shares = self._shares(move)
         rest = y[-1] - aim / self.unit
         over = rest * (start.y[-1] - aim / self.unit) < 0.0 and move.outcome is not Outcome.FACTOR
-        beyond = abs(rest) / abs(y[-1] - start.y[-1]) if over and abs(rest) > ROUNDING else 0.0
+        beyond = abs(rest) / abs(y[-1] - start.y[-1]) if over and abs(rest) > self.limits.rounding else 0.0
         site = int(np.argmin(shares)) if shares.size else 0
         if over and abs(rest) > 1e-13 * (1.0 + abs(y[-1])) and 1.0 - beyond <= float(np.min(shares, initial=1.0)):
             guess = start.y + (1.0 - beyond) * (y - start.y)
@@ -95,14 +92,14 @@ class Events(Equations):
         """The part of the step after which each site passed an end; 1 where it did not, (m,)."""
         sites, s0, s1 = self.sites, move.before.values.s, move.after.values.s
         found, way = np.ones(len(sites)), np.where(s1 != s0, s1 - s0, 1.0)
-        allowed = ROUNDING * (1.0 + np.abs(s1))
+        allowed = self.limits.rounding * (1.0 + np.abs(s1))
         above, below = s1 > np.maximum(sites.high + allowed, s0), s1 < np.minimum(sites.low - allowed, s0)
         for ends, beyond in ((sites.high, above), (sites.low, below)):
             found[beyond] = np.clip((ends[beyond] - s0[beyond]) / way[beyond], 0.0, 1.0 - 1e-12)
         return found
 
     def _moved(self, outcome: Outcome, site: int | None, y: Array) -> Move:
-        if float(self.here.tangent @ (y - self.here.y)) < -ROUNDING:
+        if float(self.here.tangent @ (y - self.here.y)) < -self.limits.rounding:
             raise Refused
         move = Move(outcome=outcome, site=site, before=self.here, after=self._after(y))
         if outcome is Outcome.END and not self._arrives(move):
@@ -138,7 +135,7 @@ class Events(Equations):
     def _up_to(self, move: Move, outcome: Outcome, site: int | None) -> Move | None:
         """The step up to where a rate, of the factor or of a site, is zero; None: it is too short."""
         whole = float(self.here.tangent @ (move.after.y - self.here.y))
-        if whole <= LEAST:
+        if whole <= self.limits.shortest:
             return None
         rate = self._rate_of(outcome, site)
         if rate(self.here) * rate(move.after) >= 0.0:
@@ -149,7 +146,7 @@ class Events(Equations):
             if way not in known:
                 known[way] = self._at(way, known)
             found = rate(known[way])
-            return found if abs(found) > STANDING * float(np.max(np.abs(known[way].tangent))) else 0.0
+            return found if abs(found) > self.limits.standing * float(np.max(np.abs(known[way].tangent))) else 0.0
 
         root = toms748(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, k=1)
         rate_at(root)
@@ -157,10 +154,10 @@ class Events(Equations):
 
     def _turned(self, after: Place) -> tuple[Outcome, int | None] | None:
         largest = float(np.max(np.abs(after.tangent)))
-        if self.trend * after.tangent[-1] < -UNDECIDED * largest:
+        if self.trend * after.tangent[-1] < -self.limits.undecided * largest:
             return Outcome.FOLD, None
         rates = self.sites.rates(after.y[:-1], after.tangent[:-1]) * self.sites.outward
-        back = np.flatnonzero(rates < -UNDECIDED * largest)
+        back = np.flatnonzero(rates < -self.limits.undecided * largest)
         return (Outcome.TURNED, int(back[0])) if back.size else None
 
     def _rate_of(self, outcome: Outcome, site: int | None) -> Callable[[Place], float]:

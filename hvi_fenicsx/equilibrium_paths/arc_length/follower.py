@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
+from ..beginning import AWAY
 from ..programme import Follower
 from ..rounds import Round, Rounds
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
@@ -20,8 +21,9 @@ from .equations import Refused
 from .events import Move, Outcome
 from .felt import factors, felt
 from .jump import Jump
-from .passage import Crossing, Passage, order
-from .rest import Rest, at_rest, is_held
+from .passage import Crossing, Passage, event_of, order
+from .rest import at_rest, is_held
+from .settling import settled
 from .sites import Sites
 from .vertex_laws import vertex_laws
 
@@ -57,7 +59,7 @@ class ArcLengthFollower(Follower):
         super().__init__(problem, options, resume, watch)
         self._fineness = fineness
         self._laws = vertex_laws(problem, options.remember)
-        self._sites = Sites(problem, self._laws)
+        self._sites = Sites(problem, self._laws, options.thresholds)
         self._lag = order(problem, [int(group[0]) for group in self._sites.unknowns()])
         self._remembers = any(law.passed is not None for law in self._laws)
         self._last: PathState | None = None
@@ -73,10 +75,8 @@ class ArcLengthFollower(Follower):
 
     @override
     def _begun(self) -> Iterator[PathState]:
-        rest = at_rest(self._problem, self._sites)
-        z = self._loaded(rest)
+        z = self._first()
         if z is None:
-            self._come_off(0.0, self.reason or "nothing holds the body at rest")
             return
         self._follow_from(z, 0.0)
         self._balance = Balance(self._problem, self._sites)
@@ -84,17 +84,31 @@ class ArcLengthFollower(Follower):
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
         yield self._state(Event.START)
 
-    def _loaded(self, rest: Rest) -> Array | None:
-        """From rest to the constant loads, as stable as it goes; where the sites are then."""
-        if rest.z is None or rest.constant is None:
+    def _first(self) -> Array | None:
+        """Where the sites are at the factor 0; None: the path has ended."""
+        rest = at_rest(self._problem, self._sites)
+        if rest.constant is not None:
+            return self._loaded(rest.constant)
+        if rest.held:
             return rest.z
-        follower = ArcLengthFollower(rest.constant, PathOptions(remember=self._options.remember), watch=self._watcher)
+        first = self._options.thresholds.exact.first_load * self._options.programme[0]
+        held = self._is_held(first)
+        z, reason = settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=held)
+        if z is None:
+            self._end_before(reason, escapes=reason == AWAY)
+        return z
+
+    def _loaded(self, constant: CondensedProblem) -> Array | None:
+        """From rest to the constant loads, as stable as it goes; where the sites are then."""
+        options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
+        follower = ArcLengthFollower(constant, options, watch=self._watcher)
         for _ in follower.states():
             pass
         if follower.end is End.INTERRUPTED:
             raise Stopped
         if follower.end is not End.REACHED:
-            self.reason = f"under the constant loads alone: {follower.reason}"
+            reason = f"under the constant loads alone: {follower.reason}"
+            self._end_before(reason, escapes=follower.end is End.ESCAPES)
             return None
         self._sites, self._laws = follower._sites, follower._laws
         return follower._curve.here.y[:-1]
@@ -128,22 +142,28 @@ class ArcLengthFollower(Follower):
     @override
     def _towards(self, aim: float) -> Iterator[PathState]:
         self._orient(aim)
-        self._rounds = Rounds(self._curve.here.values.x / self._factors)
+        self._rounds = Rounds(self._curve.here.values.x / self._factors, self._options.thresholds.exact.same_place)
         while self.end is None and self._curve.factor != aim:
             if self._options.follow is Follow.STABLE and self._unstable > 0:
                 yield from self._jump(aim)
                 continue
-            move = self._curve.advance(aim)
+            move = self._curve.advance(self._next(aim))
             if move.outcome in (Outcome.AWAY, Outcome.STUCK):
                 self._ended(move.outcome)
                 yield self._state(Event.END)
                 return
             self._balance.go(move, self._curve.unit)
-            if move.outcome is not Outcome.FACTOR:
+            if move.outcome is not Outcome.FACTOR or self._curve.factor != aim:
                 yield self._noted(move)
             self._watch()
             if self.end is not None:
                 yield self._state(Event.END)
+
+    def _next(self, aim: float) -> float:
+        """The next factor that the path may come to as it goes: one at which a state is wanted, or the aim."""
+        factor, up = self._curve.factor, self._curve.factor_rate > 0.0
+        ahead = [f for f in (*self._options.stops, aim) if f != factor and (f > factor) == up]
+        return min(ahead, key=lambda f: abs(f - factor), default=aim)
 
     def _orient(self, aim: float) -> None:
         """Set out towards a factor; a path that is resumed on its way goes on as it went."""
@@ -181,7 +201,7 @@ class ArcLengthFollower(Follower):
             self._curve.trend = -self._curve.trend
             self._unstable = self._beyond(move)
             return self._state(Event.FOLD)
-        if move.outcome is Outcome.STEP:
+        if move.outcome in (Outcome.STEP, Outcome.FACTOR):
             self._unstable = self._sites.unstable_directions(self._curve.here.values)
             return self._state(Event.STEP)
         if self._floats and self._is_off():  # all bonds are broken at once: nothing is left to pass
@@ -191,7 +211,7 @@ class ArcLengthFollower(Follower):
         self._curve.settle()
         self._trend()
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
-        state = self._state(_event(passages, folds=before * self._curve.trend < 0), passages)
+        state = self._state(event_of(passages, folds=before * self._curve.trend < 0), passages)
         if self._rounds.note(state) is Round.CLOSED:
             self._go_round(Round.CLOSED)
         return state
@@ -283,11 +303,3 @@ class ArcLengthFollower(Follower):
         laws = self._sites.laws_at(passage.site)
         group = laws[0].group if laws and not (passage.closes or passage.opens) else None
         return place_of(self._problem, int(self._sites.unknowns_of(passage.site)[0]), group)
-
-
-def _event(passages: Sequence[Passage], *, folds: bool) -> Event:
-    if folds:
-        return Event.FOLD
-    if any(p.closes for p in passages):
-        return Event.CONTACT
-    return Event.RELEASE if any(p.opens for p in passages) else Event.KINK

@@ -17,22 +17,11 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from .curve import Curve
 from .energies import displacement_rate
-from .equations import ROUNDING, Place, Refused
+from .equations import Place, Refused
 from .events import Outcome
-from .passage import Crossing
+from .passage import Crossing, advancing
 from .relaxation import Relaxation
 from .sites import Sites
-
-_BEYOND = 1e-2
-"""A step along the path, in units of s."""
-_PUSH = 1e-6
-"""How much larger the loads are that take a body off a state at which it would rest."""
-_SAME = 1e-3
-"""Motions that differ by no more lead the same way."""
-_MOST = 40
-"""Steps of such a curve at most, at first."""
-_LATER = 20
-"""So many more for each site where nothing else leads to an end: it may zigzag where bonds break one by one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,11 +63,12 @@ class Jump:
         Args:
             heading: 1 where larger factors are not borne, -1 where smaller ones are not.
         """
+        limits = self.sites.thresholds.jump
         ways: list[Callable[[], Landing | None]] = [
-            lambda: self._held_back(_MOST),
+            lambda: self._held_back(limits.steps),
             self._released,
             lambda: self._pushed_off(heading),
-            lambda: self._held_back(_MOST + _LATER * len(self.sites)),
+            lambda: self._held_back(limits.steps + limits.later_steps * len(self.sites)),
         ]
         kept = self.sites.kept()
         for way in ways:
@@ -106,7 +96,7 @@ class Jump:
         sites = self.sites
         curve = Curve(self.load, restraint * float(np.mean(sites.forces)), sites, self.here.y[:-1].copy(), 0.0)
         tangent = curve.tangent(curve.here.values, row)
-        if any(np.allclose(tangent, other, rtol=0.0, atol=ROUNDING) for other in tried):
+        if any(np.allclose(tangent, other, rtol=0.0, atol=curve.limits.rounding) for other in tried):
             return None
         tried.append(tangent)
         curve.head(tangent)
@@ -117,9 +107,7 @@ class Jump:
 
     def _to_its_end(self, curve: Curve, most: int) -> Landing | None:
         start = curve.here.y
-        for _ in range(most):
-            self.step()
-            move = curve.advance(0.0)
+        for move in advancing(curve, 0.0, self.lag, self.step, most):
             if move.outcome is Outcome.FACTOR:
                 stable = curve.sites.unstable_directions(curve.here.values) == 0
                 moved = float(np.max(np.abs(curve.here.y - start), initial=0.0))
@@ -129,8 +117,6 @@ class Jump:
                 return Landing(z=None) if off else None
             if move.outcome is Outcome.STUCK or curve.here.y[-1] > 1e-9:
                 return None
-            if move.outcome in (Outcome.END, Outcome.TURNED):
-                Crossing(curve, self.lag, self.step).run(move.site, turned=move.outcome is Outcome.TURNED)
         return None
 
     def _released(self) -> Landing | None:
@@ -146,7 +132,7 @@ class Jump:
         """A little farther along the path, where the loads are smaller than those that act."""
         curve = Curve(self.problem.force, self.problem.force_rate, self.sites, self.here.y[:-1].copy(), 0.0)
         curve.place(self.here.y.copy(), self.here.tangent)
-        curve.length = _BEYOND
+        curve.length = self.sites.thresholds.jump.beyond
         return curve.advance(np.inf).after.y[:-1]
 
     def _relaxed(self, z: Array, load: Array, directions: Array) -> Landing | None:
@@ -158,7 +144,8 @@ class Jump:
     def _pushed_off(self, heading: int) -> Landing | None:
         """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
         rate, directions = self.problem.force_rate, self._directions()
-        push = _PUSH * heading * np.max(np.abs(self.load)) / np.max(np.abs(rate), initial=1e-300)
+        push = self.sites.thresholds.jump.push * heading
+        push = push * np.max(np.abs(self.load)) / np.max(np.abs(rate), initial=1e-300)
         found = self._relaxed(self.here.y[:-1].copy(), self.load + push * rate, directions)
         if found is None or found.z is None:
             return found
@@ -201,9 +188,10 @@ def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) 
     if lowest is not None:
         found += [lowest * (np.sign(_into_cell(sites, here, lowest) or float(lowest @ path)) or 1.0)]
     seen: list[Array] = []
+    same = sites.thresholds.jump.same
     for motion in (*found, path):
         size = float(np.max(np.abs(motion), initial=0.0))
-        if size and not any(np.allclose(motion / size, other, rtol=0.0, atol=_SAME) for other in seen):
+        if size and not any(np.allclose(motion / size, other, rtol=0.0, atol=same) for other in seen):
             seen.append(np.asarray(motion / size))
             yield seen[-1]
 
@@ -211,7 +199,7 @@ def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) 
 def _into_cell(sites: Sites, here: Place, motion: Array) -> float:
     """How far a motion takes the sites at ends of their segments into these; 0 where there are none."""
     s, moves = here.values.s, here.values.moves > 0.0
-    allowed = ROUNDING * (1.0 + np.abs(s))
+    allowed = sites.thresholds.curve.rounding * (1.0 + np.abs(s))
     low, high = moves & (s <= sites.low + allowed), moves & (s >= sites.high - allowed)
     return float((low * 1.0 - high) @ sites.along(here.values, motion))
 

@@ -10,7 +10,7 @@ sites comes from where they are, so that it is the same on any number of ranks.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,18 +18,10 @@ import numpy as np
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
 from ..segments import Kind, Segment, piece_at
+from ..state import Event
 from .curve import Curve
-from .equations import ROUNDING, STANDING, UNDECIDED, Refused
-
-_SLOW = 1e-6
-"""A rate of a site's force at which it stands, but for rounding, beside the largest."""
-_AT_END = 1e-11
-"""A displacement so near to an end of a piece, relative, is at it."""
-_ROUND = 3
-"""Times that the passages at one point come to the same cell: a straight line does so once, else they go round.
-
-A site that turns back has another graph from then on, so that the cells are others.
-"""
+from .equations import Refused
+from .events import Move, Outcome
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +49,20 @@ class Passage:
         return self.before.kind is Kind.BOUND
 
 
+def event_of(passages: Sequence[Passage], *, folds: bool) -> Event:
+    """The event of a state at which sites pass.
+
+    Args:
+        passages: at this state.
+        folds: whether the factor turns there.
+    """
+    if folds:
+        return Event.FOLD
+    if any(p.closes for p in passages):
+        return Event.CONTACT
+    return Event.RELEASE if any(p.opens for p in passages) else Event.KINK
+
+
 def order(problem: CondensedProblem, sites: list[int]) -> Array:
     """Numbers from 0.5 to 1.5 that look like random ones, from the vertices of unknowns, (m,).
 
@@ -76,6 +82,27 @@ def order(problem: CondensedProblem, sites: list[int]) -> Array:
     return found
 
 
+def advancing(curve: Curve, aim: float, lag: Array, step: Callable[[], None], most: int) -> Iterator[Move]:
+    """The steps of a curve, from event to event; after each one that is an event the sites pass.
+
+    Args:
+        curve: the curve; it has a direction.
+        aim: the factor at which a step ends.
+        lag: an order of the sites, (m,).
+        step: is called before each step and passage; it may raise an error to end them.
+        most: steps at most.
+
+    Raises:
+        Refused: there is no end of passing.
+    """
+    for _ in range(most):
+        step()
+        move = curve.advance(aim)
+        yield move
+        if move.outcome in (Outcome.END, Outcome.TURNED):
+            Crossing(curve, lag, step).run(move.site, turned=move.outcome is Outcome.TURNED)
+
+
 class Crossing:
     """The passages at the present point of a curve.
 
@@ -86,7 +113,7 @@ class Crossing:
     """
 
     def __init__(self, curve: Curve, lag: Array, check: Callable[[], None]) -> None:
-        self._curve, self._sites, self._check = curve, curve.sites, check
+        self._curve, self._sites, self._check, self._limits = curve, curve.sites, check, curve.limits
         self._lag, self._left = lag, lag.copy()
         self._cells: Counter[tuple[bytes, frozenset[int]]] = Counter()
         self._turned: set[int] = set()
@@ -131,7 +158,7 @@ class Crossing:
         """
         cell = self._sites.numbers.tobytes(), frozenset(self._turned)
         self._cells[cell] += 1
-        if self._cells[cell] > _ROUND:
+        if self._cells[cell] > self._limits.rounds:
             raise Refused
 
     def _outwards(self, k: int) -> float:
@@ -149,16 +176,16 @@ class Crossing:
 
         So does the one that arrived where its rate may have either sign: it was the step that took it out.
         """
-        rates, allowed = self._all_rates(), np.full(len(self._sites), STANDING)
+        rates, allowed = self._all_rates(), np.full(len(self._sites), self._limits.standing)
         if self._arrived is not None and self._sites.bent:
-            allowed[self._arrived] = UNDECIDED
+            allowed[self._arrived] = self._limits.undecided
         rates[np.abs(rates) <= allowed * np.max(np.abs(self._curve.here.tangent))] = 0.0
         return rates
 
     def _near(self) -> tuple[Mask, Mask]:
         """Which sites are at the low end, and which at the high end of their segments."""
         sites, s = self._sites, self._curve.here.values.s
-        allowed = ROUNDING * (1.0 + np.abs(s))
+        allowed = self._limits.rounding * (1.0 + np.abs(s))
         return s <= sites.low + allowed, s >= sites.high - allowed
 
     def _ways(self, rates: Array) -> Array:
@@ -199,11 +226,11 @@ class Crossing:
         """
         values, stiffest = self._curve.here.values, float(np.max(np.diag(self._sites.stiffness)))
         forces = (stiffest * np.abs(values.moves) + np.abs(values.rises)) * np.abs(self._all_rates())
-        return bool(forces[k] <= _SLOW * np.max(forces))
+        return bool(forces[k] <= self._limits.slow_force * np.max(forces))
 
     def _unmoved(self, k: int) -> bool:
         """Whether the site has not left 0 but for rounding: there is nothing to remember."""
-        return abs(float(self._curve.here.values.lengths[k])) <= ROUNDING * self._sites.length
+        return abs(float(self._curve.here.values.lengths[k])) <= self._limits.rounding * self._sites.length
 
     def _turned_back(self, k: int, *, forward: bool) -> Array:
         """Coordinates and factor on the secant of where the bonds have been, (n + 1,)."""
@@ -211,7 +238,7 @@ class Crossing:
         x, force = float(values.lengths[k]), float(values.tractions[k])
         sites.remember(k, x, force)
         self._turned.add(k)
-        sites.enter(k, piece_at(sites.chain(k), x, _AT_END, forward=forward))
+        sites.enter(k, piece_at(sites.chain(k), x, self._limits.at_end, forward=forward))
         y = curve.here.y.copy()
         sites.set(y, k, sites.coordinate(k, x, force))
         return y

@@ -20,13 +20,6 @@ from .events import Outcome
 from .passage import Crossing
 from .sites import Sites
 
-_FAR = 1e4
-"""A displacement that is infinite, in units of s where the motion began."""
-_STEPS, _MORE_STEPS = 500, 200
-"""Steps in time at most, and so many more for each site: each drop that is smoothed sharply takes some tens."""
-_SHORTEST = 1e-3
-"""A step in time ends where the curve takes no longer step than that: what holds back is too little from there on."""
-
 
 class _Went(Enum):
     """How a step in time went, and by what θ changes after it."""
@@ -67,9 +60,10 @@ class Relaxation:
         step: Callable[[], None],
     ) -> None:
         self._problem, self._sites, self._load, self._lag, self._step = problem, sites, load, lag, step
+        self._limits = sites.thresholds.jump
         self._damping = np.diag(sites.forces / sites.length)
         self.z, self.escapes, self.theta = z.copy(), False, 1.0
-        self._infinite = np.inf if held else _FAR * (1.0 + float(np.max(np.abs(sites.s(z)), initial=0.0)))
+        self._infinite = np.inf if held else self._limits.far * (1.0 + float(np.max(np.abs(sites.s(z)), initial=0.0)))
 
     def run(self, directions: Array) -> bool:
         """Move to equilibrium; whether one was found, or the body escapes.
@@ -87,7 +81,7 @@ class Relaxation:
             self._sites.stiffness = stiffness
 
     def _moved(self) -> bool:
-        for _ in range(_STEPS + _MORE_STEPS * len(self._sites)):
+        for _ in range(self._limits.times + self._limits.more_times * len(self._sites)):
             if self._at_rest():
                 return self._settled()
             if self._is_out_of_reach():
@@ -142,7 +136,7 @@ class Relaxation:
         row = np.eye(1, len(self.z) + 1, len(self.z))[0]
         curve.head(curve.tangent(curve.here.values, row))
         Crossing(curve, self._lag, self._step).run()
-        curve.shortest = _SHORTEST
+        curve.shortest = self._limits.shortest
         went = self._followed(curve)
         self.z = curve.here.y[:-1].copy()
         if sites.on_drops():

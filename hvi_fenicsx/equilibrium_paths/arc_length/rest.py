@@ -15,14 +15,16 @@ from .sites import Sites
 
 @dataclass(frozen=True, kw_only=True)
 class Rest:
-    """The first state.
+    """The state before any load acts.
 
     Attributes:
-        z: the coordinates of the sites; None: nothing holds the body.
+        z: the coordinates of the sites, (n,).
+        held: whether the body is held there.
         constant: the path from there to the constant loads, its factor from 0 to 1; None where there are none.
     """
 
-    z: Array | None
+    z: Array
+    held: bool
     constant: CondensedProblem | None = None
 
 
@@ -48,11 +50,12 @@ def at_rest(problem: CondensedProblem, sites: Sites) -> Rest:
     held = problem.stiffness @ x + force
     away = problem.force - held
     size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
-    if not is_held(problem, sites, z):
-        return Rest(z=None)
-    if np.max(np.abs(away), initial=0.0) <= 1e-14 * size:
-        return Rest(z=z)
-    return Rest(z=z, constant=replace(problem, force=held, force_rate=away))
+    is_loaded = np.max(np.abs(away), initial=0.0) > 1e-14 * size
+    return Rest(
+        z=z,
+        held=is_held(problem, sites, z),
+        constant=replace(problem, force=held, force_rate=away) if is_loaded else None,
+    )
 
 
 def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:

@@ -18,6 +18,7 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from ..graphs import Passed
 from ..segments import Component, Kind, Segment, chain
+from ..thresholds import DEFAULT, Thresholds
 from .chains import beside_opening, fresh, from_zero
 from .deviations import Deviations
 from .site_laws import SiteLaws
@@ -41,16 +42,13 @@ class Kept:
     passed: list[Passed | None]
 
 
-_NO_LENGTH = 1e-12
-"""A length that is 0, but for rounding, in units of s."""
-
-
 class SiteGraphs(SiteLaws):
     """All sites, each on one segment of its graph.
 
     Args:
         problem: the problem.
         laws: at its vertices.
+        thresholds: of the path.
 
     Attributes:
         numbers: of the segments on which the sites are, (m,).
@@ -63,10 +61,10 @@ class SiteGraphs(SiteLaws):
         InputError: a law on a length shares an unknown with another law or a bound.
     """
 
-    def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw]) -> None:
-        super().__init__(problem, laws)
+    def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw], thresholds: Thresholds = DEFAULT) -> None:
+        super().__init__(problem, laws, thresholds)
         self.stiffness = problem.stiffness
-        self._deviations = Deviations(self.laws)
+        self._deviations = Deviations(self.laws, thresholds.curve)
         m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)
         self.low, self.high, self.outward = np.zeros(m), np.zeros(m), np.zeros(m)
@@ -233,7 +231,8 @@ class SiteGraphs(SiteLaws):
         """
         radials = self.radials
         lengths, directions = radials.polar(z)
-        along = np.where(lengths > _NO_LENGTH, radials.along(directions, direction), radials.lengths(direction))
+        moved = lengths > self.thresholds.curve.no_length
+        along = np.where(moved, radials.along(directions, direction), radials.lengths(direction))
         return np.concatenate([direction[self.one], along, direction[radials.opening_unknowns]])
 
     def on_drops(self) -> list[int]:

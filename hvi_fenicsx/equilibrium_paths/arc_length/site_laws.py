@@ -8,6 +8,7 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Integers
+from ..thresholds import DEFAULT, Thresholds
 from .chains import refuse_shared
 from .radials import Radials
 from .units import units
@@ -20,8 +21,10 @@ class SiteLaws:
     Args:
         problem: the problem.
         laws: at its vertices.
+        thresholds: of the path.
 
     Attributes:
+        thresholds: of the path.
         one: the unknowns of sites of one unknown, which come first, (m1,).
         radials: the p sites of laws on a length, which come next; then come the sites of their openings, (q,).
         laws: of each site; those of openings have none.
@@ -32,8 +35,8 @@ class SiteLaws:
         InputError: a law on a length shares an unknown with another law or a bound.
     """
 
-    def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw]) -> None:
-        self._problem = problem
+    def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw], thresholds: Thresholds = DEFAULT) -> None:
+        self._problem, self.thresholds = problem, thresholds
         kinds = {law.unknowns: (law.opens, law.mixity) for law in laws if law.radial}
         lengths = sorted(kinds)
         self.radials = Radials(lengths, [kinds[group][0] for group in lengths], [kinds[group][1] for group in lengths])

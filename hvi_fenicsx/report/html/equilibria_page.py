@@ -23,7 +23,7 @@ def write(folder: Path) -> Path:
 
     Raises:
         ResultError: no search is there, or its files are damaged.
-        PageError: the page cannot be written.
+        NotWrittenError: the page cannot be written.
     """
     return page_of("equilibria.html.j2", _content(read(folder)), folder)
 

@@ -19,7 +19,7 @@ def write(folder: Path) -> Path:
 
     Raises:
         ResultError: no load path is there, or its files are damaged.
-        PageError: the page cannot be written.
+        NotWrittenError: the page cannot be written.
     """
     return page_of("path.html.j2", _content(read(folder)), folder)
 

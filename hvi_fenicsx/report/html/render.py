@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...runtime import manifest
-from ..errors import PageError
+from ...runtime import manifest, writing
 from ..reader import read
 
 if TYPE_CHECKING:
@@ -23,7 +20,7 @@ def write(folder: Path) -> Path:
 
     Raises:
         ResultError: no result is there, or its files are damaged.
-        PageError: the page cannot be written.
+        NotWrittenError: the page cannot be written.
     """
     from .content import content
 
@@ -42,13 +39,10 @@ def page_of(template: str, values: dict[str, Any], folder: Path) -> Path:
         The file.
 
     Raises:
-        PageError: it cannot be written.
+        NotWrittenError: it cannot be written.
     """
     page = render(template, values, folder / NAME)
-    try:
-        manifest.add(folder, [NAME])
-    except OSError as error:
-        raise PageError(f"{folder / manifest.NAME}: cannot be written: {error.strerror or error}") from None
+    manifest.add(folder, [NAME])
     return page
 
 
@@ -64,18 +58,9 @@ def render(template: str, values: dict[str, Any], path: Path) -> Path:
         The file.
 
     Raises:
-        PageError: it cannot be written.
+        NotWrittenError: it cannot be written.
     """
-    text = _environment().get_template(template).render(values)
-    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        aside.write_text(text, encoding="utf-8")
-        os.replace(aside, path)
-    except OSError as error:
-        raise PageError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        with contextlib.suppress(OSError):
-            aside.unlink()
+    writing.text(path, _environment().get_template(template).render(values))
     return path
 
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..errors import PageError
+from ..errors import ResultError
 from .content import picture, pictures
 from .render import NAME, render
 
@@ -18,14 +18,15 @@ def write(folder: Path) -> Path:
     """Write the page into the folder of a finished study; for one process alone.
 
     Raises:
-        PageError: no study is there, it is damaged, or the page cannot be written.
+        ResultError: no study is there, or it is damaged.
+        NotWrittenError: the page cannot be written.
     """
     file = folder / "study.json"
     try:
-        study = json.loads(file.read_text(encoding="utf-8"))
-        return render("study.html.j2", _content(study, folder), folder / NAME)
+        content = _content(json.loads(file.read_text(encoding="utf-8")), folder)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise PageError(f"{file}: no finished study, or damaged ({error})") from None
+        raise ResultError(f"{file}: no finished study, or damaged ({error})") from None
+    return render("study.html.j2", content, folder / NAME)
 
 
 def _content(study: dict[str, Any], folder: Path) -> dict[str, Any]:

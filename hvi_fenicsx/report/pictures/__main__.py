@@ -18,8 +18,8 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from ...errors import HviError
-from ...runtime import processes
+from ...errors import HviError, NotWrittenError
+from ...runtime import processes, writing
 from ..errors import PictureError
 from ..reader import Result, read
 from .draw import COMPLAINT, TOLD, WHEN_TOLD
@@ -61,9 +61,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         failures = draw_all(read(options.folder))
     except HviError as error:
-        failures = [str(error)]
+        failures = [error]
     for failure in failures:
         print(f"{COMPLAINT}{failure}", file=sys.stderr)
+    for failure in failures:
+        if isinstance(failure, NotWrittenError):
+            return writing.hand_over(failure)
     return 1 if failures else 0
 
 
@@ -82,7 +85,7 @@ def _terminated(*_: object) -> NoReturn:
     raise SystemExit(128 + signal.SIGTERM)
 
 
-def draw_all(result: Result) -> list[str]:
+def draw_all(result: Result) -> list[HviError]:
     """Draw the pictures of a result side by side and print the names of those that are there.
 
     Returns:
@@ -103,7 +106,7 @@ def draw_all(result: Result) -> list[str]:
         server.wait()
         running = [_started(drawing, context) for drawing in found]
         failures = [_ended(one) for one in running]
-    return [failure for failure in failures if failure]
+    return [failure for failure in failures if failure is not None]
 
 
 def _started(drawing: Drawing, context: multiprocessing.context.ForkContext) -> Running:
@@ -121,27 +124,33 @@ def _drawn(drawing: Drawing, connection: Connection) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     try:
         save(drawing.make(), drawing.path, drawing.caption)
-        connection.send("")
+        connection.send(None)
+    except NotWrittenError as error:
+        connection.send(error)
     except ModuleNotFoundError as error:
-        connection.send(f"needs the package {error.name}, which is not installed here")
+        connection.send(_failed(drawing, f"needs the package {error.name}, which is not installed here"))
     except Exception as error:  # whatever it is, it is reported in one line
-        connection.send(str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}")
+        words = str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}"
+        connection.send(_failed(drawing, words))
 
 
-def _ended(one: Running) -> str:
-    """Wait for a drawing; what went wrong with it, or nothing."""
+def _failed(drawing: Drawing, why: str) -> PictureError:
+    return PictureError(f"{drawing.path.name}: {why}")
+
+
+def _ended(one: Running) -> HviError | None:
+    """Wait for a drawing; what went wrong with it, if anything did."""
+    failure: HviError | None
     try:
-        failure = str(one.connection.recv())
+        failure = one.connection.recv()
     except EOFError:
-        failure = "aborted"
+        one.process.join()
+        advice = _ADVICE if one.drawing.rendered else ""
+        return _failed(one.drawing, f"the drawing process ended with {_reason(one.process.exitcode)}{advice}")
     one.process.join()
-    if failure == "aborted":
-        failure = (
-            f"the drawing process ended with {_reason(one.process.exitcode)}{_ADVICE if one.drawing.rendered else ''}"
-        )
-    if not failure:
+    if failure is None:
         print(one.drawing.path.name, flush=True)
-    return f"{one.drawing.path.name}: {failure}" if failure else ""
+    return failure
 
 
 def _reason(code: int | None) -> str:

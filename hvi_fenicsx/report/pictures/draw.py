@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...runtime import manifest, processes
+from ...runtime import manifest, processes, writing
 from ..errors import PictureError
 
 UNFINISHED = ".part.png"
@@ -62,18 +62,16 @@ class PictureProcess:
 
         Raises:
             PictureError: the process failed; its message says which picture and why.
+            NotWrittenError: there is no room for a picture.
         """
         try:
             names, errors = self.child.communicate(timeout=timeout)
         except subprocess.TimeoutExpired:
             raise PictureError(f"not drawn within {timeout:g} s; {self.command} tries again") from None
+        writing.raise_handed_over(self.child.returncode, errors)
         if self.child.returncode != 0:
             raise PictureError(_message(errors, self.child.returncode))
-        try:
-            manifest.add(self.folder, names.splitlines())
-        except OSError as error:
-            words = f"{self.folder}/{manifest.NAME}: cannot be written: {error.strerror or error}"
-            raise PictureError(words) from None
+        manifest.add(self.folder, names.splitlines())
         return [self.folder / name for name in names.splitlines()]
 
 
@@ -89,6 +87,7 @@ def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
 
     Raises:
         PictureError: the child failed; its message says which picture and why.
+        NotWrittenError: there is no room for a picture.
     """
     with waiting(folder) as process:
         process.begin()

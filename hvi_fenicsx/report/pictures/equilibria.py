@@ -6,7 +6,7 @@ import os
 import subprocess
 from pathlib import Path
 
-from ...runtime import processes
+from ...runtime import processes, writing
 from ..errors import PictureError
 
 NAME = "equilibria.png"
@@ -22,6 +22,7 @@ def draw(folder: Path) -> None:
 
     Raises:
         PictureError: the child failed.
+        NotWrittenError: there is no room for it.
     """
     command = [*processes.PYTHON, "-m", f"{__name__}_chart", os.path.abspath(folder)]
     try:
@@ -30,5 +31,6 @@ def draw(folder: Path) -> None:
         )
     except subprocess.TimeoutExpired:
         raise PictureError(f"{NAME}: not drawn within {TIMEOUT:g} s") from None
+    writing.raise_handed_over(done.returncode, done.stderr)
     if done.returncode != 0:
         raise PictureError(f"{NAME}: {(done.stderr.strip() or '?').splitlines()[-1]}")

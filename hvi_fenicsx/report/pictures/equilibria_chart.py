@@ -17,6 +17,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from ...errors import NotWrittenError
+from ...runtime import writing
 from ..equilibria_reader import EquilibriaResult, Row, read
 from ..units import number, unit_for
 from .equilibria import NAME
@@ -137,4 +139,7 @@ def _legend(fig: Figure, kinds: Sequence[str], states: Sequence[Sequence[Row]]) 
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    save(make(read(folder)), folder / NAME, CAPTION)
+    try:
+        save(make(read(folder)), folder / NAME, CAPTION)
+    except NotWrittenError as error:
+        raise SystemExit(writing.hand_over(error)) from None

@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
+from ...runtime import writing
 from ..png_file import CAPTION
 from ..reader import Result
 from ..units import thousands
@@ -164,11 +165,12 @@ def _verdict(result: Result) -> tuple[str, str]:
 def unfinished(path: Path) -> Iterator[Path]:
     """A name to write to; renamed to ``path`` when all went well, else removed."""
     aside = path.with_name(f".{path.stem}.{os.getpid()}{UNFINISHED}")
-    try:
-        yield aside
-        os.replace(aside, path)
-    finally:
-        aside.unlink(missing_ok=True)
+    with writing.told(path):
+        try:
+            yield aside
+            os.replace(aside, path)
+        finally:
+            aside.unlink(missing_ok=True)
 
 
 def save(fig: Figure, path: Path, caption: str = "") -> None:
@@ -178,6 +180,9 @@ def save(fig: Figure, path: Path, caption: str = "") -> None:
         fig: the picture.
         path: its file.
         caption: what a reader should see under it; it is kept in the file.
+
+    Raises:
+        NotWrittenError: it cannot be written.
     """
     canvas = FigureCanvasAgg(fig)
     canvas.draw()

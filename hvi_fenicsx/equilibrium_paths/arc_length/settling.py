@@ -1,0 +1,66 @@
+"""Where a small part of the loads takes a body that nothing holds at rest, and back to no load."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...system.condensed_problem import CondensedProblem
+from ...typing import Array
+from ..beginning import AWAY, NEUTRAL, UNKNOWN
+from ..watch import Watch
+from .curve import Curve
+from .equations import Refused
+from .events import Outcome
+from .passage import Crossing, advancing
+from .relaxation import Relaxation
+from .rest import is_held
+from .sites import Sites
+
+
+def settled(
+    problem: CondensedProblem, sites: Sites, z: Array, first: float, lag: Array, watch: Watch, *, held: bool
+) -> tuple[Array | None, str]:
+    """The coordinates at the factor 0, (n,), or why there are none.
+
+    The body moves as an overdamped one until something holds it; then the load is taken off again.
+
+    Args:
+        problem: the problem, without constant loads.
+        sites: where they are at rest; after it, where they are then.
+        z: their coordinates at rest, (n,).
+        first: the small factor.
+        lag: an order of the sites, (m,).
+        watch: whether to stop, and who is told of the motion.
+        held: whether there is an equilibrium at this factor, so that no way leads off.
+    """
+    watch.jumps(first)
+    motion = Relaxation(problem, sites, z, problem.load(first), lag, held=held, step=watch.step)
+    if not motion.run(np.zeros(len(sites))) or motion.escapes:
+        return None, AWAY if motion.escapes else UNKNOWN
+    try:
+        found = _unloaded(Curve(problem.force, problem.force_rate, sites, motion.z, first), lag, watch)
+    except (Refused, np.linalg.LinAlgError):
+        found = None
+    if found is None:
+        return None, UNKNOWN
+    return (found, "") if is_held(problem, sites, found) else (None, NEUTRAL)
+
+
+def _unloaded(curve: Curve, lag: Array, watch: Watch) -> Array | None:
+    """The coordinates where a curve comes to the factor 0."""
+    limits = curve.sites.thresholds.settling
+    row, first = np.eye(1, len(curve.here.y), len(curve.here.y) - 1)[0], curve.factor
+    curve.head(curve.tangent(curve.here.values, row, -np.sign(first)))
+    Crossing(curve, lag, watch.step).run()
+    for move in advancing(curve, 0.0, lag, watch.step, limits.steps + limits.more_steps * len(curve.sites)):
+        if abs(curve.factor) <= max(limits.no_load * abs(first), limits.roundings * _rounding(curve)):
+            return curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
+        if move.outcome in (Outcome.AWAY, Outcome.STUCK):
+            return None
+    return None
+
+
+def _rounding(curve: Curve) -> float:
+    """The factor of a load that is no larger than the rounding of the elastic forces."""
+    elastic = np.abs(curve.sites.stiffness) @ np.abs(curve.here.values.x) / curve.sites.forces
+    return float(np.finfo(float).eps * np.max(elastic)) * curve.unit

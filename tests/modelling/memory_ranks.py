@@ -1,0 +1,85 @@
+"""PETSc objects that live, and resident memory, MB, after some and after more calls from Python, as JSON.
+
+Run under mpirun.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+from scenes import model, quadratic_linear
+
+import hvi_fenicsx as hvi
+
+COMM = MPI.COMM_WORLD
+LAW = {"law": "graph", "points": [[0, 0], [1e-5, 3e6], [1e-5, 1e6]]}
+FEW, MORE = 4, 24
+
+
+@contextmanager
+def shared_file() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(COMM.bcast(folder)) / "log"
+        COMM.Barrier()
+
+
+def living() -> int:
+    """The number of PETSc objects of rank 0 that were made and not destroyed."""
+    with shared_file() as file:
+        viewer = PETSc.Viewer().createASCII(str(file), comm=COMM)
+        PETSc.Log.view(viewer)
+        viewer.destroy()
+        COMM.Barrier()
+        told = file.read_text().partition("Object Type")[2] if COMM.rank == 0 else ""
+    return sum(int(made) - int(freed) for made, freed in re.findall(r"(\d+) +(\d+)$", told, re.MULTILINE))
+
+
+def resident() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return float(COMM.allreduce(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, op=MPI.MAX))
+
+
+def measured(call: Callable[[], Any]) -> dict[str, list[float]]:
+    found: dict[str, list[float]] = {"objects": [], "memory": []}
+    for number in range(1, MORE + 1):
+        call()
+        if number in (FEW, MORE):
+            gc.collect()
+            found["objects"].append(living())
+            found["memory"].append(resident())
+    return found
+
+
+def followed(scene: hvi.Scene) -> None:
+    path = hvi.follow(scene, COMM)
+    path.u(-1)
+    path.free()
+
+
+def main() -> None:
+    PETSc.Log.begin()
+    small = hvi.Scene.model_validate(model(12, 3e6, friction=LAW))
+    curved = hvi.Scene.model_validate(model(3, 3e6, friction=quadratic_linear(3e6)))
+    nested = hvi.Scene.model_validate(model(52, 3e6, friction=LAW))  # with coarser levels
+    calls = {
+        "path": lambda: followed(small),
+        "equilibria": lambda: hvi.equilibria(curved, COMM),
+        "lowest": lambda: hvi.equilibria(curved, COMM, lowest=True),
+        "solve": lambda: hvi.solve(nested, COMM),
+    }
+    found = {name: measured(call) for name, call in calls.items()}
+    if COMM.rank == 0:
+        print(json.dumps(found))
+
+
+main()
