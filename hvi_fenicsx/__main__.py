@@ -1,8 +1,12 @@
 """``python3 -m hvi_fenicsx``: the command line."""
 
 import os
+import signal
 import sys
 import warnings
+
+if __name__ == "__main__" and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the command catches it: Python would end by a traceback
 
 from .cli import main
 

@@ -29,6 +29,7 @@ from .method import Method
 from .options import SolverOptions
 from .quadratic import LinearSolve
 from .result import Counts, SolveResult
+from .thresholds import ActiveSetThresholds
 
 _LOG = logger("solvers")
 
@@ -114,6 +115,8 @@ def solve_from_coarser(
     Raises:
         SolverError: a convex step raised the energy.
     """
+    if start.result.interrupted or control.interrupted():
+        return _stopped(system, start, options.thresholds.active_set)
     kind, found = registry.choose(options, system), start.result
     takes = found.converged and kind.takes_start
     first = coarse_start.prolonged(start, system, options.thresholds.active_set) if takes else None
@@ -129,6 +132,21 @@ def solve_from_coarser(
     steady = result.steady and (found.steady or found.levels == 1)  # a single coarser level says too little
     off_path = result.off_path if first is None else found.off_path
     result = replace(result, counts=counts, levels=found.levels + 1, steady=steady, off_path=off_path)
+    return LevelSolution(system=system, levels=start.levels, result=result)
+
+
+def _stopped(system: System, start: CoarseStart, thresholds: ActiveSetThresholds) -> LevelSolution:
+    """What was found on the coarser mesh: where the solve is to stop, nothing is set up for it any more. Collective."""
+    u = system.displacement(coarse_start.prolonged(start, system, thresholds))
+    result = replace(
+        start.result,
+        u=u,
+        converged=False,
+        reason="interrupted",
+        interrupted=True,
+        levels=start.result.levels + 1,
+        borne=None,
+    )
     return LevelSolution(system=system, levels=start.levels, result=result)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -35,3 +36,13 @@ def test_a_second_stop_never_shows_as_another_signal() -> None:
     found = {int(code): times for code, times in json.loads(done.stdout).items()}
     assert set(found) == {130, -signal.SIGTERM}
     assert sum(found.values()) >= FEWEST
+
+
+def test_ctrl_c_while_the_program_is_loaded_ends_it_without_a_traceback(tmp_path: Path) -> None:
+    """In the place of the first module that it loads one that is interrupted."""
+    (tmp_path / "argparse.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n", encoding="utf-8")
+    path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
+    words = [sys.executable, "-P", "-m", "hvi_fenicsx", "version"]
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import logging
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -15,7 +16,9 @@ from scenes import P, Table, block, displacement, energy, far, model, quadratic_
 
 from hvi_fenicsx import NewtonStep, Scene, Solution, prepare
 from hvi_fenicsx.errors import InputError
+from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.solvers.condensed import fischer_burmeister
+from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.workflow import finish
 
 METHODS = ["tao", "ssls", "condensed"]
@@ -152,6 +155,26 @@ def test_an_interrupt_ends_the_iteration(method: str) -> None:
     assert found.exit_code == 130
     assert found.solve_result is not None
     assert "interrupted" in found.solve_result.reason
+
+
+def test_an_interrupt_on_the_second_level_of_three_gives_what_was_found_there(caplog: pytest.LogCaptureFixture) -> None:
+    """The third one was set up, and began at zero."""
+    thresholds = Thresholds(solvers=SolverThresholds(nested_from=500))
+    scene = Scene.model_validate(model(32, 3e6, friction=quadratic_linear(1.0e6)))
+    whole = finish(prepare(scene, thresholds=thresholds)).solve_result
+    prepared = prepare(scene, thresholds=thresholds)
+
+    def begun() -> int:
+        return sum(record.getMessage().startswith("level of") for record in caplog.records)
+
+    with caplog.at_level(logging.INFO, logger="hvi_fenicsx.solvers"):
+        found = finish(prepared, interrupted=lambda: begun() == 2)
+    assert begun() == 2
+    assert found.exit_code == 130
+    assert whole is not None
+    assert found.solve_result is not None
+    off = found.solve_result.u.x.array - whole.u.x.array
+    assert np.linalg.norm(off) < 0.1 * np.linalg.norm(whole.u.x.array)
 
 
 @pytest.mark.parametrize("method", ["auto", "snes_vi", *METHODS])
