@@ -20,6 +20,8 @@ SIDES = 2.1
 """How often the gap counts the difference of energies of laws and their polylines: on both sides, and some more."""
 OWN_GAP = 0.05
 """The least share of the gap that a search may leave where laws are curved."""
+FALLS = "no lowest energy: it falls without limit as the load moves a body away"
+"""What is told where this is known."""
 
 
 def lowest(task: Task) -> Found:
@@ -29,6 +31,8 @@ def lowest(task: Task) -> Found:
         task: the search.
     """
     problem, saved = task.problem, task.saved
+    if task.wanted.falls:
+        return _no_lowest(FALLS)
     search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted))
     try:
         if saved is None:
@@ -36,7 +40,7 @@ def lowest(task: Task) -> Found:
         else:
             search.resume(zip(saved["low"], saved["high"], saved["weights"], strict=True), saved["x"][0])
     except SolverError as error:
-        return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=search.boxes, reason=str(error))
+        return _no_lowest(str(error), search.boxes)
 
     clock = Clock()
 
@@ -47,6 +51,10 @@ def lowest(task: Task) -> Found:
 
     search.run(task.stop, tell)
     return _proof(search, task.wanted.gap)
+
+
+def _no_lowest(reason: str, boxes: int = 0) -> Found:
+    return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=boxes, reason=reason)
 
 
 def _own_gap(problem: ScalarProblem, wanted: Wanted) -> float:
@@ -132,6 +140,8 @@ def bounded(task: Task, points: list[Array]) -> LowestSearch | None:
         task: the search.
         points: that are known.
     """
+    if task.wanted.falls:
+        return None
     search = LowestSearch(problem=task.problem, gap=task.wanted.gap)
     try:
         search.start(points)
