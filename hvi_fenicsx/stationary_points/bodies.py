@@ -127,17 +127,23 @@ class Equilibria:
         return Found(points=(point,), complete=True, lower_bound=energy, proven=True, nodes=0, reason=reason)
 
     def _exact(self, x: Array) -> StationaryPoint | None:
-        """The certified equilibrium of the whole bodies that the solver finds from a point. Collective.
+        """The equilibrium near a point, where laws are polylines or act on lengths. Collective.
 
         Args:
             x: the point, (n,).
         """
         assert self.problem is not None
+        if len(self.problem.lengths):
+            return self._solved(self.problem, x)
+        return CurvedLaws(near=self.problem, problem=self._condensation.problem).point(x)
+
+    def _solved(self, problem: ScalarProblem, x: Array) -> StationaryPoint | None:
+        """The certified equilibrium of the whole bodies that the solver finds from a point. Collective."""
         known = self.solution(StationaryPoint(x=x, energy=np.nan, kind=Kind.UNDECIDED, isolated=True))
         if not known.converged or known.solve_result is None or known.examination is None:
             return None
         found = self._condensation.restricted(self._prepared.system.unknowns(known.solve_result.u))
-        kind = kind_of(self.problem, found)
+        kind = kind_of(problem, found)
         return StationaryPoint(x=found, energy=known.examination.energy, kind=kind, isolated=True)
 
     def _refined(

@@ -54,7 +54,7 @@ class Wanted:
         energies: the unit of energies in reports.
         curved: the curved laws, by which cells are decided and points are made exact; None where no law is curved, one
             acts on a length, or the lowest is wanted.
-        exact: makes a point near an equilibrium exact where laws act on lengths; None where there is none near it.
+        exact: makes a point near an equilibrium exact; None where there is none near it. Not for curved laws.
     """
 
     lowest: bool = False

@@ -20,6 +20,8 @@ SIDES = 2.1
 """How often the gap counts the difference of energies of laws and their polylines: on both sides, and some more."""
 OWN_GAP = 0.05
 """The least share of the gap that a search may leave where laws are curved."""
+ROUNDING = 1e-11
+"""Energies that differ by less than this share of their parts are those of one point."""
 FALLS = "no lowest energy: it falls without limit as the load moves a body away"
 """What is told where this is known."""
 
@@ -50,7 +52,7 @@ def lowest(task: Task) -> Found:
             task.keep(lambda: _left_of_lowest(search))
 
     search.run(task.stop, tell)
-    return _proof(search, task.wanted.gap)
+    return _proof(search, task.wanted)
 
 
 def _no_lowest(reason: str, boxes: int = 0) -> Found:
@@ -98,17 +100,11 @@ def begun(
     return Start(x=search.x, energy=search.upper, low=low, high=high)
 
 
-def _proof(search: LowestSearch, wanted: float) -> Found:
+def _proof(search: LowestSearch, wanted: Wanted) -> Found:
     """What a search for the lowest energy knows; curved laws are worse by what their polylines may differ."""
-    problem, now = search.problem, search.progress()
-    point = StationaryPoint(
-        x=search.x,
-        energy=search.upper + problem.error,
-        kind=kind_of(problem, search.x),
-        isolated=True,
-    )
+    problem, now, point = search.problem, search.progress(), _lowest_point(search, wanted)
     lower = now.lower - problem.error
-    proven = search.proven and 2.0 * problem.error <= (wanted - search.gap) * abs(search.upper)
+    proven = search.proven and 2.0 * problem.error <= (wanted.gap - search.gap) * abs(search.upper)
     left = {} if search.proven else _left_of_lowest(search)
     open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
     return Found(
@@ -120,6 +116,16 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
         reason="the lowest energy, proven" if proven else _open_in_words(open_gap, now.waiting),
         left=left,
     )
+
+
+def _lowest_point(search: LowestSearch, wanted: Wanted) -> StationaryPoint:
+    """The lowest point found; a descent ends where energies are equal to rounding, so polylines are balanced."""
+    problem, x = search.problem, search.x
+    if wanted.exact is not None and not (problem.error or len(problem.lengths)):
+        exact = wanted.exact(x)
+        if exact is not None and abs(exact.energy - search.upper) <= ROUNDING * problem.energy_size(x):
+            return exact
+    return StationaryPoint(x=x, energy=search.upper + problem.error, kind=kind_of(problem, x), isolated=True)
 
 
 def _left_of_lowest(search: LowestSearch) -> Saved:
