@@ -20,6 +20,7 @@ from ..workflow import certified, finish
 from .condensed_form import scalar_problem
 from .curved_laws import CurvedLaws
 from .found import Found, Keep, Saved, Wanted, forget
+from .length_kinds import kind_of
 from .point_list import StationaryPoint
 from .progress_words import Unit
 from .scalar_problem import ScalarProblem
@@ -92,12 +93,14 @@ class Equilibria:
             lowest=lowest,
             gap=gap,
             bounded=self._prepared.solvability.state == "held",
+            falls=self._prepared.solvability.state == "metastable",
+            exact=self._exact,
             energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
         )
         if not lowest and saved is None and (only := self._only()) is not None:
             return only
         with self._prepared.timer("solve"):
-            if self.problem.error and lowest:
+            if self.problem.error and lowest and not wanted.falls:
                 wanted = self._refined(self.problem, wanted, stop, report)
             elif self.problem.error and not len(self.problem.lengths):
                 condensed = self._condensation.problem
@@ -118,6 +121,26 @@ class Equilibria:
         point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER, isolated=True)
         reason = f"the only equilibrium, proven: {only.why}"
         return Found(points=(point,), complete=True, lower_bound=energy, proven=True, nodes=0, reason=reason)
+
+    def _exact(self, x: Array) -> StationaryPoint | None:
+        """The equilibrium near a point, where laws are polylines or act on lengths. Collective.
+
+        Args:
+            x: the point, (n,).
+        """
+        assert self.problem is not None
+        if len(self.problem.lengths):
+            return self._solved(self.problem, x)
+        return CurvedLaws(near=self.problem, problem=self._condensation.problem).point(x)
+
+    def _solved(self, problem: ScalarProblem, x: Array) -> StationaryPoint | None:
+        """The certified equilibrium of the whole bodies that the solver finds from a point. Collective."""
+        known = self.solution(StationaryPoint(x=x, energy=np.nan, kind=Kind.UNDECIDED, isolated=True))
+        if not known.converged or known.solve_result is None or known.examination is None:
+            return None
+        found = self._condensation.restricted(self._prepared.system.unknowns(known.solve_result.u))
+        kind = kind_of(problem, found)
+        return StationaryPoint(x=found, energy=known.examination.energy, kind=kind, isolated=True)
 
     def _refined(
         self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]

@@ -49,18 +49,22 @@ class Wanted:
         lowest: the lowest energy with a proof; else all equilibria.
         gap: relative gap that the proof of the lowest may leave.
         bounded: whether the energy is known to be bounded from below.
+        falls: whether it is known to fall without limit, as a body moves away.
         start: where the lowest is, as far as that is known.
         energies: the unit of energies in reports.
         curved: the curved laws, by which cells are decided and points are made exact; None where no law is curved, one
             acts on a length, or the lowest is wanted.
+        exact: makes a point near an equilibrium exact; None where there is none near it. Not for curved laws.
     """
 
     lowest: bool = False
     gap: float = 1e-8
     bounded: bool = True
+    falls: bool = False
     start: Start | None = None
     energies: Unit = field(default_factory=Unit)
     curved: CurvedLaws | None = None
+    exact: Callable[[Array], StationaryPoint | None] | None = None
 
 
 def forget(state: Callable[[], Saved]) -> None:

@@ -163,7 +163,7 @@ def _without_proof(task: Task) -> Found:
     below = bounded(task, [])
     known = [] if below is None else [below.x]
     if (curved := task.wanted.curved) is None:
-        points = tuple(systematic.near_stationary(problem, known, task.stop))
+        points = tuple(systematic.near_stationary(problem, known, task.stop, task.wanted.exact))
     else:
         points = tuple(systematic.near_stationary(curved.near, known, task.stop, curved.point))
     if not points and (cells := _cells_of_none(task)):

@@ -16,6 +16,9 @@ from .progress_words import Clock, counted, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .search_task import Task, stacked
 
+FALLS = "no lowest energy: it falls without limit as the load moves a body away"
+"""What is told where this is known."""
+
 
 def lowest(task: Task) -> Found:
     """The lowest energy, with a proof where it comes to its end.
@@ -24,6 +27,8 @@ def lowest(task: Task) -> Found:
         task: the search.
     """
     problem, saved = task.problem, task.saved
+    if task.wanted.falls:
+        return _no_lowest(FALLS)
     search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted))
     try:
         if saved is None:
@@ -31,7 +36,7 @@ def lowest(task: Task) -> Found:
         else:
             search.resume(zip(saved["low"], saved["high"], saved["weights"], strict=True), saved["x"][0])
     except SolverError as error:
-        return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=search.boxes, reason=str(error))
+        return _no_lowest(str(error), search.boxes)
 
     clock = Clock()
 
@@ -41,7 +46,11 @@ def lowest(task: Task) -> Found:
             task.keep(lambda: _left_of_lowest(search))
 
     search.run(task.stop, tell)
-    return _proof(search, task.wanted.gap)
+    return _proof(search, task.wanted)
+
+
+def _no_lowest(reason: str, boxes: int = 0) -> Found:
+    return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=boxes, reason=reason)
 
 
 def _own_gap(problem: ScalarProblem, wanted: Wanted) -> float:
@@ -85,17 +94,11 @@ def begun(
     return Start(x=search.x, energy=search.upper, low=low, high=high)
 
 
-def _proof(search: LowestSearch, wanted: float) -> Found:
+def _proof(search: LowestSearch, wanted: Wanted) -> Found:
     """What a search for the lowest energy knows; curved laws are worse by what their polylines may differ."""
-    problem, now = search.problem, search.progress()
-    point = StationaryPoint(
-        x=search.x,
-        energy=search.upper + problem.error,
-        kind=kind_of(problem, search.x),
-        isolated=True,
-    )
+    problem, now, point = search.problem, search.progress(), _lowest_point(search, wanted)
     lower = now.lower - problem.error
-    proven = search.proven and 2.0 * problem.error <= (wanted - search.gap) * abs(search.upper)
+    proven = search.proven and 2.0 * problem.error <= (wanted.gap - search.gap) * abs(search.upper)
     left = {} if search.proven else _left_of_lowest(search)
     open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
     return Found(
@@ -107,6 +110,17 @@ def _proof(search: LowestSearch, wanted: float) -> Found:
         reason="the lowest energy, proven" if proven else _open_in_words(open_gap, now.waiting),
         left=left,
     )
+
+
+def _lowest_point(search: LowestSearch, wanted: Wanted) -> StationaryPoint:
+    """The lowest point found; a descent ends where energies are equal to rounding, so polylines are balanced."""
+    problem, x = search.problem, search.x
+    if wanted.exact is not None and not (problem.error or len(problem.lengths)):
+        exact = wanted.exact(x)
+        allowed = problem.thresholds.lowest.one_point * problem.energy_size(x)
+        if exact is not None and abs(exact.energy - search.upper) <= allowed:
+            return exact
+    return StationaryPoint(x=x, energy=search.upper + problem.error, kind=kind_of(problem, x), isolated=True)
 
 
 def _left_of_lowest(search: LowestSearch) -> Saved:
@@ -127,6 +141,8 @@ def bounded(task: Task, points: list[Array]) -> LowestSearch | None:
         task: the search.
         points: that are known.
     """
+    if task.wanted.falls:
+        return None
     search = LowestSearch(problem=task.problem, gap=task.wanted.gap)
     try:
         search.start(points)

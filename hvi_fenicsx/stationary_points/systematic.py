@@ -70,11 +70,15 @@ def near_stationary(
         problem: the problem.
         known: points of low energy, each (n,).
         stop: asked before each attempt.
-        exact: makes points of polylines those of curved laws; None: a solver is to make points exact.
+        exact: makes points near stationary ones exact, such as those of polylines near curved laws; None: they are
+            taken as they are.
     """
-    points, same = list[StationaryPoint](), problem.thresholds.systematic.same
+    points, near, same = list[StationaryPoint](), list[Array](), problem.thresholds.systematic.same
     for x in itertools.chain(known, candidates(problem, points, stop)):
-        point = None if _far(problem, x) else _as_it_is(problem, x) if exact is None else exact(x)
+        if _far(problem, x) or any(_same(y, x, same) for y in near):
+            continue
+        near.append(x)
+        point = _as_it_is(problem, x) if exact is None else exact(x)
         if point is not None and not any(_same(p.x, point.x, same) for p in points):
             points.append(point)
     return sorted(points, key=lambda p: p.energy)

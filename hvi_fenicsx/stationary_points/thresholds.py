@@ -217,6 +217,7 @@ class LowestThresholds:
         widened: relative widening of radii, for rounding.
         share_used: share of the allowed gap that a search uses: so that rounding lifts no told gap above it.
         rounding: energies that differ by less than this share of their parts are equal.
+        one_point: energies that differ by less than this share of their parts are those of one point.
         most_boxes: boxes that are bounded for the gap where what was asked for is not proven.
         sides: how often the gap counts the difference of energies of laws and their polylines: on both sides, and some
             more.
@@ -236,6 +237,7 @@ class LowestThresholds:
     widened: float = 1e-9
     share_used: float = 0.999
     rounding: float = 1e-13
+    one_point: float = 1e-11
     most_boxes: int = 50
     sides: float = 2.1
     own_gap: float = 0.05

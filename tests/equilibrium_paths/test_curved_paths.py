@@ -437,6 +437,28 @@ def first_fold(follower: Follower) -> float:
     return next(s.factor for s in follower.states() if s.event is Event.FOLD)
 
 
+@pytest.mark.parametrize("pull", [-0.9, 0.9])
+def test_a_bound_that_is_not_reached_changes_no_path_with_memory(pull: float) -> None:
+    law = create("chks", graph([(0, 0), (0.8, 1), (2, 0.5)]), epsilon=0.1)
+    ends = []
+    for lower in (-0.5, -np.inf):
+        given = problem([[1.0]], [pull], bonds(law, [0]), lower=lower)
+        _, states = path(given, programme=(1.0, 0.3, 1.0), remember=(0,))
+        assert largest_distance(given, states, (0,)) < 1e-8
+        ends.append([(s.factor, s.x[0], s.dissipated) for s in states if s.event in (Event.TURN, Event.END)])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9, atol=1e-9)
+
+
+def test_nothing_is_dissipated_before_a_smoothed_bond_moves() -> None:
+    """A kink at rest that is smoothed has an energy there, which is no loss; what is lost then balances the work."""
+    law = create("chks", graph([(0, 0), (0, 1), (2, 0)]), epsilon=0.1)
+    given = problem([[1.0]], [1.5], bonds(law, [0]))
+    _, states = path(given, remember=(0,))
+    assert states[0].dissipated == 0.0
+    last = states[-1]
+    assert last.work == pytest.approx(last.energy + last.factor * 1.5 * last.x[0] + last.dissipated, rel=1e-8)
+
+
 @pytest.mark.parametrize(
     "law",
     [

@@ -89,6 +89,17 @@ def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(
     assert "equilibria" not in json.loads((out / "summary.json").read_text())
 
 
+def test_the_lowest_equilibrium_is_certified_where_a_descent_ends_slowly() -> None:
+    """Laws that fall nearly as steeply as the body is stiff: each step of a descent leaves a share of the rest."""
+    law = {"law": "graph", "points": [[0, 0], [3.691e-4, 8.963e7], [2.889e-3, 3.702e7]]}
+    table = model(3, 3.333e8, 2.218e8, friction=law, gap=6.904e-4)
+    table["domain"] = {"shape": "rectangle", "size": [1.0, 0.272], "cells": [3, 2]}
+    table["material"] = {"model": "plane_strain", "youngs_modulus": 4.507e10, "poisson_ratio": 0.0}
+    found = hvi.equilibria(hvi.Scene.model_validate(table), lowest=True)
+    assert found.proven
+    assert found.solutions[0].converged
+
+
 class Killed(BaseException):
     """Stands for SIGKILL, after which nothing is tidied up."""
 

@@ -340,6 +340,28 @@ def test_of_such_laws_equilibria_are_found_without_a_proof_that_these_are_all() 
     assert min(energies) == pytest.approx(lowest.solutions[0].energy, rel=1e-8)
 
 
+def test_a_block_that_sticks_and_could_slide_off_has_one_equilibrium_and_no_lowest_energy() -> None:
+    """Bonds that break without a rest, and a load that they still bear: most descents run off, and end anywhere."""
+    law = {"law": "graph", "points": [[0, 0], [0, 1.2e4], [4e-5, 0]]}
+    scene = hvi.Scene.model_validate(
+        {
+            "domain": {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [1, 1, 1]},
+            "material": {"model": "three_dimensional", "youngs_modulus": 2e9, "poisson_ratio": 0.3},
+            "boundary": {
+                "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
+                "pull": {"on": "top", "traction": [1e3, 500.0, -1.2e3]},
+            },
+        }
+    )
+    found = hvi.equilibria(scene)
+    assert found.reason.startswith("1 found")
+    assert [s.energy for s in found.solutions] == pytest.approx([hvi.solve(scene).energy], rel=1e-9)
+    assert (found.kinds, found.lower_bound) == (("minimiser",), None)
+    lowest = hvi.equilibria(scene, lowest=True)
+    assert (lowest.proven, lowest.lower_bound, len(lowest.solutions)) == (False, None, 0)
+    assert "falls without limit" in lowest.reason
+
+
 def test_where_the_energy_is_convex_the_only_equilibrium_is_proven_at_once() -> None:
     """Friction that never weakens; the search for the lowest energy knows nothing of it, and ends there too."""
     table = space(2)

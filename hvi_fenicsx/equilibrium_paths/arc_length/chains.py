@@ -31,7 +31,7 @@ def from_zero(found: tuple[Segment, ...], laws: Sequence[VertexLaw]) -> tuple[Se
 
 
 def fresh(segment: Segment, laws: Sequence[VertexLaw]) -> Segment:
-    """A piece that a curved law with memory has not passed is fresh, whatever its chord.
+    """A piece that a curved law with memory has not passed is fresh, whatever its chord; one through 0 goes both ways.
 
     Args:
         segment: the piece, or another segment.
@@ -39,7 +39,10 @@ def fresh(segment: Segment, laws: Sequence[VertexLaw]) -> Segment:
     """
     if segment.rise or segment.outward:
         return segment
-    middle = between(segment.x + segment.low, segment.x + segment.high)
+    first, last = segment.x + segment.low, segment.x + segment.high
+    if first < 0.0 < last:
+        return segment
+    middle = between(first, last)
     for law in laws:
         ends = (-np.inf, np.inf) if law.passed is None else law.passed.displacements
         if law.curved and not ends[0] < middle < ends[1]:

@@ -122,7 +122,8 @@ class VertexLaw:
 
     def _lost_behind(self, passed: Passed) -> float:
         ends, tractions = np.array(passed.displacements), np.array(passed.tractions)
-        lost = self.law.value(self.sign * ends) - 0.5 * ends * tractions
+        taken = self.law.value(self.sign * ends) - self.law.value(np.zeros(1))  # a smoothed law is not zero at rest
+        lost = taken - 0.5 * ends * tractions
         return self.weight * float(lost[1] if self.law.even else lost.sum())
 
     def memory(self) -> list[float]:
