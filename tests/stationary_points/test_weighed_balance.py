@@ -133,7 +133,7 @@ def test_a_cell_behind_the_drops_has_no_point() -> None:
 
 def test_a_test_that_is_cut_short_excludes_less_and_loses_no_point() -> None:
     """As where a signal ends the search: what is left of each cell is kept."""
-    problem = condensed_floor(6)
+    problem = condensed_floor(4)
     low = np.maximum(problem.lower, -20.0)
     cell = fresh_box(low, np.maximum(np.full(problem.size, -5.0), low + 1.0), np.zeros(problem.size))
     assert BalanceTest(Relaxation(problem)).look(cell, lambda: True) is not None
