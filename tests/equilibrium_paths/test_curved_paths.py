@@ -449,6 +449,20 @@ def test_a_bound_that_is_not_reached_changes_no_path_with_memory(pull: float) ->
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("rounding", [1e-31, -1e-31])
+def test_a_stiffness_that_is_rounding_is_no_unit_of_forces(rounding: float) -> None:
+    """A block rests on a floor and slides on a smoothed bond: what presses it meets no stiffness but the floor's."""
+    law = create("log_exp", graph([(0, 0), (0, 1), (2, 0.5)]), epsilon=0.05)
+    found = []
+    for across in (rounding, 0.0):
+        given = problem(np.diag([1.0, across]), [0.9, -1.0], bonds(law, [0]), lower=[-np.inf, 0])
+        follower, states = path(given)
+        assert follower.end is End.REACHED
+        assert largest_imbalance(given, states) < 1e-8
+        found.append([(s.factor, *s.x) for s in states])
+    np.testing.assert_allclose(*found, rtol=1e-10)
+
+
 def test_nothing_is_dissipated_before_a_smoothed_bond_moves() -> None:
     """A kink at rest that is smoothed has an energy there, which is no loss; what is lost then balances the work."""
     law = create("chks", graph([(0, 0), (0, 1), (2, 0)]), epsilon=0.1)

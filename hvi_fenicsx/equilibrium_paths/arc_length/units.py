@@ -10,6 +10,9 @@ from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from .vertex_laws import VertexLaw
 
+ROUNDING = 1e-12
+"""A stiffness below this share of the largest is none: the unknown moves with a body that is free."""
+
 
 def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence[Integers]) -> tuple[float, Array]:
     """The unit of displacements, and those of forces by unknown, (n,).
@@ -20,7 +23,8 @@ def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence
         groups: unknowns that share one unit.
     """
     diagonal = np.diag(problem.stiffness).copy()
-    diagonal[diagonal <= 0.0] = np.max(diagonal, initial=0.0) or 1.0
+    largest = float(np.max(diagonal, initial=0.0)) or 1.0
+    diagonal[diagonal <= ROUNDING * largest] = largest
     lengths = {law.group: law.law.length_scale for law in laws}.values()
     bounds = np.abs(np.concatenate([problem.lower, problem.upper]))
     elastic = np.max(np.abs(problem.force_rate) / diagonal, initial=0.0)
