@@ -133,6 +133,21 @@ def test_a_body_that_nothing_touches_falls_where_the_exact_path_has_it(seed: int
     assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
 
 
+@pytest.mark.parametrize("remember", [(), (0,)])
+def test_a_curved_law_presses_on_its_bound_with_its_own_traction(remember: tuple[int, ...]) -> None:
+    """By hand: a spring of stiffness 3, pulled by 3 λ, touches a bound at 0.4 and leaves it at λ = 0.4 + t(0.4)/3."""
+    law = Exponential(1.0, 0.1, 0.5)
+    given = problem(3.0, -3.0, bonds(law, 0), lower=-0.4)
+    follower, states = path(given, programme=(1.0, 0.1), remember=remember)
+    traction = float(law.right(np.array([0.4]))[0])
+    touched = 0.4 + traction / 3.0
+    factors = {event: next(s.factor for s in states if s.event is event) for event in (Event.CONTACT, Event.RELEASE)}
+    assert follower.end is End.REACHED
+    assert list(factors.values()) == pytest.approx([touched, touched], rel=1e-9)
+    slope = traction / 0.4
+    assert states[-1].x[0] == pytest.approx(-0.3 / (3.0 + slope) if remember else 0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
 def test_a_body_that_rolls_on_its_floor_has_no_first_state_and_is_not_said_to_come_off(kind: type[Follower]) -> None:
     """A beam of three points that rests on its middle one, where the load is: in balance at any inclination."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...laws import Mixity, Superpotential, TractionGraph
-from ...system.condensed_problem import Bonds, CondensedProblem
+from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
 from ..graphs import Passed, graph_of, remembering, turned, was_passed
 
@@ -26,6 +26,7 @@ class VertexLaw:
         law: j.
         polyline: the traction graph of the law; None where it is curved.
         weight: lumped area.
+        bounds: finite bounds of its coordinate; there chords of a curved law have its traction.
         passed: what it remembers, along its coordinate; None without memory.
         mixity: how the energy of separation depends on the mode; None: it does not.
         lost: the energy that is lost for good, and the memory of which it is; None: not asked for yet.
@@ -39,6 +40,7 @@ class VertexLaw:
     law: Superpotential
     polyline: TractionGraph | None
     weight: float
+    bounds: tuple[float, ...]
     passed: Passed | None
     mixity: Mixity | None = None
     lost: tuple[Passed, float] | None = None
@@ -56,7 +58,7 @@ class VertexLaw:
 
     @property
     def _ends(self) -> Array:
-        return np.zeros(0) if self.passed is None else np.array(self.passed.displacements)
+        return np.array([*self.bounds, *(() if self.passed is None else self.passed.displacements)])
 
     def traction(self, x: Array, side: str) -> Array:
         """The limit of the traction along the coordinate, with memory, (m,).
@@ -165,12 +167,13 @@ def vertex_laws(problem: CondensedProblem, remember: Collection[int]) -> list[Ve
     return [
         law
         for number, group in enumerate(problem.bonds)
-        for law in _of_group(number, group, remembers=number in remember and not group.law.is_linear)
+        for law in _of_group(problem, number, remembers=number in remember and not group.law.is_linear)
     ]
 
 
-def _of_group(number: int, group: Bonds, *, remembers: bool) -> Iterator[VertexLaw]:
-    graph = graph_of(group.law)
+def _of_group(problem: CondensedProblem, number: int, *, remembers: bool) -> Iterator[VertexLaw]:
+    group = problem.bonds[number]
+    graph, ends = graph_of(group.law), np.column_stack([problem.lower, problem.upper])
     for row, weight in enumerate(group.weights):
         unknowns, sign = tuple(int(i) for i in group.unknowns[row, :]), float(np.sign(group.signs[row, 0]))
         yield VertexLaw(
@@ -182,6 +185,7 @@ def _of_group(number: int, group: Bonds, *, remembers: bool) -> Iterator[VertexL
             law=group.law,
             polyline=graph,
             weight=float(weight),
+            bounds=() if group.radial else tuple(float(x) for x in ends[unknowns[0]] if np.isfinite(x)),
             passed=Passed() if remembers else None,
             mixity=group.mixity,
         )
