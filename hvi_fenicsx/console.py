@@ -14,6 +14,7 @@ from .load_path import LoadPath
 from .preparation import Preparation
 from .problem import effect_summary
 from .rigid import AnyBody, LoadFactors, Mode
+from .runtime.percent import percent
 from .scene import PathTable
 from .solution import Solution
 from .solvers import nested_iteration, registry
@@ -184,15 +185,15 @@ def error(estimate: Estimate) -> str:
     """One line on the estimated error and its parts."""
     norm = estimate.energy_norm or 1.0
     parts = {name: getattr(estimate, name) / norm for name in ("discretisation", "smoothing", "algebraic")}
-    split = ", ".join(f"{name} {percent(value)}" for name, value in parts.items())
-    return f"estimated error {percent(estimate.total / norm)} in the energy norm ({split})"
+    split = ", ".join(f"{name} {_part(value)}" for name, value in parts.items())
+    return f"estimated error {_part(estimate.total / norm)} in the energy norm ({split})"
 
 
-def percent(value: float) -> str:
-    """A ratio as a percentage."""
+def _part(value: float) -> str:
+    """A ratio as a percentage, where it is not too small for one."""
     if not math.isfinite(value):
         return "unknown"
-    return f"{100 * value:.2g} %" if value >= 1e-5 or value == 0 else f"{value:.0e}"
+    return percent(value) if value >= 1e-5 or value == 0 else f"{value:.0e}"
 
 
 def accuracy(reached: AccuracyResult) -> Iterator[str]:
@@ -202,17 +203,17 @@ def accuracy(reached: AccuracyResult) -> Iterator[str]:
         yield f"accuracy not reached: {reached.why}"
     if not steps:
         return
-    last, asked = steps[-1], "" if goal.accuracy is None else f" ({percent(goal.accuracy)} was asked for)"
+    last, asked = steps[-1], "" if goal.accuracy is None else f" ({_part(goal.accuracy)} was asked for)"
     what = quantities.find(goal.quantity).description
     epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
     yield (
-        f"accuracy: {percent(last.error)}{asked} of {what}, at degree {reached.degree} by {len(steps)} meshes up to "
+        f"accuracy: {_part(last.error)}{asked} of {what}, at degree {reached.degree} by {len(steps)} meshes up to "
         f"{last.dofs:,} unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
     )
     if reached.more is not None:
         more = reached.more
         yield (
-            f"{percent(more.accuracy)} would take about {more.dofs:.1e} unknowns, {more.seconds:.3g} s and "
+            f"{_part(more.accuracy)} would take about {more.dofs:.1e} unknowns, {more.seconds:.3g} s and "
             f"{more.memory / 1024:.2g} GB"
         )
 

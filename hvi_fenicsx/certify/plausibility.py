@@ -11,6 +11,7 @@ from dolfinx import fem
 from ..effects import Direction
 from ..problem.problem import Problem
 from ..runtime.mpi import largest, total
+from ..runtime.percent import percent
 from ..typing import Array
 from . import scene_keys
 from .certificate import Examination
@@ -53,7 +54,7 @@ def of_estimate(errors: Estimate) -> tuple[str, ...]:
     if not errors.coarse:
         return ()
     share = ratio(errors.discretisation, errors.energy_norm)
-    size = f"{100 * share:.2g} % of the solution" if np.isfinite(share) else "as large as the solution"
+    size = f"{percent(share)} of the solution" if np.isfinite(share) else "as large as the solution"
     return (
         f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "
         "are solved and certified; refine the mesh",
@@ -155,7 +156,7 @@ def _wide_smoothing(problem: Problem, law: LawState, thresholds: PlausibilityThr
         most, of_peak = (largest(comm, float(np.max(v, initial=0.0))) for v in (away * term.multiplier, away / peak))
         yield (
             f"{scene_keys.of_law(problem, term)}: smoothing changes the traction by up to "
-            f"{most * problem.scales.stress:.3g} N/m² ({100 * of_peak:.2g} % of the law's peak), "
+            f"{most * problem.scales.stress:.3g} N/m² ({percent(of_peak)} of the law's peak), "
             f"and by more than {100 * limit:.0f} % on "
-            f"{100 * share:.2g} % of the part; is a smaller ε meant? (epsilon_absolute is in N/m)"
+            f"{percent(share)} of the part; is a smaller ε meant? (epsilon_absolute is in N/m)"
         )

@@ -21,6 +21,7 @@ from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
 from ..runtime import log, notebook
 from ..runtime.argument_checks import require_kind, require_path
+from ..runtime.percent import percent
 from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
@@ -188,7 +189,7 @@ class ModelSolution(Solution):
             rows.append((f"obstacle of {self.obstacle.part}", str(self.obstacle)))
         if self.estimate is not None:
             part = self.estimate.total / (self.estimate.energy_norm or 1.0)
-            rows.append(("estimated error", f"{100 * part:.2g} % in the energy norm"))
+            rows.append(("estimated error", f"{percent(part)} in the energy norm"))
         return rows + [("warning", warning) for warning in self.warnings]
 
     def __repr__(self) -> str:

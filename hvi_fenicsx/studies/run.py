@@ -23,7 +23,7 @@ from .errors import NoReferenceError
 from .plan import Plan, make
 from .progress import StudyProgress
 from .runner import PointRun, Runner, watched
-from .sentences import headlines, percent, sentences, share_of_epsilon
+from .sentences import headlines, of_error, sentences, share_of_epsilon
 from .setting import Setting
 from .store import Store, write_json
 from .study import Study, evaluate
@@ -142,7 +142,7 @@ def write(study: Study, folder: Path) -> None:
 def said(study: Study) -> list[str]:
     """What a study says, in sentences."""
     known = [(q, study.certain[q].error) for q in headlines(study.rows)]
-    parts = [f"{percent(e)} in {ERROR_NORMS[q].name}" for q, e in known if e is not None]
+    parts = [f"{of_error(e)} in {ERROR_NORMS[q].name}" for q, e in known if e is not None]
     sure = f"itself uncertain by {', '.join(parts)}" if parts else "on the only mesh there is"
     reference = f"{study.reference.text} ({study.reference.dofs or 0:,} unknowns)"
     return [

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from ..errors import ExitCode
+from ..runtime.percent import percent
 from .certainty import Certainty
 from .error_norms import ERROR_NORMS
 from .table import Row, claimed_error, front
@@ -69,13 +70,13 @@ def own_setting(own: Row, exact: Row, quantity: str) -> str:
     error = own.error(quantity)
     if error is None:
         return f"{setting} was not measured: {own.reason}."
-    text = f"{setting} takes {seconds(own.seconds)} and is {percent(error)} off in {ERROR_NORMS[quantity].name}"
+    text = f"{setting} takes {seconds(own.seconds)} and is {of_error(error)} off in {ERROR_NORMS[quantity].name}"
     bare = exact.error(quantity)
     if own.smoothing is None or bare is None:
         return f"{text}."
     share = share_of_epsilon(own, exact, quantity)
     text += f", {_how_much(share)}" if share is not None else ""
-    return f"{text}. The exact law on the same mesh takes {seconds(exact.seconds)} and is {percent(bare)} off."
+    return f"{text}. The exact law on the same mesh takes {seconds(exact.seconds)} and is {of_error(bare)} off."
 
 
 def share_of_epsilon(own: Row, exact: Row, quantity: str) -> float | None:
@@ -119,7 +120,7 @@ def targets(rows: Sequence[Row], quantity: str, certain: Certain, thresholds: Th
         if cheapest is None:
             missed = [_missed(rows, quantity, target, certain)]
             break
-        reached.setdefault(cheapest.point, (cheapest, []))[1].append(percent(target))
+        reached.setdefault(cheapest.point, (cheapest, []))[1].append(of_error(target))
     parts = [f"{', '.join(t)} for {seconds(r.seconds)} ({r.text})" for r, t in reached.values()]
     return f"In {ERROR_NORMS[quantity].name}: {'; '.join([*parts, *missed])}."
 
@@ -127,10 +128,10 @@ def targets(rows: Sequence[Row], quantity: str, certain: Certain, thresholds: Th
 def _missed(rows: Sequence[Row], quantity: str, target: float, certain: Certain) -> str:
     own = certain[quantity].error
     if own is not None and own > target:
-        return f"{percent(target)} cannot be claimed: the reference itself is uncertain by {percent(own)}"
+        return f"{of_error(target)} cannot be claimed: the reference itself is uncertain by {of_error(own)}"
     errors = [(r.error(quantity), r) for r in rows]
     best, at = min(((e, r) for e, r in errors if e is not None), key=lambda pair: pair[0])
-    return f"{percent(target)} is not reached here: the best is {percent(best)} for {seconds(at.seconds)} ({at.text})"
+    return f"{of_error(target)} is not reached here: the best is {of_error(best)} for {seconds(at.seconds)} ({at.text})"
 
 
 def slope(points: Sequence[tuple[float, float]]) -> float | None:
@@ -217,12 +218,12 @@ def adaptive_meshes(rows: Sequence[Row], certain: Certain) -> Iterator[str]:
     found = sorted(((e, r) for e, r in known if r.adaptive), key=lambda pair: -pair[0])
     if not found:
         return
-    parts = [f"{percent(e)} with {_unknowns(r)}" for e, r in found]
+    parts = [f"{of_error(e)} with {_unknowns(r)}" for e, r in found]
     best = found[-1][0]
     uniform = [r for e, r in known if not r.adaptive and e <= best]
     fewest = min(uniform, key=lambda r: (r.dofs or 0, r.seconds or 0.0), default=None)
     like = _unknowns(fewest) if fewest else "more unknowns than any measured here has"
-    yield f"Adaptive meshes: {', '.join(parts)} in the energy norm; a uniform mesh needs {like} for {percent(best)}."
+    yield f"Adaptive meshes: {', '.join(parts)} in the energy norm; a uniform mesh needs {like} for {of_error(best)}."
 
 
 def _unknowns(found: Row) -> str:
@@ -258,12 +259,9 @@ def failures(rows: Sequence[Row]) -> Iterator[str]:
         yield f"{len(bad)} of {len(rows)} points ended without a certified solution; study.csv says why."
 
 
-def percent(value: float) -> str:
+def of_error(value: float) -> str:
     """A relative error as a percentage, to two digits."""
-    scaled = 100.0 * value
-    if scaled < 1e-3:
-        return "below 0.001 %"
-    return f"{scaled:.0f} %" if scaled >= 10.0 else f"{scaled:.2g} %"
+    return "below 0.001 %" if value < 1e-5 else percent(value)
 
 
 def seconds(value: float | None) -> str:
