@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
@@ -18,10 +19,13 @@ from .step import FACTOR
 from .thresholds import DEFAULT, ExactThresholds
 from .tracer import Tracer
 
-AWAY = "nothing holds the body at rest"
-UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
-NEUTRAL = "nothing holds the body at rest, and where a small load takes it, it may still move without a force"
-"""Why a path does not begin."""
+
+class Nowhere(Enum):
+    """Why a body that nothing holds at rest has no first state."""
+
+    AWAY = "nothing holds the body at rest"
+    UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
+    NEUTRAL = "nothing holds the body at rest, and where a small load takes it, it may still move without a force"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,9 +68,10 @@ def at_rest(
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
-        settled, reason = _settled(bonds, replace(problem, force=held, force_rate=rate))
-        if settled is None:
-            return Beginning(cells=None, memory=bonds.memory, reason=reason, escapes=reason == AWAY)
+        settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
+        if isinstance(settled, Nowhere):
+            off = settled is Nowhere.AWAY
+            return Beginning(cells=None, memory=bonds.memory, reason=settled.value, escapes=off)
         cells = settled
     if rate is not away:
         return Beginning(cells=cells, memory=bonds.memory)
@@ -83,7 +88,7 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
     return np.where((problem.lower == problem.upper), wanted, found)
 
 
-def _settled(bonds: BondTable, problem: CondensedProblem) -> tuple[Cells | None, str]:
+def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | Nowhere:
     """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; or why nowhere."""
     chains = [bonds.chain(i) for i in range(problem.size)]
     first = bonds.thresholds.first_load
@@ -91,14 +96,14 @@ def _settled(bonds: BondTable, problem: CondensedProblem) -> tuple[Cells | None,
     start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     landing = Descent(bonds, load).land(start, start)
     if not landing.found:
-        return None, AWAY if landing.escapes else UNKNOWN
+        return Nowhere.AWAY if landing.escapes else Nowhere.UNKNOWN
     cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
     equations = problem.elastic, problem.force, problem.force_rate
     tracer = Tracer(*equations, cells, first, heading=-1, thresholds=bonds.thresholds)
     while True:
         step = tracer.advance(0.0)
         if step.variable is None:
-            return None, UNKNOWN
+            return Nowhere.UNKNOWN
         if step.variable == FACTOR:
-            return (None, NEUTRAL) if tracer.cells.is_singular() else (tracer.cells, "")
+            return Nowhere.NEUTRAL if tracer.cells.is_singular() else tracer.cells
         go_on(tracer, bonds, step)

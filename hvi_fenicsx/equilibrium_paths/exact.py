@@ -19,13 +19,13 @@ from .descent import Descent, Landing
 from .onward import Way, chosen, ways_on
 from .passing import Passing, classify, go_on
 from .placing import place
-from .programme import Follower
+from .programme import Follower, why_not_loaded
 from .rounds import Round, Rounds
 from .snap import snap
 from .state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from .step import FACTOR
 from .tracer import Tracer
-from .watch import Stopped, Watch
+from .watch import Watch
 
 
 class ExactFollower(Follower):
@@ -91,12 +91,7 @@ class ExactFollower(Follower):
         options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
         beginning = replace(start, constant=None)
         follower = ExactFollower(constant, options, watch=self._watcher, beginning=beginning)
-        for _ in follower.states():
-            pass
-        if follower.end is End.INTERRUPTED:
-            raise Stopped
-        if follower.end is not End.REACHED:
-            reason = f"under the constant loads alone: {follower.reason}"
+        if reason := why_not_loaded(follower):
             off = follower.end is End.ESCAPES
             return Beginning(cells=None, memory=follower.memory, reason=reason, escapes=off)
         return Beginning(cells=follower.tracer.cells, memory=follower.memory)

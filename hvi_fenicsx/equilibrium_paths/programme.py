@@ -152,3 +152,19 @@ class Follower(ABC):
             self._finish(End.ESCAPES, self._not_borne())
         else:
             self._finish(End.LOST, reason)
+
+
+def why_not_loaded(follower: Follower) -> str:
+    """Follow the path of the constant loads to its end; why that is not the whole loads, or nothing.
+
+    Args:
+        follower: of this path.
+
+    Raises:
+        Stopped: the path was asked to stop.
+    """
+    for _ in follower.states():
+        pass
+    if follower.end is End.INTERRUPTED:
+        raise Stopped
+    return "" if follower.end is End.REACHED else f"under the constant loads alone: {follower.reason}"

@@ -111,9 +111,8 @@ class PathRun:
         Raises:
             InputError: on all ranks alike: the path cannot be followed.
         """
-        for one in itertools.takewhile(
-            lambda record: record["event"] != Event.END, known
-        ):  # why it ends is found again
+        # why it ends is found again
+        for one in itertools.takewhile(lambda record: record["event"] != Event.END, known):
             self._take(*records.state(one))
         rows = list(self._rows())
         follower = self._follower(control)

@@ -117,7 +117,7 @@ class Equilibria:
         result, examined, only = known.solve_result, known.examination, known.uniqueness
         if result is None or examined is None or only is None or only.state != "unique":
             return None
-        x, energy = self._condensation.restricted(system.unknowns(result.u)), examined.energy
+        x, energy = self._condensation.restricted(result.u), examined.energy
         point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER, isolated=True)
         reason = f"the only equilibrium, proven: {only.why}"
         return Found(points=(point,), complete=True, lower_bound=energy, proven=True, nodes=0, reason=reason)
@@ -138,7 +138,7 @@ class Equilibria:
         known = self.solution(StationaryPoint(x=x, energy=np.nan, kind=Kind.UNDECIDED, isolated=True))
         if not known.converged or known.solve_result is None or known.examination is None:
             return None
-        found = self._condensation.restricted(self._prepared.system.unknowns(known.solve_result.u))
+        found = self._condensation.restricted(known.solve_result.u)
         kind = kind_of(problem, found)
         return StationaryPoint(x=found, energy=known.examination.energy, kind=kind, isolated=True)
 

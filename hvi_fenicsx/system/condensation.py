@@ -203,14 +203,17 @@ class Condensation:
         unknowns.destroy()
         return found
 
-    def restricted(self, u: PETSc.Vec, factor: float = 1.0) -> Array:
+    def restricted(self, u: fem.Function, factor: float = 1.0) -> Array:
         """The condensed unknowns of a displacement of the whole body, (n,). Collective.
 
         Args:
-            u: the unknowns of the whole body.
+            u: the displacement field.
             factor: λ.
         """
-        return np.asarray(self._interior.kept_values(u)[self._elimination.stay] - factor * self._shift)
+        unknowns = self._system.unknowns(u)
+        kept = self._interior.kept_values(unknowns)
+        unknowns.destroy()
+        return np.asarray(kept[self._elimination.stay] - factor * self._shift)
 
     def load(self, factor: float = 1.0) -> PETSc.Vec:
         """The system's load at a factor, prescribed values in their rows, as :attr:`.System.load`. Collective.

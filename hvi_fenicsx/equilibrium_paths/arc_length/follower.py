@@ -10,11 +10,11 @@ from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..beginning import AWAY
-from ..programme import Follower
+from ..beginning import Nowhere
+from ..programme import Follower, why_not_loaded
 from ..rounds import Round, Rounds
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
-from ..watch import Stopped, Watch
+from ..watch import Watch
 from .curve import Curve
 from .energies import Balance, displacement_rate
 from .equations import Refused
@@ -93,21 +93,17 @@ class ArcLengthFollower(Follower):
             return rest.z
         first = self._options.thresholds.exact.first_load * self._options.programme[0]
         held = self._is_held(first)
-        z, reason = settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=held)
-        if z is None:
-            self._end_before(reason, escapes=reason == AWAY)
+        z = settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=held)
+        if isinstance(z, Nowhere):
+            self._end_before(z.value, escapes=z is Nowhere.AWAY)
+            return None
         return z
 
     def _loaded(self, constant: CondensedProblem) -> Array | None:
         """From rest to the constant loads, as stable as it goes; where the sites are then."""
         options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
         follower = ArcLengthFollower(constant, options, watch=self._watcher)
-        for _ in follower.states():
-            pass
-        if follower.end is End.INTERRUPTED:
-            raise Stopped
-        if follower.end is not End.REACHED:
-            reason = f"under the constant loads alone: {follower.reason}"
+        if reason := why_not_loaded(follower):
             self._end_before(reason, escapes=follower.end is End.ESCAPES)
             return None
         self._sites, self._laws = follower._sites, follower._laws

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..beginning import AWAY, NEUTRAL, UNKNOWN
+from ..beginning import Nowhere
 from ..watch import Watch
 from .curve import Curve
 from .equations import Refused
@@ -19,7 +19,7 @@ from .sites import Sites
 
 def settled(
     problem: CondensedProblem, sites: Sites, z: Array, first: float, lag: Array, watch: Watch, *, held: bool
-) -> tuple[Array | None, str]:
+) -> Array | Nowhere:
     """The coordinates at the factor 0, (n,), or why there are none.
 
     The body moves as an overdamped one until something holds it; then the load is taken off again.
@@ -36,14 +36,14 @@ def settled(
     watch.jumps(first)
     motion = Relaxation(problem, sites, z, problem.load(first), lag, held=held, step=watch.step)
     if not motion.run(np.zeros(len(sites))) or motion.escapes:
-        return None, AWAY if motion.escapes else UNKNOWN
+        return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
     try:
         found = _unloaded(Curve(problem.force, problem.force_rate, sites, motion.z, first), lag, watch)
     except (Refused, np.linalg.LinAlgError):
         found = None
     if found is None:
-        return None, UNKNOWN
-    return (found, "") if is_held(problem, sites, found) else (None, NEUTRAL)
+        return Nowhere.UNKNOWN
+    return found if is_held(problem, sites, found) else Nowhere.NEUTRAL
 
 
 def _unloaded(curve: Curve, lag: Array, watch: Watch) -> Array | None:
