@@ -34,6 +34,7 @@ def started(words: list[str], environment: Mapping[str, str] | None = None) -> s
 
 def end(process: subprocess.Popen[str], way: str, chance: random.Random) -> None:
     """End a run in one of the ways, and wait until its processes are gone; a request to stop is met in words."""
+    there = marked()
     if way == "SIGKILL":
         os.killpg(process.pid, signal.SIGKILL)
     elif way == "one rank":
@@ -44,7 +45,7 @@ def end(process: subprocess.Popen[str], way: str, chance: random.Random) -> None
             process.send_signal(getattr(signal, name))
             time.sleep(PAUSE)
     _, errors = process.communicate(timeout=120)
-    wait_for_end()
+    wait_for_end(there)
     print(f"ended by {way}: {process.returncode}")
     assert "Traceback" not in errors, (way, process.args, errors)
     if way in SOFT or way in TWICE:
@@ -68,17 +69,35 @@ def children(pid: int) -> list[int]:
         return []
 
 
-def wait_for_end() -> None:
-    """Ranks whose launcher was killed end a little later, and hold the folder until then; some start after the kill."""
+def wait_for_end(there: set[Path]) -> None:
+    """Ranks whose launcher was killed end a little later, and hold the folder until then; some start after the kill.
+
+    Args:
+        there: the processes of the run before it was ended: one that ends has no environment any more.
+    """
     late = time.monotonic() + LONGEST
-    while any(is_marked(process) for process in Path("/proc").glob("[0-9]*")):
+    while there := {process for process in there if lives(process)} | marked():
         assert time.monotonic() < late, "processes stay"
         time.sleep(0.1)
 
 
+def marked() -> set[Path]:
+    """The processes of a run of this one."""
+    return {process for process in Path("/proc").glob("[0-9]*") if is_marked(process)}
+
+
 def is_marked(process: Path) -> bool:
-    """Whether a process belongs to a run of this one, while it lives."""
+    """Whether a process belongs to a run of this one, by its environment."""
     try:
         return f"\0{'='.join(MARK)}\0".encode() in b"\0" + (process / "environ").read_bytes()
     except OSError:
         return False
+
+
+def lives(process: Path) -> bool:
+    """Whether a process may still hold files: one of its threads is no zombie."""
+    try:
+        states = [(task / "stat").read_text().rpartition(")")[2].split()[0] for task in (process / "task").iterdir()]
+    except OSError:
+        return process.exists()
+    return any(state not in "ZX" for state in states)
