@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 
@@ -12,20 +11,9 @@ from ..system.condensed_problem import CondensedProblem
 from ..typing import Array
 from .bonds import BondTable
 from .cells import Cells
-from .descent import Descent
-from .passing import go_on
 from .placing import place
-from .step import FACTOR
-from .thresholds import DEFAULT, ExactThresholds
-from .tracer import Tracer
-
-
-class Nowhere(Enum):
-    """Why a body that nothing holds at rest has no first state."""
-
-    AWAY = "nothing holds the body at rest"
-    UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
-    NEUTRAL = "nothing holds the body at rest, and where a small load takes it, it may still move without a force"
+from .settling import Nowhere, settled
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +36,7 @@ class Beginning:
 
 
 def at_rest(
-    problem: CondensedProblem, remember: Collection[int], aim: float, thresholds: ExactThresholds = DEFAULT.exact
+    problem: CondensedProblem, remember: Collection[int], aim: float, thresholds: Thresholds = DEFAULT
 ) -> Beginning:
     """The state at the factor 0, before constant loads act: these are applied along a path of their own.
 
@@ -58,7 +46,7 @@ def at_rest(
         aim: the factor that the path goes to first.
         thresholds: of the path.
     """
-    bonds = BondTable(problem, remember, thresholds)
+    bonds = BondTable(problem, remember, thresholds.exact)
     chains = [bonds.chain(i) for i in range(problem.size)]
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     force = _nearest(bonds, x, problem.force - problem.elastic @ x)
@@ -68,11 +56,12 @@ def at_rest(
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
-        settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
-        if isinstance(settled, Nowhere):
-            off = settled is Nowhere.AWAY
-            return Beginning(cells=None, memory=bonds.memory, reason=settled.value, escapes=off)
-        cells = settled
+        next_loads = replace(problem, force=held, force_rate=rate)
+        found = settled(bonds, next_loads, np.zeros(problem.size), thresholds.settling)
+        if isinstance(found, Nowhere):
+            off = found is Nowhere.AWAY
+            return Beginning(cells=None, memory=bonds.memory, reason=found.value, escapes=off)
+        cells = found
     if rate is not away:
         return Beginning(cells=cells, memory=bonds.memory)
     alone = replace(problem, force=held, force_rate=away)
@@ -86,24 +75,3 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
         forces = [s.force_at(float(x[i])) for s in bonds.chain(i) if s.stands_at(float(x[i]))]
         found[i] = min(forces, key=abs) if forces else 0.0
     return np.where((problem.lower == problem.upper), wanted, found)
-
-
-def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | Nowhere:
-    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; or why nowhere."""
-    chains = [bonds.chain(i) for i in range(problem.size)]
-    first = bonds.thresholds.first_load
-    load = problem.load(first)
-    start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
-    landing = Descent(bonds, load).land(start, start)
-    if not landing.found:
-        return Nowhere.AWAY if landing.escapes else Nowhere.UNKNOWN
-    cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
-    equations = problem.elastic, problem.force, problem.force_rate
-    tracer = Tracer(*equations, cells, first, heading=-1, thresholds=bonds.thresholds)
-    while True:
-        step = tracer.advance(0.0)
-        if step.variable is None:
-            return Nowhere.UNKNOWN
-        if step.variable == FACTOR:
-            return Nowhere.NEUTRAL if tracer.cells.is_singular() else tracer.cells
-        go_on(tracer, bonds, step)

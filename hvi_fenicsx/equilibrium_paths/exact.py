@@ -21,6 +21,7 @@ from .passing import Passing, classify, go_on
 from .placing import place
 from .programme import Follower, why_not_loaded
 from .rounds import Round, Rounds
+from .settling import Nowhere, settled
 from .snap import snap
 from .state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from .step import FACTOR
@@ -72,8 +73,8 @@ class ExactFollower(Follower):
     @override
     def _begun(self) -> Iterator[PathState]:
         programme, remember = self._options.programme, self._options.remember
-        exact = self._options.thresholds.exact
-        start = self._beginning or at_rest(self._problem, remember, programme[0], exact)
+        thresholds = self._options.thresholds
+        start = self._beginning or at_rest(self._problem, remember, programme[0], thresholds)
         if start.constant is not None:
             start = self._loaded(start, start.constant)
         self._bonds.restore(start.memory)
@@ -144,8 +145,8 @@ class ExactFollower(Follower):
         self._orient(aim)
         self._rounds = Rounds(self.tracer.cells.x, self._options.thresholds.exact.same_place)
         while self.end is None and self.tracer.factor != aim:
-            if self._must_jump(aim):
-                yield from self._jump(aim)
+            if self._is_adrift() or self._must_jump(aim):
+                yield from self._taken_up() if self._is_adrift() else self._jump(aim)
                 continue
             step = self.tracer.advance(aim)
             cells = self.tracer.cells
@@ -231,7 +232,7 @@ class ExactFollower(Follower):
         load, step = self._problem.load(factor), self._watcher.step
         found = snap(self._bonds, load, self.tracer, self._moved, self._direction, step)
         if found is not None and found.cells is not None:
-            yield self._landed(found.cells, aim, found.inverse)
+            yield self._landed(found.cells, factor, aim, found.inverse)
             return
         landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False)
         if landing.escapes:
@@ -242,7 +243,14 @@ class ExactFollower(Follower):
             self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
             yield self._state(Event.END)
         else:
-            yield self._landed(self._placed(landing.x, factor), aim)
+            yield self._landed(self._placed(landing.x, factor), factor, aim)
+
+    @override
+    def _settled(self, towards: float) -> PathState | Nowhere:
+        self._remember_all()
+        loads = replace(self._problem, force_rate=towards * self._problem.force_rate)
+        found = settled(self._bonds, loads, self.tracer.cells.x, self._options.thresholds.settling)
+        return found if isinstance(found, Nowhere) else self._landed(found, 0.0, towards)
 
     def _descended(self) -> Landing:
         """Down by the branch iteration."""
@@ -251,9 +259,9 @@ class ExactFollower(Follower):
         descent = Descent(self._bonds, self._problem.load(self.tracer.factor), self._watcher.step)
         return descent.land(descent.pushed(cells, rates), cells.x)
 
-    def _landed(self, cells: Cells, aim: float, inverse: CellInverse | None = None) -> PathState:
+    def _landed(self, cells: Cells, factor: float, aim: float, inverse: CellInverse | None = None) -> PathState:
         self._blocked = False
-        self._follow_from(cells, self.tracer.factor, inverse=inverse)
+        self._follow_from(cells, factor, inverse=inverse)
         self._unstable = 0 if cells.is_stable() else cells.unstable_directions()
         cells = self.tracer.cells
         released = self._balance.leap(cells.x, cells.bond_force)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..system.condensed_problem import CondensedProblem
 from .rounds import Round
+from .settling import Nowhere
 from .state import End, Event, PathOptions, PathState
 from .watch import Stopped, Watch
 
@@ -54,6 +55,7 @@ class Follower(ABC):
             yield from self._begun()
         else:
             self._restore(self._resume)
+            self._peak = max(map(abs, self._options.programme[: self._leg]), default=0.0)
         programme = self._options.programme
         while self.end is None and self._leg < len(programme):
             yield from self._gone_to(programme[self._leg])
@@ -110,12 +112,30 @@ class Follower(ABC):
     def _is_off(self) -> bool:
         """Whether no load, law or bound acts any more, and nothing would hold a body that floats."""
 
+    def _is_adrift(self) -> bool:
+        """Whether the body is free: where any load is borne, the next one takes it to where something holds it."""
+        return self._floats and self._is_off()
+
+    def _taken_up(self) -> Iterator[PathState]:
+        """From no load, at which the body is free, to where the next load takes it."""
+        programme = self._options.programme
+        found = self._settled(next((factor for factor in programme[self._leg :] if factor), programme[0]))
+        if isinstance(found, Nowhere):
+            self._lose(self.factor, found.value)
+            yield self._state(Event.END)
+        else:
+            yield found
+
+    @abstractmethod
+    def _settled(self, towards: float) -> PathState | Nowhere:
+        """The state at no load that bears a load in the direction of a factor, in which the path then is."""
+
     def _watch(self) -> None:
         """Count an event; end the path where it has a reason to."""
         self._events += 1
         self._peak = max(self._peak, abs(self.factor))
-        if self._floats and self._is_off():
-            self._come_off(self.factor, "the load is back at zero, and nothing holds the body any more")
+        if self._is_adrift() and not self._is_held(self.factor):
+            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
         elif self._watcher.interrupted():
             self._finish(End.INTERRUPTED, "interrupted")
         elif self._events > self._options.most_events:

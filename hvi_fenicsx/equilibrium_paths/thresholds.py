@@ -18,7 +18,6 @@ class ExactThresholds:
         near_end: a coordinate so near to an end of its segment is at it, relative to the sizes of coordinates.
         balanced: forces that balance may leave so much of the largest one.
         same_place: a difference of displacements that does not count, relative.
-        first_load: part of the first load at which a body that nothing holds at rest is looked for.
         standing: so many events at one place, and four for each unknown, lead nowhere.
         softest: relative accuracy of the direction in which a cell is softest.
     """
@@ -31,7 +30,6 @@ class ExactThresholds:
     near_end: float = 1e-9
     balanced: float = 1e-9
     same_place: float = 1e-7
-    first_load: float = 1e-3
     standing: int = 20
     softest: float = 1e-8
 
@@ -127,20 +125,22 @@ class JumpThresholds:
 
 @dataclass(frozen=True, kw_only=True)
 class SettlingThresholds:
-    """Where a path begins that nothing holds at rest, where laws are curved.
+    """How a state is found that bears the next load, where the load is none and nothing holds the body.
 
     Attributes:
-        steps: from a small load back to none at most,
-        more_steps: and so many more for each site.
-        no_load: a part of the small factor that is none,
+        first_load: part of the next load at which this state is looked for; from there the load is taken off again.
+        no_load: a part of this small load that is none,
         roundings: and so many roundings of the elastic forces: all contacts end at no load, and rounding says which one
             is first.
+        steps: from a small load back to none at most, where laws are curved,
+        more_steps: and so many more for each site.
     """
 
-    steps: int = 50
-    more_steps: int = 20
+    first_load: float = 1e-3
     no_load: float = 1e-9
     roundings: float = 100.0
+    steps: int = 50
+    more_steps: int = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,7 +151,7 @@ class Thresholds:
         exact: from event to event.
         curve: by predictor and corrector.
         jump: in jumps of these.
-        settling: where these begin.
+        settling: from no load on, where nothing holds the body.
         at_limit: a factor so near to the largest that can be borne, relative to those of the programme, is at the
             limit.
     """

@@ -13,7 +13,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -396,15 +395,21 @@ def test_the_console_script_and_the_module_are_one_program() -> None:
 
 
 def test_help_is_instant_and_knows_the_exit_codes() -> None:
-    """Half a second, by the best of three: no dolfinx, no MPI for a help text."""
+    """Half a second of processor time, by the best of three: no dolfinx, no MPI for a help text."""
     best = np.inf
     for _ in range(3):
-        start = time.perf_counter()
+        start = processor_time_of_children()
         done = process("--help")
-        best = min(best, time.perf_counter() - start)
+        best = min(best, processor_time_of_children() - start)
     assert done.returncode == 0
     assert "3 no solution exists" in done.stdout
     assert best < 0.5
+
+
+def processor_time_of_children() -> float:
+    """What all processes took that this one started, and that ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def test_np_starts_that_many_ranks(scene: Path, tmp_path: Path) -> None:

@@ -176,6 +176,36 @@ def test_how_far_a_body_is_above_its_floor_does_not_matter(gap: float) -> None:
     np.testing.assert_allclose(states[0].x, wanted[0].x - np.r_[np.full(3, gap), np.zeros(3)], atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+@pytest.mark.parametrize("remember", [None, (), range(3)])
+def test_a_load_that_turns_takes_a_free_body_to_its_other_side(
+    kind: type[Follower], remember: Sequence[int] | None
+) -> None:
+    """By hand: three points on springs of stiffness 1 between -0.5 and 1, free, or on bonds that break before that.
+
+    The outer ones come to rest on a bound, and half of the load on the middle one is how far that is from there.
+    """
+    law = graph([(0, 0), (0.01, 0.01), (0.02, 0)])
+    laws = () if remember is None else (bonds(law, np.arange(3)),)
+    given = problem(chain(3, 1.0), [2.0, -0.5, 2.0], *laws, lower=-0.5, upper=1.0)
+    options = PathOptions(programme=(1.0, -1.0, 0.0, 0.5), held=(-2.0, 2.0), remember=remember or ())
+    follower = kind(given, options)
+    states = list(follower.states())
+    assert follower.end is End.REACHED
+    turns = [state.x for state in states if state.event in (Event.TURN, Event.END)]
+    np.testing.assert_allclose(turns[0], [1.0, 0.75, 1.0], atol=1e-9)
+    np.testing.assert_allclose(turns[1], [-0.5, -0.25, -0.5], atol=1e-9)
+    np.testing.assert_allclose(turns[3], [1.0, 0.875, 1.0], atol=1e-9)
+    if not laws:
+        assert states[-1].work == pytest.approx(0.125**2, abs=1e-9)
+    if remember:
+        assert states[-1].dissipated == pytest.approx(3 * 0.01 * 0.02 / 2, abs=1e-9)
+    for state in states[:-1]:
+        rest = list(kind(given, options, state).states())
+        np.testing.assert_allclose(rest[-1].x, states[-1].x, atol=1e-9)
+        assert rest[-1].work == pytest.approx(states[-1].work, abs=1e-9)
+
+
 def test_a_closed_curve_is_gone_round_once() -> None:
     """The exact path knows it by its cells; the wanted factor is not on it, so loading does not lead there."""
     given = random_problem(165)

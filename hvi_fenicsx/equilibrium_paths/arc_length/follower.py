@@ -10,9 +10,9 @@ from typing_extensions import override
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..beginning import Nowhere
 from ..programme import Follower, why_not_loaded
 from ..rounds import Round, Rounds
+from ..settling import Nowhere
 from ..state import End, Event, Follow, PathOptions, PathState, Place, Position, place_of
 from ..watch import Watch
 from .curve import Curve
@@ -91,13 +91,15 @@ class ArcLengthFollower(Follower):
             return self._loaded(rest.constant)
         if rest.held:
             return rest.z
-        first = self._options.thresholds.exact.first_load * self._options.programme[0]
-        held = self._is_held(first)
-        z = settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=held)
+        z = self._at_no_load(rest.z, self._options.programme[0])
         if isinstance(z, Nowhere):
             self._end_before(z.value, escapes=z is Nowhere.AWAY)
             return None
         return z
+
+    def _at_no_load(self, z: Array, towards: float) -> Array | Nowhere:
+        first = self._options.thresholds.settling.first_load * towards
+        return settled(self._problem, self._sites, z, first, self._lag, self._watcher, held=self._is_held(first))
 
     def _loaded(self, constant: CondensedProblem) -> Array | None:
         """From rest to the constant loads, as stable as it goes; where the sites are then."""
@@ -140,6 +142,9 @@ class ArcLengthFollower(Follower):
         self._orient(aim)
         self._rounds = Rounds(self._curve.here.values.x / self._factors, self._options.thresholds.exact.same_place)
         while self.end is None and self._curve.factor != aim:
+            if self._is_adrift():
+                yield from self._taken_up()
+                continue
             if self._options.follow is Follow.STABLE and self._unstable > 0:
                 yield from self._jump(aim)
                 continue
@@ -254,11 +259,19 @@ class ArcLengthFollower(Follower):
             assert self._last is not None
             yield replace(self._last, event=Event.END, place=None, released=0.0)
         else:
-            self._follow_from(landing.z, factor)
-            released = self._balance.leap(self._curve.here.values, factor)
-            self._unstable = 0
-            self._orient(aim)
-            yield replace(self._state(Event.JUMP), released=released)
+            yield self._landed(landing.z, factor, aim)
+
+    @override
+    def _settled(self, towards: float) -> PathState | Nowhere:
+        z = self._at_no_load(self._curve.here.y[:-1], towards)
+        return z if isinstance(z, Nowhere) else self._landed(z, 0.0, towards)
+
+    def _landed(self, z: Array, factor: float, aim: float) -> PathState:
+        self._follow_from(z, factor)
+        released = self._balance.leap(self._curve.here.values, factor)
+        self._unstable = 0
+        self._orient(aim)
+        return replace(self._state(Event.JUMP), released=released)
 
     # -- reports
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
-from ..beginning import Nowhere
+from ..settling import Nowhere, no_load
 from ..watch import Watch
 from .curve import Curve
 from .equations import Refused
@@ -38,7 +38,8 @@ def settled(
     if not motion.run(np.zeros(len(sites))) or motion.escapes:
         return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
     try:
-        found = _unloaded(Curve(problem.force, problem.force_rate, sites, motion.z, first), lag, watch)
+        curve = Curve(problem.force, problem.force_rate, sites, motion.z, first)
+        found = _unloaded(curve, no_load(problem, curve.here.values.x, first, sites.thresholds.settling), lag, watch)
     except (Refused, np.linalg.LinAlgError):
         found = None
     if found is None:
@@ -46,21 +47,15 @@ def settled(
     return found if is_held(problem, sites, found) else Nowhere.NEUTRAL
 
 
-def _unloaded(curve: Curve, lag: Array, watch: Watch) -> Array | None:
-    """The coordinates where a curve comes to the factor 0."""
+def _unloaded(curve: Curve, none: float, lag: Array, watch: Watch) -> Array | None:
+    """The coordinates where a curve comes to the factor 0, straight from one that is none."""
     limits = curve.sites.thresholds.settling
     row, first = np.eye(1, len(curve.here.y), len(curve.here.y) - 1)[0], curve.factor
     curve.head(curve.tangent(curve.here.values, row, -np.sign(first)))
     Crossing(curve, lag, watch.step).run()
     for move in advancing(curve, 0.0, lag, watch.step, limits.steps + limits.more_steps * len(curve.sites)):
-        if abs(curve.factor) <= max(limits.no_load * abs(first), limits.roundings * _rounding(curve)):
+        if abs(curve.factor) <= none:
             return curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
         if move.outcome in (Outcome.AWAY, Outcome.STUCK):
             return None
     return None
-
-
-def _rounding(curve: Curve) -> float:
-    """The factor of a load that is no larger than the rounding of the elastic forces."""
-    elastic = np.abs(curve.sites.stiffness) @ np.abs(curve.here.values.x) / curve.sites.forces
-    return float(np.finfo(float).eps * np.max(elastic)) * curve.unit
