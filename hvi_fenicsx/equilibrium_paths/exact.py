@@ -145,8 +145,8 @@ class ExactFollower(Follower):
         self._orient(aim)
         self._rounds = Rounds(self.tracer.cells.x, self._options.thresholds.exact.same_place)
         while self.end is None and self.tracer.factor != aim:
-            if self._is_adrift() or self._must_jump(aim):
-                yield from self._taken_up() if self._is_adrift() else self._jump(aim)
+            if self._adrift or self._must_jump(aim):
+                yield from self._taken_up() if self._adrift else self._jump(aim)
                 continue
             step = self.tracer.advance(aim)
             cells = self.tracer.cells
@@ -172,7 +172,7 @@ class ExactFollower(Follower):
     @override
     def _is_off(self) -> bool:
         tracer = self.tracer
-        return self._peak > 0.0 and tracer.at_rest(self._peak) and tracer.cells.is_singular()
+        return tracer.at_rest(self._peak) and tracer.cells.is_singular()
 
     def _noted(self, state: PathState, aim: float) -> PathState:
         """The state after an event; where the path comes back to one, another way is taken, or the path ends."""

@@ -40,6 +40,7 @@ class Follower(ABC):
         self._resume, self._watcher = resume, watch or Watch()
         self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
         self._floats = problem.elastic.is_singular(np.ones(problem.size, dtype=bool), np.zeros(problem.size))
+        self._adrift = False
         self.end: End | None = None
         self.reason, self.is_closed = "", False
 
@@ -56,6 +57,7 @@ class Follower(ABC):
         else:
             self._restore(self._resume)
             self._peak = max(map(abs, self._options.programme[: self._leg]), default=0.0)
+            self._adrift = self._resume.event not in (Event.START, Event.JUMP) and self._is_adrift()
         programme = self._options.programme
         while self.end is None and self._leg < len(programme):
             yield from self._gone_to(programme[self._leg])
@@ -113,12 +115,13 @@ class Follower(ABC):
         """Whether no load, law or bound acts any more, and nothing would hold a body that floats."""
 
     def _is_adrift(self) -> bool:
-        """Whether the body is free: where any load is borne, the next one takes it to where something holds it."""
-        return self._floats and self._is_off()
+        """Whether the load is back at zero and the body free; where any load is borne, the next one takes it up."""
+        return self._floats and self._peak > 0.0 and self._is_off()
 
     def _taken_up(self) -> Iterator[PathState]:
         """From no load, at which the body is free, to where the next load takes it."""
         programme = self._options.programme
+        self._adrift = False
         found = self._settled(next((factor for factor in programme[self._leg :] if factor), programme[0]))
         if isinstance(found, Nowhere):
             self._lose(self.factor, found.value)
@@ -134,7 +137,8 @@ class Follower(ABC):
         """Count an event; end the path where it has a reason to."""
         self._events += 1
         self._peak = max(self._peak, abs(self.factor))
-        if self._is_adrift() and not self._is_held(self.factor):
+        self._adrift = self._is_adrift()
+        if self._adrift and not self._is_held(self.factor):
             self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
         elif self._watcher.interrupted():
             self._finish(End.INTERRUPTED, "interrupted")

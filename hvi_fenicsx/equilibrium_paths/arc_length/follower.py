@@ -142,7 +142,7 @@ class ArcLengthFollower(Follower):
         self._orient(aim)
         self._rounds = Rounds(self._curve.here.values.x / self._factors, self._options.thresholds.exact.same_place)
         while self.end is None and self._curve.factor != aim:
-            if self._is_adrift():
+            if self._adrift:
                 yield from self._taken_up()
                 continue
             if self._options.follow is Follow.STABLE and self._unstable > 0:
@@ -205,7 +205,7 @@ class ArcLengthFollower(Follower):
         if move.outcome in (Outcome.STEP, Outcome.FACTOR):
             self._unstable = self._sites.unstable_directions(self._curve.here.values)
             return self._state(Event.STEP)
-        if self._floats and self._is_off():  # all bonds are broken at once: nothing is left to pass
+        if self._is_adrift():  # all bonds are broken at once: nothing is left to pass
             return self._state(Event.KINK)
         before = self._curve.trend
         passages = self._crossed(move.site, turned=move.outcome is Outcome.TURNED)
