@@ -206,6 +206,29 @@ def test_a_load_that_turns_takes_a_free_body_to_its_other_side(
         assert rest[-1].work == pytest.approx(states[-1].work, abs=1e-9)
 
 
+def test_a_vector_of_no_length_but_for_rounding_moves_only_where_it_sets_out() -> None:
+    """A bond that falls less steeply than the spring along its slip is stiff, and more steeply than that across it."""
+    given = problem(np.diag([3.0, 0.5]), [1.0, 0.0], lengths(Exponential(1.0, 0.2, 0.5), 1))
+    follower = ArcLengthFollower(given, PathOptions(programme=(2.0,)))
+    states = follower.states()
+    assert next(s for s in states if s.event is Event.KINK).factor == pytest.approx(1.0)
+    sites, z = follower._sites, follower._curve.here.y[:-1]
+    for rounded in (z, z * (1.0 - 1e-15), z * (1.0 + 1e-15)):
+        assert sites.unstable_directions(sites.values(rounded)) == 0
+    assert all(state.stable for state in states)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 36])
+def test_a_body_that_is_stiffer_than_its_laws_fall_never_jumps_nor_turns(seed: int) -> None:
+    """The energy is strictly convex; slips turn on the way, and a bond that turned back slips on within a step."""
+    law, generator = Exponential(1.0, 0.3, 0.8), np.random.default_rng(seed)
+    root = generator.standard_normal((6, 6))
+    given = problem(0.3 * root @ root.T + np.eye(6), generator.standard_normal(6), lengths(law, 3))
+    follower, states = path(given, programme=(4.0,), remember=(0,))
+    assert follower.end is End.REACHED
+    assert all(state.stable and state.event not in (Event.JUMP, Event.FOLD) for state in states)
+
+
 def test_a_closed_curve_is_gone_round_once() -> None:
     """The exact path knows it by its cells; the wanted factor is not on it, so loading does not lead there."""
     given = random_problem(165)

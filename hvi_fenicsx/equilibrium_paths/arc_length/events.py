@@ -107,8 +107,17 @@ class Events(Equations):
         return move
 
     def _back_at(self, move: Move, site: int) -> Move:
-        """Where a site passes the end at which it began: a bond that set out from it turned back on the way."""
-        sets_out = self._rate_of(Outcome.TURNED, site)(self.here) * self.sites.outward[site] > 0.0
+        """Where a site passes the end at which it began: a bond that set out from it turned back on the way.
+
+        Raises:
+            Refused: it went inwards first, and came back within the step.
+        """
+        rate = self._rate_of(Outcome.TURNED, site)(self.here)
+        beyond = move.after.values.s[site] - move.before.values.s[site]
+        largest = float(np.max(np.abs(self.here.tangent)))
+        if rate * beyond < 0.0 and abs(rate) > self.limits.undecided * largest and not self.sites.outward[site]:
+            raise Refused
+        sets_out = rate * self.sites.outward[site] > 0.0
         turned = self._up_to(move, Outcome.TURNED, site) if sets_out else None
         if turned is not None and turned.after.y is move.after.y:
             raise Refused  # it turns no earlier, and is beyond its end

@@ -145,7 +145,7 @@ class ArcLengthFollower(Follower):
             if self._adrift:
                 yield from self._taken_up()
                 continue
-            if self._options.follow is Follow.STABLE and self._unstable > 0:
+            if self._options.follow is Follow.STABLE and self._must_jump(aim):
                 yield from self._jump(aim)
                 continue
             move = self._curve.advance(self._next(aim))
@@ -159,6 +159,10 @@ class ArcLengthFollower(Follower):
             self._watch()
             if self.end is not None:
                 yield self._state(Event.END)
+
+    def _must_jump(self, aim: float) -> bool:
+        """Whether no stable way goes on towards a factor: a bond that turns back makes the path stable, and turn."""
+        return self._unstable > 0 or (aim - self._curve.factor) * self._curve.trend < 0.0
 
     def _next(self, aim: float) -> float:
         """The next factor that the path may come to as it goes: one at which a state is wanted, or the aim."""
@@ -246,11 +250,12 @@ class ArcLengthFollower(Follower):
             sites=self._sites,
             here=self._curve.here,
             load=problem.load(factor),
+            heading=-self._curve.trend or 1,
             lag=self._lag,
             held=self._is_held(factor),
             step=self._watcher.step,
         )
-        landing = jump.landing(-self._curve.trend or 1)
+        landing = jump.landing()
         if landing is None:
             self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
             yield self._state(Event.END)

@@ -44,6 +44,7 @@ class Jump:
         sites: where they are; after the jump, where they are then.
         here: the state, and where its curve goes on.
         load: f, (n,).
+        heading: 1 where larger factors are wanted, -1 where smaller ones are.
         lag: an order of the sites, (m,).
         held: whether there is an equilibrium at these loads whatever the bonds remember, so that no way leads off.
         step: called before each step; it may end the jump by an exception.
@@ -53,21 +54,18 @@ class Jump:
     sites: Sites
     here: Place
     load: Array
+    heading: int
     lag: Array
     held: bool
     step: Callable[[], None]
 
-    def landing(self, heading: int) -> Landing | None:
-        """Where it leads; None where this was not found, with the sites where they were.
-
-        Args:
-            heading: 1 where larger factors are not borne, -1 where smaller ones are not.
-        """
+    def landing(self) -> Landing | None:
+        """Where it leads; None where this was not found, with the sites where they were."""
         limits = self.sites.thresholds.jump
         ways: list[Callable[[], Landing | None]] = [
             lambda: self._held_back(limits.steps),
             self._released,
-            lambda: self._pushed_off(heading),
+            self._pushed_off,
             lambda: self._held_back(limits.steps + limits.later_steps * len(self.sites)),
         ]
         kept = self.sites.kept()
@@ -106,12 +104,10 @@ class Jump:
         return self._to_its_end(curve, most)
 
     def _to_its_end(self, curve: Curve, most: int) -> Landing | None:
-        start = curve.here.y
         for move in advancing(curve, 0.0, self.lag, self.step, most):
             if move.outcome is Outcome.FACTOR:
                 stable = curve.sites.unstable_directions(curve.here.values) == 0
-                moved = float(np.max(np.abs(curve.here.y - start), initial=0.0))
-                return Landing(z=curve.here.y[:-1]) if stable and moved > 1e-9 else None
+                return self._landed(curve.here.y[:-1]) if stable else None
             if move.outcome is Outcome.AWAY:
                 off = abs(curve.factor_rate) <= 1e-6 and curve.here.y[-1] < 0.0 and not self.held
                 return Landing(z=None) if off else None
@@ -119,10 +115,24 @@ class Jump:
                 return None
         return None
 
+    def _landed(self, z: Array) -> Landing | None:
+        """The landing at a stable equilibrium; None where it is the state itself, or bears no load that is wanted."""
+        if float(np.max(np.abs(z - self.here.y[:-1]), initial=0.0)) <= 1e-9:
+            return None
+        kept = self.sites.kept()
+        curve = Curve(self.load, self.heading * self.problem.force_rate, self.sites, z.copy(), 0.0)
+        row = np.eye(1, len(z) + 1, len(z))[0]
+        with suppress(Refused, np.linalg.LinAlgError):
+            curve.head(curve.tangent(curve.here.values, row))
+            Crossing(curve, self.lag, self.step).run()
+        self.sites.restore(kept)
+        return Landing(z=z) if curve.factor_rate >= 0.0 else None
+
     def _released(self) -> Landing | None:
         """The landing of an overdamped motion."""
         start = self.here.y[:-1] if self.sites.on_drops() else self._beyond()
-        return self._relaxed(start, self.load, self._directions())
+        found = self._relaxed(start, self.load, self._directions())
+        return found if found is None or found.z is None else self._landed(found.z)
 
     def _directions(self) -> Array:
         """In which the sites go along the path, (m,)."""
@@ -141,15 +151,16 @@ class Jump:
             return None
         return Landing(z=None if relaxation.escapes else relaxation.z)
 
-    def _pushed_off(self, heading: int) -> Landing | None:
+    def _pushed_off(self) -> Landing | None:
         """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
         rate, directions = self.problem.force_rate, self._directions()
-        push = self.sites.thresholds.jump.push * heading
+        push = self.sites.thresholds.jump.push * self.heading
         push = push * np.max(np.abs(self.load)) / np.max(np.abs(rate), initial=1e-300)
         found = self._relaxed(self.here.y[:-1].copy(), self.load + push * rate, directions)
         if found is None or found.z is None:
             return found
-        return self._relaxed(found.z, self.load, directions)
+        found = self._relaxed(found.z, self.load, directions)
+        return found if found is None or found.z is None else self._landed(found.z)
 
 
 def _starts(here: Place) -> Iterator[Array]:

@@ -223,14 +223,21 @@ class Sites(SiteGraphs):
         unknowns, e = self.radials.flat[here], values.directions[here]
         axes = _axes(e)
         moves, steep = bool(values.moves[k]), values.energies[k] * values.rises[k] / (values.moves[k] or 1.0)
-        if values.lengths[k] > 0.0:
-            across, turns = values.energies[k] * values.tractions[k] / values.lengths[k], True
-        else:
-            across, turns = steep, moves
+        across = self._across(k, values, float(steep))
+        turns = across <= self.thresholds.curve.held_fast * float(np.max(np.diag(self.stiffness)))
         kept = np.array([moves, *[turns] * (len(e) - 1)][: len(e)], dtype=bool)
         found = np.zeros((len(values.x), len(e)))
         found[unknowns] = axes
         return found[:, kept], np.array([steep, *[across] * (len(e) - 1)][: len(e)])[kept]
+
+    def _across(self, k: int, values: Values, steep: float) -> float:
+        """The slope across a site's vector: infinite where that has no length, and bears a force or stands."""
+        force = float(values.energies[k] * values.tractions[k])
+        if values.lengths[k] > 0.0:
+            return force / float(values.lengths[k])
+        unknown = int(self.unknowns_of(k)[0])
+        stands = not values.moves[k] or abs(force) > self.thresholds.curve.rounding * self.forces[unknown]
+        return np.inf if stands else steep
 
     @property
     def bent(self) -> bool:
