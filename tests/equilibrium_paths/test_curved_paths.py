@@ -316,6 +316,17 @@ def test_a_block_on_friction_bears_the_same_in_each_direction(angle: float) -> N
     assert largest_distance(given, states) < 1e-9
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.7, 2.0, 2.5])
+def test_what_sets_out_from_rest_is_held_across_its_way(angle: float) -> None:
+    """By hand: springs of stiffness 0.5, a law that falls by 0.8 from 1; across the way t/s is infinite."""
+    pull = np.array([np.cos(angle), np.sin(angle)])
+    given = problem(0.5 * np.eye(2), pull, lengths(graph([(0, 1), (1, 0.2)]), 1))
+    _, states = path(given, programme=(2.0,), follow=Follow.EXACT)
+    fold = next(state for state in states if state.event is Event.FOLD)
+    assert fold.factor == pytest.approx(1.0, rel=1e-12)
+    assert fold.unstable == 1
+
+
 def test_a_rough_floor_holds_up_to_its_strength_in_each_direction() -> None:
     """Tresca friction on |u_t|: four vertices at rest, then sliding one after the other; the sum is the strength."""
     follower, states = path(plate(graph([(0, 0.2)]), 5, 0.7), programme=(2.0,))

@@ -198,7 +198,10 @@ class Sites(SiteGraphs):
             values: of the sites.
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
-        return negative_directions(self.motions(values).matrix, negligible) + len(self.on_drops())
+        motions = self.motions(values)
+        sizes = np.sqrt(np.diag(motions.elastic) + np.abs(motions.slopes))
+        sizes[sizes == 0.0] = 1.0  # else what is stiff, as a length that has just left 0 is across, would hide the rest
+        return negative_directions(motions.matrix / np.outer(sizes, sizes), negligible) + len(self.on_drops())
 
     def motions(self, values: Values) -> Motions:
         """The displacements that can change.
@@ -226,7 +229,8 @@ class Sites(SiteGraphs):
         rises, moves = values.energies * values.rises, values.moves
         along = np.divide(rises, moves, out=np.full(len(self), np.nan), where=moves != 0.0)
         tractions = values.energies[p] * values.tractions[p]
-        across = np.divide(tractions, lengths, out=along[p].copy(), where=lengths > 0.0)
+        across = np.where(values.s[p] > 0.0, np.nan, along[p])  # what rests at 0 is held across the way it sets out
+        np.divide(tractions, lengths, out=across, where=lengths > 0.0)
         return self._by_unknown(along, np.where(radials.leads(), along[p][radials.owner], across[radials.owner]))
 
     @property
@@ -237,4 +241,3 @@ class Sites(SiteGraphs):
     def reach(self, values: Values) -> Array:
         """How far the curved sites may move in one step, in units of s, (m,); infinite for the others."""
         return np.asarray(self._deviations.reach(values.lengths) / self.length)
-
