@@ -74,14 +74,15 @@ class BondEnergies:
             values: of the sites.
         """
         back, forces = 0.0, self._sites.bond_forces(values)
-        lost, scales = np.zeros(0), np.zeros(0)
+        lost: list[Array] = []
+        scales: list[Array] = []
         for group in self._groups:
             x, scale = values.lengths[group.sites], values.energies[group.sites]
             traction = group.tractions(self._sites, values.lengths, forces)
             back += float(scale @ group.rows.recoverable(x, traction))
-            lost = np.append(lost, group.rows.dissipated(x, traction, group.memory()))
-            scales = np.append(scales, scale)
-        return back, lost, scales
+            lost.append(group.rows.dissipated(x, traction, group.memory()))
+            scales.append(scale)
+        return back, np.concatenate([np.zeros(0), *lost]), np.concatenate([np.zeros(0), *scales])
 
 
 def _group(number: int, problem: CondensedProblem, remember: Collection[int], sites: Sites) -> _Group:
