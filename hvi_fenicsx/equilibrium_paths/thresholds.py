@@ -65,7 +65,6 @@ class CurveThresholds:
         no_length: a length that is 0, but for rounding, in units of s.
         agreed: by how much the work along a step may miss what the energies say, relative to the energies.
         rank: singular values so small beside the greatest are zero: a body that slides takes any place.
-        held_fast: a slope so steep beside the stiffness lets nothing move.
         near_break: a displacement this near to a break of a law, or to a bound, may be there, relative to itself and to
             lengths.
     """
@@ -92,7 +91,6 @@ class CurveThresholds:
     no_length: float = 1e-12
     agreed: float = 3e-10
     rank: float = 1e-12
-    held_fast: float = 1e9
     near_break: float = 1e-10
 
 

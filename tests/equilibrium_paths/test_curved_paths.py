@@ -108,6 +108,16 @@ def test_piecewise_linear_paths_are_the_exact_ones(follow: Follow) -> None:
         assert states[-1].work == pytest.approx(wanted[-1].work, rel=1e-9)
 
 
+@pytest.mark.parametrize("remember", [(0, 1), (0,)])
+def test_two_laws_at_one_point_lose_what_the_exact_path_says(remember: tuple[int, ...]) -> None:
+    given = problem(chain(4, 2.0), np.eye(1, 4, 3)[0], bonds(graph(DROP), range(4)), bonds(graph(SOFTENING), range(4)))
+    options = PathOptions(programme=(4.0, 0.5, 5.0), remember=remember)
+    wanted, states = list(ExactFollower(given, options).states()), list(ArcLengthFollower(given, options).states())
+    assert wanted[-1].dissipated > 0.1
+    assert states[-1].dissipated == pytest.approx(wanted[-1].dissipated, rel=1e-9)
+    assert states[-1].energy == pytest.approx(wanted[-1].energy, rel=1e-9)
+
+
 def floating(law: Superpotential, gaps: Any, seed: int, row: int = 3) -> CondensedProblem:
     """A row of points with gaps below them, and slips that nothing but their law holds."""
     generator = np.random.default_rng(seed)
@@ -329,6 +339,17 @@ def test_a_block_on_friction_bears_the_same_in_each_direction(angle: float) -> N
     assert largest_distance(given, states) < 1e-9
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.7, 2.0, 2.5])
+def test_what_sets_out_from_rest_is_held_across_its_way(angle: float) -> None:
+    """By hand: springs of stiffness 0.5, a law that falls by 0.8 from 1; across the way t/s is infinite."""
+    pull = np.array([np.cos(angle), np.sin(angle)])
+    given = problem(0.5 * np.eye(2), pull, lengths(graph([(0, 1), (1, 0.2)]), 1))
+    _, states = path(given, programme=(2.0,), follow=Follow.EXACT)
+    fold = next(state for state in states if state.event is Event.FOLD)
+    assert fold.factor == pytest.approx(1.0, rel=1e-12)
+    assert fold.unstable == 1
+
+
 def test_a_rough_floor_holds_up_to_its_strength_in_each_direction() -> None:
     """Tresca friction on |u_t|: four vertices at rest, then sliding one after the other; the sum is the strength."""
     follower, states = path(plate(graph([(0, 0.2)]), 5, 0.7), programme=(2.0,))
@@ -373,7 +394,7 @@ def test_the_derivatives_of_the_forces_are_those_of_the_matrix() -> None:
     follower, _ = path(oblique(SMOOTHED), programme=(0.6,))
     sites, values = follower._sites, follower._curve.here.values
     for direction in generator.standard_normal((5, 6)):
-        moved = sites.stiffness @ sites.displacement_rate(values, direction) + sites.force_rate(values, direction)
+        moved = sites.stiffness @ (sites.moved(values) @ direction) + sites.risen(values) @ direction
         assert moved == pytest.approx(sites.jacobian(values) @ direction, rel=1e-12)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array
+from .bond_energies import BondEnergies
 from .equations import Place
 from .events import Move
 from .sites import Sites, Values
@@ -55,8 +56,7 @@ class Balance:
     def __init__(self, problem: CondensedProblem, sites: Sites, work: float = 0.0, dissipated: float = 0.0) -> None:
         self._problem, self._sites, self.work = problem, sites, work
         self._size = sum(float(b.weights.sum()) * b.law.energy_scale for b in problem.bonds)
-        self._remembers = {law.group for several in sites.laws for law in several if law.passed is not None}
-        self._in_sites = self._remembers | {n for n, b in enumerate(problem.bonds) if b.mixity is not None}
+        self._bonds = BondEnergies(problem, sites)
         self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
         self.stored = Stored(energy=0.0, potential=0.0, dissipated=0.0, size=0.0)
 
@@ -70,7 +70,7 @@ class Balance:
         problem, x = self._problem, values.x
         elastic, load = 0.5 * float(x @ (problem.stiffness @ x)), float(problem.load(factor) @ x)
         constant = problem.constant_at(factor)
-        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._in_sites)
+        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._bonds.numbers)
         back, lost, scales = self._bonds(values)
         all_lost = float(scales @ lost)
         return Stored(
@@ -82,21 +82,6 @@ class Balance:
             lost=lost,
             scales=scales,
         )
-
-    def _bonds(self, values: Values) -> tuple[float, Array, Array]:
-        """What bonds give back, what each has lost for 1 at its mode, and the scales by mode, (b,)."""
-        back, found = 0.0, []
-        for k, laws in enumerate(self._sites.laws):
-            if not any(law.group in self._in_sites for law in laws):
-                continue
-            x, scale = float(values.lengths[k]), float(values.energies[k])
-            shares = self._sites.shares(k, x, self._sites.bond_force(k, values))
-            for law, share in zip(laws, shares, strict=True):
-                if law.group in self._in_sites:
-                    back += scale * law.recoverable(x, share)
-                    found.append((law.dissipated(x, share), scale))
-        lost, scales = np.reshape(np.array(found), (-1, 2)).T
-        return back, lost, scales
 
     def begin(self, values: Values, factor: float) -> None:
         """Start at a state.
@@ -187,7 +172,7 @@ def displacement_rate(sites: Sites, place: Place) -> Array:
         sites: the sites.
         place: the place.
     """
-    return sites.displacement_rate(place.values, place.tangent[:-1])
+    return sites.moved(place.values) @ place.tangent[:-1]
 
 
 def _cubic(t: Array, ends: list[float]) -> Array:

@@ -114,12 +114,16 @@ class Equations:
         self._factors = Bordered(matrix, self.limits)
         return self._factors
 
-    def _change(self, values: Values, direction: Array) -> Array:
+    def _changes(self, values: Values) -> Callable[[Array], Array]:
         """How what is left of the forces changes along a direction of all variables, in their units, (n,)."""
-        sites = self.sites
-        moved = sites.stiffness @ sites.displacement_rate(values, direction[:-1])
-        moved += sites.force_rate(values, direction[:-1]) - direction[-1] * self.unit * self._rate
-        return np.asarray(moved / sites.forces)
+        sites, moved, risen = self.sites, self.sites.moved(values), self.sites.risen(values)
+
+        def change(direction: Array) -> Array:
+            found = sites.stiffness @ (moved @ direction[:-1])
+            found += risen @ direction[:-1] - direction[-1] * self.unit * self._rate
+            return np.asarray(found / sites.forces)
+
+        return change
 
     def tangent(self, values: Values, row: Array, sign: float = 1.0) -> Array:
         """The direction of the curve in which a linear function grows, of length 1, (n + 1,).
@@ -153,8 +157,9 @@ class Equations:
     def _refined(self, factors: Bordered, values: Values) -> Array | None:
         """The direction in which the equations stay satisfied, by factors of a point nearby; None: they are too far."""
         found, last, size = factors.along, np.inf, float(np.max(np.abs(factors.along)))
+        change_along = self._changes(values)
         for _ in range(self.limits.refinements):
-            step = factors.across(self._change(values, found))
+            step = factors.across(change_along(found))
             change = float(np.max(np.abs(step)))
             if not change <= self.limits.slow * last:
                 return found if change <= 1e-13 * size else None
@@ -267,9 +272,9 @@ class Equations:
 
     def _exchanged(self, factors: Bordered, k: int) -> bool:
         """Exchange the columns of a site in the factors; whether that went well."""
-        columns = self.sites.columns(k)
+        columns, change_along = self.sites.columns(k), self._changes(self.here.values)
         units = np.eye(len(self.here.y))[columns]
-        return factors.exchange(columns, np.stack([self._change(self.here.values, unit) for unit in units], axis=1))
+        return factors.exchange(columns, np.stack([change_along(unit) for unit in units], axis=1))
 
     def head(self, tangent: Array) -> None:
         """Set out from the present point.

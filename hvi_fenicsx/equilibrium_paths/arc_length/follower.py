@@ -58,10 +58,9 @@ class ArcLengthFollower(Follower):
         problem = felt(problem, self._factors)
         super().__init__(problem, options, resume, watch)
         self._fineness = fineness
-        self._laws = vertex_laws(problem, options.remember)
-        self._sites = Sites(problem, self._laws, options.thresholds)
+        self._sites = Sites(problem, vertex_laws(problem, options.remember), options.thresholds)
         self._lag = order(problem, [int(group[0]) for group in self._sites.unknowns()])
-        self._remembers = any(law.passed is not None for law in self._laws)
+        self._remembers = any(law.passed is not None for law in self._sites.vertices)
         self._last: PathState | None = None
         self._curve: Curve
         self._rounds: Rounds
@@ -108,7 +107,7 @@ class ArcLengthFollower(Follower):
         if reason := why_not_loaded(follower):
             self._end_before(reason, escapes=follower.end is End.ESCAPES)
             return None
-        self._sites, self._laws = follower._sites, follower._laws
+        self._sites = follower._sites
         return follower._curve.here.y[:-1]
 
     def _follow_from(self, z: Array, factor: float) -> None:
@@ -121,7 +120,7 @@ class ArcLengthFollower(Follower):
     def _restore(self, state: PathState) -> None:
         position, sites = state.position, self._sites
         if state.memory is not None:
-            for number, law in enumerate(self._laws):
+            for number, law in enumerate(sites.vertices):
                 law.restore(state.memory[number, :])
         for k in range(len(sites)):
             sites.rebuild(k)
@@ -239,7 +238,7 @@ class ArcLengthFollower(Follower):
     @override
     def _is_off(self) -> bool:
         curve = self._curve
-        return curve.at_rest(1e-9 * self._peak) and not is_held(self._problem, self._sites, curve.here.y[:-1])
+        return curve.at_rest(1e-9 * self._peak) and not is_held(self._sites, curve.here.y[:-1])
 
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
@@ -299,7 +298,7 @@ class ArcLengthFollower(Follower):
         return self._last
 
     def _memory(self) -> Array:
-        return np.array([law.memory() for law in self._laws]).reshape(-1, 4)
+        return np.array([law.memory() for law in self._sites.vertices]).reshape(-1, 4)
 
     def _position(self) -> Position:
         tangent = self._curve.here.tangent

@@ -195,7 +195,7 @@ def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) 
     """Motions in which the energy falls, of size 1."""
     drops = sites.on_drops()
     found = [_after_drops(problem, sites, here, drops)] if drops else []
-    lowest = None if drops else _lowest(problem, sites, here)
+    lowest = None if drops else _lowest(sites, here)
     if lowest is not None:
         found += [lowest * (np.sign(_into_cell(sites, here, lowest) or float(lowest @ path)) or 1.0)]
     seen: list[Array] = []
@@ -223,20 +223,19 @@ def _after_drops(problem: CondensedProblem, sites: Sites, here: Place, drops: li
         p = sites.radial(k)
         way = 1.0 if p is None else here.values.directions[sites.radials.owner == p]
         motion[groups[k]] = (np.sign(rates[k]) or 1.0) * way
-    basis, slopes = sites.motions(here.values)
-    if basis.shape[1]:
-        matrix = basis.T @ problem.stiffness @ basis + np.diag(slopes)
-        motion -= basis @ np.linalg.lstsq(matrix, basis.T @ (problem.stiffness @ motion))[0]
+    free = sites.motions(here.values)
+    if len(free.slopes):
+        motion -= free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (problem.stiffness @ motion))[0]
     return motion
 
 
-def _lowest(problem: CondensedProblem, sites: Sites, here: Place) -> Array | None:
+def _lowest(sites: Sites, here: Place) -> Array | None:
     """The motion in which the energy falls most."""
-    basis, slopes = sites.motions(here.values)
-    if not len(slopes):
+    free = sites.motions(here.values)
+    if not len(free.slopes):
         return None
-    _, vectors = np.linalg.eigh(basis.T @ problem.stiffness @ basis + np.diag(slopes))
-    found = basis @ vectors[:, 0]
+    _, vectors = np.linalg.eigh(free.matrix)
+    found = free.ways.T @ vectors[:, 0]
     return np.asarray(found / np.max(np.abs(found)))
 
 

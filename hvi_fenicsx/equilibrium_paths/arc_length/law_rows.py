@@ -49,6 +49,34 @@ class LawRows:
         secant = np.divide(there, end, out=np.zeros_like(x), where=end != 0.0) * x
         return np.where(inside, secant, found)
 
+    def recoverable(self, x: Array, traction: Array) -> Array:
+        """What the vertices give back on the way to zero: w j, or the triangle under the secant with memory, (r,).
+
+        Args:
+            x: coordinates, (r,).
+            traction: along them, (r,).
+        """
+        plain = 0.5 * x * traction if self.remembers else self.law.value(self.signs * x)
+        return np.asarray(self.bonds.weights * plain)
+
+    def dissipated(self, x: Array, traction: Array, memory: Array) -> Array:
+        """The energy that is lost for good once the vertices have been at x, or where they were before, (r,).
+
+        Args:
+            x: coordinates, (r,).
+            traction: along them, (r,).
+            memory: as above, (r, 4).
+        """
+        if not self.remembers:
+            return np.zeros_like(x)
+        turned = np.where(self.law.even & (x < 0.0), -1.0, 1.0)  # both sides of an even law remember the same
+        at, there, ends, tractions = (turned * x)[:, None], (turned * traction)[:, None], memory[:, :2], memory[:, 2:]
+        reached = ((at > 0.0) == [False, True]) & (np.abs(at) >= np.abs(ends) * (1.0 - 1e-12))
+        ends, tractions = np.where(reached, at, ends), np.where(reached, there, tractions)
+        taken = self.law.value((self.signs[:, None] * ends).ravel()) - self.law.value(np.zeros(1))  # smoothed: not 0
+        lost = taken.reshape(ends.shape) - 0.5 * ends * tractions
+        return np.asarray(self.bonds.weights * (lost[:, 1] if self.law.even else lost.sum(axis=1)))
+
     def _limit(self, x: Array, side: str) -> Array:
         if self.polyline is not None:
             return self.polyline.traction(x, side)

@@ -94,10 +94,24 @@ class Radials:
             return lengths, vectors / lengths[self.owner]
         spread = lengths[self.owner]
         found = np.divide(vectors, spread, out=np.zeros_like(vectors), where=spread > 0.0)
-        counted = np.flatnonzero(self.counts)
-        sites, first = np.unique(self.owner[counted], return_index=True)
-        found[counted[first[lengths[sites] == 0.0]]] = 1.0
+        found[self.leads() & (spread == 0.0)] = 1.0
         return lengths, found
+
+    def leads(self) -> Mask:
+        """Which of the N are the first of their site that counts, (N,)."""
+        found = np.zeros(len(self.flat), dtype=bool)
+        counted = np.flatnonzero(self.counts)
+        found[counted[np.unique(self.owner[counted], return_index=True)[1]]] = True
+        return found
+
+    def mirrors(self, directions: Array) -> tuple[Array, Array]:
+        """What the first unknown that counts is reflected at onto the unit vector, (N,), and half its square, (p,).
+
+        Args:
+            directions: the unit vectors, (N,).
+        """
+        found = directions + self.leads() * np.where(directions < 0.0, -1.0, 1.0)
+        return found, np.maximum(0.5 * self._sums(found**2), 0.5)  # at least 1 but where nothing counts
 
     def along(self, directions: Array, change: Array) -> Array:
         """The products of unit vectors with a change of the coordinates, (p,).
@@ -107,14 +121,6 @@ class Radials:
             change: of all coordinates, (n,) or more.
         """
         return self._sums(directions * change[self.flat])
-
-    def summed(self, values: Array) -> Array:
-        """Sums over the unknowns of each site, (n, p).
-
-        Args:
-            values: by unknown of a site, (n, N).
-        """
-        return np.asarray(np.add.reduceat(values, self._firsts, axis=1), dtype=np.float64)
 
     def energies(self, directions: Array) -> Array:
         """By what the mode mixity multiplies the forces of each site, (p,).

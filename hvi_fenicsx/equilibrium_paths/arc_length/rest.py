@@ -53,7 +53,7 @@ def at_rest(problem: CondensedProblem, sites: Sites) -> Rest:
     is_loaded = np.max(np.abs(away), initial=0.0) > 1e-14 * size
     return Rest(
         z=z,
-        held=is_held(problem, sites, z),
+        held=is_held(sites, z),
         constant=replace(problem, force=held, force_rate=away) if is_loaded else None,
     )
 
@@ -68,13 +68,11 @@ def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int,
     return best, forces[best]
 
 
-def is_held(problem: CondensedProblem, sites: Sites, z: Array) -> bool:
+def is_held(sites: Sites, z: Array) -> bool:
     """Whether the tangent holds the body.
 
     Args:
-        problem: the problem.
-        sites: where its sites are.
+        sites: where all sites are.
         z: their coordinates, (n,).
     """
-    basis, slopes = sites.motions(sites.values(z))
-    return not is_singular(basis.T @ problem.stiffness @ basis + np.diag(slopes))
+    return not is_singular(sites.motions(sites.values(z)).matrix)

@@ -44,7 +44,7 @@ def settled(
         found = None
     if found is None:
         return Nowhere.UNKNOWN
-    return found if is_held(problem, sites, found) else Nowhere.NEUTRAL
+    return found if is_held(sites, found) else Nowhere.NEUTRAL
 
 
 def _unloaded(curve: Curve, none: float, lag: Array, watch: Watch) -> Array | None:

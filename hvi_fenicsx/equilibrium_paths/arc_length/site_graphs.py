@@ -70,7 +70,7 @@ class SiteGraphs(SiteLaws):
         self.low, self.high, self.outward = np.zeros(m), np.zeros(m), np.zeros(m)
         self._base, self._x, self._force = np.zeros(m), np.zeros(m), np.zeros(m)
         self._moves, self._rises = np.zeros(m), np.zeros(m)
-        self._curved, self._bent = np.zeros(m, dtype=bool), np.zeros(m, dtype=bool)
+        self._bound, self._curved, self._bent = (np.zeros(m, dtype=bool) for _ in range(3))
         self._chains: list[tuple[Segment, ...]] = [()] * m
         self._bases: list[Array] = [np.zeros(0)] * m
         for k in range(m):
@@ -151,6 +151,7 @@ class SiteGraphs(SiteLaws):
         self._x[k], self._force[k] = segment.x, segment.force
         self._moves[k] = 0.0 if segment.rise else unit
         self._rises[k] = (segment.rise or segment.slope) * unit
+        self._bound[k] = segment.kind is Kind.BOUND
         self.outward[k] = segment.outward
         self._curved[k] = self._deviations.enter(k, segment)
         self._bent[k] = self._curved[k] or self._turns(k)
@@ -237,7 +238,7 @@ class SiteGraphs(SiteLaws):
 
     def on_drops(self) -> list[int]:
         """The sites where a law drops."""
-        return [k for k in range(len(self)) if self.segment(k).rise < 0.0 and self.segment(k).kind is Kind.JUMP]
+        return [int(k) for k in np.flatnonzero((self._moves == 0.0) & (self._rises < 0.0) & ~self._bound)]
 
     # -- memory
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Integers
@@ -25,9 +26,14 @@ class SiteLaws:
 
     Attributes:
         thresholds: of the path.
+        vertices: the laws at all vertices.
         one: the unknowns of sites of one unknown, which come first, (m1,).
         radials: the p sites of laws on a length, which come next; then come the sites of their openings, (q,).
         laws: of each site; those of openings have none.
+        of_lengths: which of the sites are those of lengths,
+        of_openings: and of openings.
+        site_of: the site of each unknown, of an opening that of its length, (n,).
+        places: the number of each site of one unknown, and of each pair of unknowns of a length, in a matrix, (n, n).
         length: the unit of displacements.
         forces: the units of forces by unknown, (n,).
 
@@ -36,7 +42,7 @@ class SiteLaws:
     """
 
     def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw], thresholds: Thresholds = DEFAULT) -> None:
-        self._problem, self.thresholds = problem, thresholds
+        self._problem, self.thresholds, self.vertices = problem, thresholds, laws
         kinds = {law.unknowns: (law.opens, law.mixity) for law in laws if law.radial}
         lengths = sorted(kinds)
         self.radials = Radials(lengths, [kinds[group][0] for group in lengths], [kinds[group][1] for group in lengths])
@@ -50,6 +56,12 @@ class SiteLaws:
         refuse_shared(problem, self.radials, laws)
         self.length, self.forces = units(problem, laws, self.radials.groups)
         self._force_units = self.forces[[*(key[0] for key in keys), *openings]]
+        m1, last = len(self.one), len(self.one) + len(self.radials)
+        self.of_lengths, self.of_openings = slice(m1, last), slice(last, None)
+        self.site_of = np.empty(problem.size, dtype=np.int64)
+        self.site_of[self.one], self.site_of[self.radials.flat] = np.arange(m1), m1 + self.radials.owner
+        rows, columns = (np.concatenate([self.one, self.radials.flat[pair]]) for pair in self.radials.pairs)
+        self.places = csr_array((np.arange(len(rows)), (rows, columns)), shape=(problem.size, problem.size))
 
     def __len__(self) -> int:
         return len(self.laws)

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from ...system.spectrum import negative_directions
 from ...typing import Array
-from ..segments import Kind
+from .blocks import Blocks
 from .site_graphs import SiteGraphs
 
 
@@ -40,6 +40,26 @@ class Values:
     energies: Array
 
 
+@dataclass(frozen=True, kw_only=True)
+class Motions:
+    """The displacements that can change at a point, q of them.
+
+    Attributes:
+        ways: they as orthonormal rows, (q, n).
+        elastic: the stiffness S along them, (q, q).
+        slopes: those of the forces of laws and bounds, (q,).
+    """
+
+    ways: csr_array
+    elastic: Array
+    slopes: Array
+
+    @property
+    def matrix(self) -> Array:
+        """How all forces change with them, (q, q)."""
+        return self.elastic + np.diag(self.slopes)
+
+
 class Sites(SiteGraphs):
     """All sites, each on one segment of its graph: :class:`.SiteGraphs`, and what a cell gives at its coordinates."""
 
@@ -55,10 +75,11 @@ class Sites(SiteGraphs):
         more, slopes = self._deviations.values(lengths)
         tractions, rises = tractions + more, self._rises + slopes * self._moves
         energies = np.ones(len(s))
-        energies[len(self.one) : len(self.one) + len(self.radials)] = self.radials.energies(e)
+        energies[self.of_lengths] = self.radials.energies(e)
+        forces, spread = tractions * energies, self.site_of[self.radials.flat]
         return Values(
-            x=self._by_unknown(lengths, e),
-            force=self._by_unknown(tractions * energies, e),
+            x=self._by_unknown(lengths, lengths[spread] * e),
+            force=self._by_unknown(forces, forces[spread] * e),
             lengths=lengths,
             tractions=tractions,
             moves=self._moves,
@@ -75,7 +96,7 @@ class Sites(SiteGraphs):
             values: at the point.
             direction: of the coordinates, (n,).
         """
-        radials, p = self.radials, slice(len(self.one), len(self.one) + len(self.radials))
+        radials, p = self.radials, self.of_lengths
         rest = values.s[p] == 0.0
         if not radials.differ or not np.any(rest):
             return None
@@ -84,88 +105,68 @@ class Sites(SiteGraphs):
         energies[p] = radials.energies(e)
         return replace(values, directions=e, energies=energies)
 
-    def _by_unknown(self, values: Array, e: Array) -> Array:
-        """What values along the sites are by unknown, (n,)."""
-        m1, radials, found = len(self.one), self.radials, np.zeros(len(self.forces))
-        found[self.one] = values[:m1]
-        if not len(radials):
-            return found
-        parts = values[m1:][radials.owner] * e
-        beside = radials.openings
-        parts[beside] = np.where(radials.counts[beside], parts[beside], values[m1 + len(radials) :])
-        found[radials.flat] = parts
+    def _by_unknown(self, values: Array, parts: Array) -> Array:
+        """What sites have by unknown, (n,).
+
+        Args:
+            values: of the sites, (m,).
+            parts: of the unknowns of sites of lengths, (N,).
+        """
+        found = np.empty(len(self.forces))
+        found[self.one], found[self.radials.flat] = values[: len(self.one)], self._beside(values, parts)
         return found
 
-    def _blocks(self, values: Values, name: str) -> tuple[Array, Array]:
-        """The derivatives of vectors by z: diagonal, (N,), and what a site adds along its unit vector, (p,)."""
-        m1, radials = len(self.one), self.radials
-        p = len(radials)
-        every = getattr(values, name)
-        radial, s = every[m1 : m1 + p], values.s[m1 : m1 + p]
-        lengths = (values.lengths if name == "moves" else values.tractions)[m1 : m1 + p]
-        across = np.divide(lengths, s, out=radial.copy(), where=s > 0.0)
-        diagonal = across[radials.owner]
-        beside = radials.openings
-        diagonal[beside] = np.where(radials.counts[beside], diagonal[beside], every[m1 + p :])
-        return diagonal, radial - across
+    def _beside(self, values: Array, parts: Array) -> Array:
+        """Parts of the unknowns of sites of lengths; of an opening that does not count, what its own site has, (N,)."""
+        openings, counts = self.radials.openings, self.radials.counts
+        parts[openings] = np.where(counts[openings], parts[openings], values[self.of_openings])
+        return parts
+
+    def moved(self, values: Values) -> Blocks:
+        """The derivatives of the displacements by the coordinates.
+
+        Args:
+            values: at the point.
+        """
+        return self._of_vectors(values, values.lengths, values.moves)
+
+    def risen(self, values: Values) -> Blocks:
+        """The derivatives of the forces of laws and bounds by the coordinates.
+
+        Args:
+            values: at the point.
+        """
+        radials, e, p = self.radials, values.directions, self.of_lengths
+        found = self._of_vectors(values, values.energies * values.tractions, values.energies * values.rises)
+        turned = values.tractions[p][radials.owner] * radials.energy_rates(e, values.s[p])
+        return replace(found, right=found.right + turned)
+
+    def _of_vectors(self, values: Values, sizes: Array, rates: Array) -> Blocks:
+        """The derivatives of vectors that have the directions of z.
+
+        Args:
+            values: of the sites.
+            sizes: of the vectors by site, (m,).
+            rates: their derivatives by s, (m,).
+        """
+        p, owner, e = self.of_lengths, self.radials.owner, values.directions
+        across = np.divide(sizes[p], values.s[p], out=rates[p].copy(), where=values.s[p] > 0.0)
+        return Blocks(
+            sites=self,
+            ones=rates[: len(self.one)],
+            diagonal=self._beside(rates, across[owner]),
+            left=e,
+            right=(rates[p] - across)[owner] * e,
+        )
 
     def jacobian(self, values: Values) -> Array:
-        """The derivative of S x + r by the coordinates, (n, n)."""
-        stiffness, m1, radials = self.stiffness, len(self.one), self.radials
-        found = np.zeros_like(stiffness)
-        found[:, self.one] = stiffness[:, self.one] * values.moves[:m1]
-        found[self.one, self.one] += values.rises[:m1]
-        if not len(radials):
-            return found
-        flat, owner, e = radials.flat, radials.owner, values.directions
-        across, more = self._blocks(values, "moves")
-        moved = stiffness[:, flat]
-        found[:, flat] = moved * across + (radials.summed(moved * e) * more)[:, owner] * e
-        rows, others = radials.pairs
-        found[flat[rows], flat[others]] += self._force_rates(values)
-        return found
-
-    def _force_rates(self, values: Values) -> Array:
-        """The derivatives of the forces on lengths by the coordinates, for each of the pairs of unknowns."""
-        radials, e, p = self.radials, values.directions, slice(len(self.one), len(self.one) + len(self.radials))
-        (rows, others), owner, energies = radials.pairs, radials.owner, values.energies[p]
-        rises, steeper = self._blocks(values, "rises")
-        turned = radials.energy_rates(e, values.s[p])
-        found = (steeper * energies)[owner[rows]] * e[rows] * e[others]
-        found += values.tractions[p][owner[rows]] * e[rows] * turned[others]
-        alone = rises * np.where(radials.counts, energies[owner], 1.0)
-        return np.asarray(found + np.where(rows == others, alone[rows], 0.0))
-
-    def displacement_rate(self, values: Values, direction: Array) -> Array:
-        """How the displacements change along a direction of the coordinates, (n,).
+        """The derivative of S x + r by the coordinates, (n, n).
 
         Args:
             values: at the point.
-            direction: of the coordinates, (n,).
         """
-        found, m1, radials = np.zeros(len(values.x)), len(self.one), self.radials
-        found[self.one] = values.moves[:m1] * direction[self.one]
-        if not len(radials):
-            return found
-        across, more = self._blocks(values, "moves")
-        along = radials.along(values.directions, direction)
-        found[radials.flat] = across * direction[radials.flat] + (more * along)[radials.owner] * values.directions
-        return found
-
-    def force_rate(self, values: Values, direction: Array) -> Array:
-        """How the forces of laws and bounds change along a direction of the coordinates, (n,).
-
-        Args:
-            values: at the point.
-            direction: of the coordinates, (n,).
-        """
-        found, m1, radials = np.zeros(len(values.x)), len(self.one), self.radials
-        found[self.one] = values.rises[:m1] * direction[self.one]
-        if len(radials):
-            rows, others = radials.pairs
-            parts = self._force_rates(values) * direction[radials.flat[others]]
-            found[radials.flat] = np.bincount(rows, parts, minlength=len(radials.flat))
-        return found
+        moved = self.moved(values).sparse @ self.stiffness
+        return np.asarray(moved.T + self.risen(values).sparse.toarray())  # S and the first blocks are symmetric
 
     def along(self, values: Values, motion: Array) -> Array:
         """What a motion is along the displacements of the sites, (m,).
@@ -182,14 +183,13 @@ class Sites(SiteGraphs):
             ]
         )
 
-    def bond_force(self, k: int, values: Values) -> float:
-        """The force of a site's laws alone, without that of a bound.
+    def bond_forces(self, values: Values) -> Array:
+        """The forces of the laws of each site alone, without those of bounds, (m,).
 
         Args:
-            k: the site.
             values: of the sites.
         """
-        return float(self._force[k] if self.segment(k).kind is Kind.BOUND else values.tractions[k])
+        return np.where(self._bound, self._force, values.tractions)
 
     def unstable_directions(self, values: Values, negligible: float = 1e-12) -> int:
         """The number of directions in which the energy falls at constant loads.
@@ -198,46 +198,40 @@ class Sites(SiteGraphs):
             values: of the sites.
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
-        basis, slopes = self.motions(values)
-        ways = csr_array(basis.T)
-        matrix = ways @ (ways @ self.stiffness).T + np.diag(slopes)
-        return negative_directions(matrix, negligible) + len(self.on_drops())
+        motions = self.motions(values)
+        sizes = np.sqrt(np.diag(motions.elastic) + np.abs(motions.slopes))
+        sizes[sizes == 0.0] = 1.0  # else what is stiff, as a length that has just left 0 is across, would hide the rest
+        return negative_directions(motions.matrix / np.outer(sizes, sizes), negligible) + len(self.on_drops())
 
-    def motions(self, values: Values) -> tuple[Array, Array]:
-        """The displacements that can change, as orthonormal columns (n, q), and the slopes of their forces, (q,)."""
-        n, m1, radials = len(values.x), len(self.one), self.radials
-        free = np.flatnonzero(values.moves[:m1])
-        columns = [np.eye(n)[:, self.one[free]]]
-        slopes = [values.rises[free] / values.moves[free]]
-        for p in range(len(radials)):
-            basis, steep = self._turning(p, values)
-            columns, slopes = [*columns, basis], [*slopes, steep]
-        for number, i in enumerate(radials.opening_unknowns):
-            if not radials.counts[radials.openings[number]] and values.moves[m1 + len(radials) + number]:
-                columns, slopes = [*columns, np.eye(n)[:, [i]]], [*slopes, np.zeros(1)]
-        return np.concatenate(columns, axis=1), np.concatenate(slopes)
+    def motions(self, values: Values) -> Motions:
+        """The displacements that can change.
 
-    def _turning(self, p: int, values: Values) -> tuple[Array, Array]:
-        """Along a site's vector and across it: the columns that can change, (n, r), and their slopes, (r,)."""
-        k, here = len(self.one) + p, (self.radials.owner == p) & self.radials.counts
-        unknowns, e = self.radials.flat[here], values.directions[here]
-        axes = _axes(e)
-        moves, steep = bool(values.moves[k]), values.energies[k] * values.rises[k] / (values.moves[k] or 1.0)
-        across = self._across(k, values, float(steep))
-        turns = across <= self.thresholds.curve.held_fast * float(np.max(np.diag(self.stiffness)))
-        kept = np.array([moves, *[turns] * (len(e) - 1)][: len(e)], dtype=bool)
-        found = np.zeros((len(values.x), len(e)))
-        found[unknowns] = axes
-        return found[:, kept], np.array([steep, *[across] * (len(e) - 1)][: len(e)])[kept]
+        Args:
+            values: of the sites.
+        """
+        slopes = self._slopes(values)
+        free = np.flatnonzero(~np.isnan(slopes))
+        ways = self._axes(values.directions).sparse[free]
+        return Motions(ways=ways, elastic=ways @ (ways @ self.stiffness).T, slopes=slopes[free])
 
-    def _across(self, k: int, values: Values, steep: float) -> float:
-        """The slope across a site's vector: infinite where that has no length, and bears a force or stands."""
-        force = float(values.energies[k] * values.tractions[k])
-        if values.lengths[k] > 0.0:
-            return force / float(values.lengths[k])
-        unknown = int(self.unknowns_of(k)[0])
-        stands = not values.moves[k] or abs(force) > self.thresholds.curve.rounding * self.forces[unknown]
-        return np.inf if stands else steep
+    def _axes(self, directions: Array) -> Blocks:
+        """Orthonormal axes of each site, the first that counts along its vector.
+
+        They are those of its unknowns, reflected as Householder (1958) does; what does not count keeps its own.
+        """
+        mirror, halves = self.radials.mirrors(directions)
+        ones, left = np.ones(len(self.one)), -mirror / halves[self.radials.owner]
+        return Blocks(sites=self, ones=ones, diagonal=np.ones(len(mirror)), left=left, right=mirror)
+
+    def _slopes(self, values: Values) -> Array:
+        """How forces change with displacements along the axes of all sites, (n,); nan where these do not move."""
+        radials, p, lengths = self.radials, self.of_lengths, values.lengths[self.of_lengths]
+        rises, moves = values.energies * values.rises, values.moves
+        along = np.divide(rises, moves, out=np.full(len(self), np.nan), where=moves != 0.0)
+        tractions = values.energies[p] * values.tractions[p]
+        across = np.where(values.s[p] > 0.0, np.nan, along[p])  # what rests at 0 is held across the way it sets out
+        np.divide(tractions, lengths, out=across, where=lengths > 0.0)
+        return self._by_unknown(along, np.where(radials.leads(), along[p][radials.owner], across[radials.owner]))
 
     @property
     def bent(self) -> bool:
@@ -247,12 +241,3 @@ class Sites(SiteGraphs):
     def reach(self, values: Values) -> Array:
         """How far the curved sites may move in one step, in units of s, (m,); infinite for the others."""
         return np.asarray(self._deviations.reach(values.lengths) / self.length)
-
-
-def _axes(direction: Array) -> Array:
-    """Orthonormal axes of which a unit vector is the first, as columns; none where the vector has no components."""
-    if len(direction) == 2:
-        return np.array([[direction[0], -direction[1]], [direction[1], direction[0]]])
-    axes = np.linalg.svd(direction[None])[2].T if len(direction) > 1 else np.ones((len(direction), len(direction)))
-    axes[:, :1] = direction[:, None]
-    return axes

@@ -29,7 +29,6 @@ class VertexLaw:
         bounds: finite bounds of its coordinate; there chords of a curved law have its traction.
         passed: what it remembers, along its coordinate; None without memory.
         mixity: how the energy of separation depends on the mode; None: it does not.
-        lost: the energy that is lost for good, and the memory of which it is; None: not asked for yet.
     """
 
     group: int
@@ -43,7 +42,6 @@ class VertexLaw:
     bounds: tuple[float, ...]
     passed: Passed | None
     mixity: Mixity | None = None
-    lost: tuple[Passed, float] | None = None
 
     @property
     def curved(self) -> bool:
@@ -89,44 +87,9 @@ class VertexLaw:
             traction: along it.
         """
         if self.passed is not None:
-            self.passed = self._reached(x, traction)
-
-    def _reached(self, x: float, traction: float) -> Passed:
-        assert self.passed is not None
-        near = self.sign * self.law.breaks
-        x = next((float(b) for b in near if abs(b - x) <= 1e-11 * abs(x)), x)
-        return self.passed.reached(x, traction, even=self.law.even)
-
-    def recoverable(self, x: float, traction: float) -> float:
-        """What it gives back on the way to zero: w j, or the triangle under the secant of one with memory.
-
-        Args:
-            x: the coordinate.
-            traction: along it.
-        """
-        if self.passed is not None:
-            return 0.5 * self.weight * x * traction
-        return self.weight * float(self.law.value(np.array([self.sign * x]))[0])
-
-    def dissipated(self, x: float, traction: float) -> float:
-        """The energy that is lost for good once it has been at x, or where it was before.
-
-        Args:
-            x: the coordinate.
-            traction: along it.
-        """
-        if self.passed is None:
-            return 0.0
-        passed = self._reached(x, traction)
-        if self.lost is None or self.lost[0] != passed:
-            self.lost = passed, self._lost_behind(passed)
-        return self.lost[1]
-
-    def _lost_behind(self, passed: Passed) -> float:
-        ends, tractions = np.array(passed.displacements), np.array(passed.tractions)
-        taken = self.law.value(self.sign * ends) - self.law.value(np.zeros(1))  # a smoothed law is not zero at rest
-        lost = taken - 0.5 * ends * tractions
-        return self.weight * float(lost[1] if self.law.even else lost.sum())
+            near = self.sign * self.law.breaks
+            x = next((float(b) for b in near if abs(b - x) <= 1e-11 * abs(x)), x)
+            self.passed = self.passed.reached(x, traction, even=self.law.even)
 
     def memory(self) -> list[float]:
         """What it remembers: least and greatest coordinate, and the tractions there; zeros without memory."""
