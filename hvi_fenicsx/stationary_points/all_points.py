@@ -56,7 +56,7 @@ class Enumeration:
         if self.laws is None and np.any(self.problem.force_error):
             raise ValueError("of polylines near curved laws the laws themselves are needed")
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
-        self._balance = RigidBalance(self.problem)
+        self._balance = RigidBalance(self.problem, self.laws)
         self._thresholds = self.problem.thresholds.cells
         self.points = PointList(self.problem.size, self.problem.thresholds.points.same)
         self._cells: LawsOfCells = PolylineCells(self.problem) if self.laws is None else CurvedCells(self.laws)

@@ -23,6 +23,7 @@ class CellThresholds:
         rigid_passes: passes over all unknowns by the balance of whole bodies.
         rigid_progress: a pass of these that makes no interval shorter by this share is the last.
         rigid: eigenvalues of S below this share of the largest are those of rigid motions.
+        same_share: shares of a rigid motion that are this near to 0, 1 or -1 are these numbers.
         part: share of the largest curvature.
         widened_radius: relative widening of the radius, for rounding and for the residual of y.
         hull_rounding: corners nearer to the hull than this share of the products compared are kept.
@@ -54,6 +55,7 @@ class CellThresholds:
     rigid_passes: int = 20
     rigid_progress: float = 0.1
     rigid: float = 1e-11
+    same_share: float = 1e-9
     part: float = 0.9
     widened_radius: float = 1e-9
     hull_rounding: float = 1e-15

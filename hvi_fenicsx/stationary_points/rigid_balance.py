@@ -2,57 +2,57 @@
 
 With τ = f - Sx the forces that laws and bounds bear, a rigid motion r (Sr = 0) demands r·τ = r·f. And
 x = Tx_p + G(f - τ), where x_p are a few unknowns, pivots, that fix the rigid motion T x_p. So intervals of the forces,
-which also cells that reach far have, bound the differences of displacements. S and G are what they were computed to be:
-what Sr and I - T_p - GS are off zero is counted, with the rounding of these products.
+which also cells that reach far have, bound the differences of displacements.
+
+Elastic forces have no net force: what Sr is off zero by the rounding of S (:mod:`.rigid_motions`) is taken for zero.
+Else a body a million slips away would be held by rounding, where a load that is above its limit by 1e-7 pulls. What is
+beyond rounding counts, and so does what I - T_p - GS is off zero.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import qr
 
 from ..typing import Array
+from .curved_laws import CurvedLaws
 from .graph_clip import GraphClip, clipped_again
+from .rigid_motions import EPSILON, RigidMotions
 from .scalar_problem import ArcTable, ScalarProblem
-
-EPSILON = float(np.finfo(float).eps)
 
 
 class RigidBalance:
     """What net balance and elasticity leave of a cell.
 
     Args:
-        problem: the problem.
+        problem: the problem; of curved laws that of the polylines near them.
+        laws: the laws, where these are curved.
 
     Attributes:
         pivots: unknowns that fix the rigid motions, one for each.
     """
 
-    def __init__(self, problem: ScalarProblem) -> None:
-        self._problem, n = problem, problem.size
+    def __init__(self, problem: ScalarProblem, laws: CurvedLaws | None = None) -> None:
+        self._problem, self._laws, n = problem, laws, problem.size
         self._widened = problem.thresholds.cells.widened
         self._arcs = ArcTable.of(problem.chains[:n])
         self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
-        values, vectors = np.linalg.eigh(problem.stiffness)
-        rigid = values <= problem.thresholds.cells.rigid * values[-1]
-        shapes, elastic = vectors[:, rigid], vectors[:, ~rigid]
-        self.pivots = qr(shapes.T, pivoting=True, mode="r")[1][: shapes.shape[1]]
-        self._motions = shapes @ np.linalg.inv(shapes[self.pivots])
-        self._motions[np.abs(self._motions) < 1e-13] = 0.0
-        flexibility = (elastic / values[~rigid]) @ elastic.T
-        self._flexibility = flexibility - self._motions @ flexibility[self.pivots]
-        self._measure_errors()
+        motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
+        self.pivots, self._motions = motions.pivots, motions.shapes
+        others = np.ix_(motions.others, motions.others)
+        self._flexibility = np.zeros((n, n))
+        self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
+        resistance, rounding = motions.resistance(problem.stiffness)
+        self._net = np.where(resistance <= rounding, 0.0, resistance + rounding)
+        self._measure_error()
 
-    def _measure_errors(self) -> None:
-        """How far the products with S are off what they are for exact numbers, rounding included."""
+    def _measure_error(self) -> None:
+        """How far G is off the inverse on elastic parts, for exact numbers, rounding included."""
         stiffness, n = self._problem.stiffness, self._problem.size
         rest = np.eye(n) - self._flexibility @ stiffness
         rest[:, self.pivots] -= self._motions
         sizes = np.eye(n) + np.abs(self._flexibility) @ np.abs(stiffness)
         sizes[:, self.pivots] += np.abs(self._motions)
         self._rest = np.abs(rest) + n * EPSILON * sizes
-        net = stiffness @ self._motions
-        self._net = np.abs(net) + n * EPSILON * (np.abs(stiffness) @ np.abs(self._motions))
 
     def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """A smaller cell with the same stationary points; None if there is none in it.
@@ -81,11 +81,13 @@ class RigidBalance:
             ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
         least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
         most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
-        wide = self._widened * (np.abs(least) + np.abs(most)) + problem.force_error
-        return (
-            np.where(low <= problem.lower, -np.inf, least - wide),
-            np.where(high >= problem.upper, np.inf, most + wide),
-        )
+        wide = self._widened * (np.abs(least) + np.abs(most))
+        least, most = least - wide - problem.force_error, most + wide + problem.force_error
+        if self._laws is not None:
+            first, last = self._laws.forces(low, high)
+            wide = self._widened * (np.abs(first) + np.abs(last))
+            least, most = np.maximum(least, first - wide), np.minimum(most, last + wide)
+        return np.where(low <= problem.lower, -np.inf, least), np.where(high >= problem.upper, np.inf, most)
 
     def _balanced(self, least: Array, most: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
         """Smaller intervals of the forces: the net force along each rigid motion is that of the load."""
@@ -131,6 +133,8 @@ class RigidBalance:
         flexibility = self._flexibility + shift @ motions.T
         first, last = _product(flexibility, problem.force - most, problem.force - least)
         size = np.maximum(np.abs(low), np.abs(high))
+        if not self._net.any() and self._rest.sum(axis=1).max() < 0.5:  # then only e is off, by less than itself
+            size = np.minimum(size, 2.0 * np.max(np.abs([first, last])))
         forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
         error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * (np.abs(flexibility) @ forces)
         return first - error, last + error
