@@ -21,6 +21,7 @@ from .cell_parts import parts
 from .cell_verdict import LawsOfCells
 from .curved_cells import CurvedCells
 from .curved_laws import CurvedLaws
+from .elastic_radius import ElasticRadius
 from .linear_test import LinearTest
 from .point_list import PointList, StationaryPoint
 from .polyline_cells import PolylineCells
@@ -57,6 +58,7 @@ class Enumeration:
             raise ValueError("of polylines near curved laws the laws themselves are needed")
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
         self._balance = RigidBalance(self.problem, self.laws)
+        self._elastic = ElasticRadius(self.problem, self._balance)
         self._thresholds = self.problem.thresholds.cells
         self.points = PointList(self.problem.size, self.problem.thresholds.points.same)
         self._cells: LawsOfCells = PolylineCells(self.problem) if self.laws is None else CurvedCells(self.laws)
@@ -126,7 +128,7 @@ class Enumeration:
             if sides is None:
                 return None
             smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
-            if np.any(smaller.low > smaller.high):
+            if np.any(smaller.low > smaller.high) or (smaller := self._elastic.tightened(smaller)) is None:
                 return None
             shrinks = np.any(smaller.high - smaller.low < self._thresholds.shorter * (cell.high - cell.low))
             cell = smaller

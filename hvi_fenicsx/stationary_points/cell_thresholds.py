@@ -26,6 +26,7 @@ class CellThresholds:
         same_share: shares of a rigid motion that are this near to 0, 1 or -1 are these numbers.
         part: share of the largest curvature.
         widened_radius: relative widening of the radius, for rounding and for the residual of y.
+        radius_passes: passes over what elastic parts differ by from those of a point.
         hull_rounding: corners nearer to the hull than this share of the products compared are kept.
         many_corners: where there are more corners than this, those inside the hull are left out.
         wide: intervals of pivots that are wider than this many times the largest joint are divided in growing parts,
@@ -58,6 +59,7 @@ class CellThresholds:
     same_share: float = 1e-9
     part: float = 0.9
     widened_radius: float = 1e-9
+    radius_passes: int = 8
     hull_rounding: float = 1e-15
     many_corners: int = 8
     wide: float = 30.0

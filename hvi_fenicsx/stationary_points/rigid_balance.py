@@ -29,6 +29,9 @@ class RigidBalance:
 
     Attributes:
         pivots: unknowns that fix the rigid motions, one for each.
+        motions: T, (n, k).
+        exact: whether S resists no motion, and G is near enough to an inverse for bounds of what it is off.
+        softness: the largest square of each e whose elastic energy is ½, (n,); where this is exact.
     """
 
     def __init__(self, problem: ScalarProblem, laws: CurvedLaws | None = None) -> None:
@@ -37,22 +40,24 @@ class RigidBalance:
         self._arcs = ArcTable.of(problem.chains[:n])
         self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
         motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
-        self.pivots, self._motions = motions.pivots, motions.shapes
+        self.pivots, self.motions = motions.pivots, motions.shapes
         others = np.ix_(motions.others, motions.others)
         self._flexibility = np.zeros((n, n))
         self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
         resistance, rounding = motions.resistance(problem.stiffness)
         self._net = np.where(resistance <= rounding, 0.0, resistance + rounding)
-        self._measure_error()
+        self._rest = self._error()
+        self.exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
+        self.softness = np.diag(self._flexibility) + 2.0 * np.diag(self._rest @ np.abs(self._flexibility))
 
-    def _measure_error(self) -> None:
-        """How far G is off the inverse on elastic parts, for exact numbers, rounding included."""
+    def _error(self) -> Array:
+        """How far G is off the inverse on elastic parts, for exact numbers, rounding included, (n, n)."""
         stiffness, n = self._problem.stiffness, self._problem.size
         rest = np.eye(n) - self._flexibility @ stiffness
-        rest[:, self.pivots] -= self._motions
+        rest[:, self.pivots] -= self.motions
         sizes = np.eye(n) + np.abs(self._flexibility) @ np.abs(stiffness)
-        sizes[:, self.pivots] += np.abs(self._motions)
-        self._rest = np.abs(rest) + n * EPSILON * sizes
+        sizes[:, self.pivots] += np.abs(self.motions)
+        return np.asarray(np.abs(rest) + n * EPSILON * sizes)
 
     def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """A smaller cell with the same stationary points; None if there is none in it.
@@ -64,13 +69,39 @@ class RigidBalance:
         limits = self._problem.thresholds.cells
         return clipped_again(self._once, low, high, most_rounds=limits.rigid_passes, progress=limits.rigid_progress)
 
+    def forces(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        """What laws and bounds bear in a cell, (n,) each; None if the net forces cannot be in balance.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+        """
+        return self._balanced(*self._forces(low, high), low, high)
+
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
-        if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
+        if (forces := self.forces(low, high)) is None:
             return None
         rounding = self._widened * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
         slack = rounding + self._problem.force_error
         ends = self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)
-        return None if ends is None else self._elastic(*ends, *forces)
+        if ends is None or not np.all(np.isfinite(forces)):
+            return ends
+        return self.moved(*ends, *self._elastic_parts(*ends, *forces))
+
+    def elastic_parts(self, low: Array, high: Array, forces: tuple[Array, Array]) -> tuple[Array, Array]:
+        """The intervals of e = x - T x_p in a cell, (n,) each.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+            forces: what laws and bounds bear there.
+        """
+        moved_low, moved_high = product(self.motions, low[self.pivots], high[self.pivots])
+        first, last = low - moved_high, high - moved_low
+        if not np.all(np.isfinite(forces)):
+            return first, last
+        begin, end = self._elastic_parts(low, high, *forces)
+        return np.maximum(first, begin), np.minimum(last, end)
 
     def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
         """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""
@@ -92,7 +123,7 @@ class RigidBalance:
     def _balanced(self, least: Array, most: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
         """Smaller intervals of the forces: the net force along each rigid motion is that of the load."""
         force, size = self._problem.force, np.maximum(np.abs(low), np.abs(high))
-        for motion, net in zip(self._motions.T, self._net.T, strict=True):
+        for motion, net in zip(self.motions.T, self._net.T, strict=True):
             i = np.flatnonzero(motion)
             r = motion[i]
             ends = np.sort(np.stack([r * least[i], r * most[i]]), axis=0)
@@ -104,44 +135,54 @@ class RigidBalance:
             least[i], most[i] = np.maximum(least[i], new[0]), np.minimum(most[i], new[1])
         return None if np.any(least > most) else (least, most)
 
-    def _elastic(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
-        """Smaller intervals of the displacements: x = T x_p + e with e = G(f - τ)."""
-        if not np.all(np.isfinite(least) & np.isfinite(most)):
-            return low, high
-        first, last = self._elastic_parts(low, high, least, most)
+    def moved(self, low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals of the displacements x = T x_p + e; None if one is empty.
+
+        Args:
+            low: of x, (n,), finite.
+            high: of x, (n,), finite.
+            first: of e, (n,), finite.
+            last: of e, (n,), finite.
+        """
         begin, end = low[self.pivots], high[self.pivots]
-        for j, motion in enumerate(self._motions.T):
+        for j, motion in enumerate(self.motions.T):
             i = np.flatnonzero(motion)
             others = np.delete(np.arange(len(begin)), j)
-            rest_low, rest_high = _product(self._motions[np.ix_(i, others)], begin[others], end[others])
+            rest_low, rest_high = product(self.motions[np.ix_(i, others)], begin[others], end[others])
             ways = np.sort(np.stack([low[i] - last[i] - rest_high, high[i] - first[i] - rest_low]) / motion[i], axis=0)
             slack = self._widened * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
             begin[j], end[j] = max(begin[j], ways[0].max() - slack), min(end[j], ways[1].min() + slack)
         if np.any(begin > end):
             return None
-        moved_low, moved_high = _product(self._motions, begin, end)
+        moved_low, moved_high = product(self.motions, begin, end)
         slack = self._widened * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
         low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
         return None if np.any(low > high) else (low, high)
 
     def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
         """The intervals of e, made short: G is changed along rigid motions, where the net force is known."""
-        problem, motions, n = self._problem, self._motions, self._problem.size
+        problem, motions, n = self._problem, self.motions, self._problem.size
         weights = (most - least) ** 2 + 1e-300
         normal = motions.T @ (weights[:, None] * motions)
         shift = -np.linalg.lstsq(normal, (self._flexibility * weights @ motions).T, rcond=None)[0].T
         flexibility = self._flexibility + shift @ motions.T
-        first, last = _product(flexibility, problem.force - most, problem.force - least)
+        first, last = product(flexibility, problem.force - most, problem.force - least)
         size = np.maximum(np.abs(low), np.abs(high))
-        if not self._net.any() and self._rest.sum(axis=1).max() < 0.5:  # then only e is off, by less than itself
+        if self.exact:  # then only e is off, by less than itself
             size = np.minimum(size, 2.0 * np.max(np.abs([first, last])))
         forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
         error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * (np.abs(flexibility) @ forces)
         return first - error, last + error
 
 
-def _product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """The ends of matrix @ [low, high]."""
+def product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The ends of matrix @ [low, high].
+
+    Args:
+        matrix: (m, n).
+        low: of the intervals, (n,).
+        high: of the intervals, (n,).
+    """
     plus, minus = np.maximum(matrix, 0.0), np.minimum(matrix, 0.0)
     return plus @ low + minus @ high, plus @ high + minus @ low
 
