@@ -28,6 +28,7 @@ from .polyline_cells import PolylineCells
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
 from .scalar_problem import ScalarProblem
+from .settled import settled
 from .tightening import ForceIntervals
 
 
@@ -131,7 +132,7 @@ class Enumeration:
             if np.any(smaller.low > smaller.high) or (smaller := self._elastic.tightened(smaller)) is None:
                 return None
             shrinks = np.any(smaller.high - smaller.low < self._thresholds.shorter * (cell.high - cell.low))
-            cell = smaller
+            cell = settled(self.problem, smaller)
             if not shrinks:
                 break
         return cell

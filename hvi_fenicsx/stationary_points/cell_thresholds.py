@@ -18,6 +18,7 @@ class CellThresholds:
         widened: relative widening of what intervals of forces leave, for rounding.
         least_widened: the least widening, where displacements are about 1: without it, an interval that is clipped
             again and again about a joint at zero would end there.
+        settled: intervals shorter than this about a jump or at a bound are that place.
         force_passes: passes over all unknowns by their own balance.
         force_progress: a pass that makes no interval shorter by this share is the last.
         rigid_passes: passes over all unknowns by the balance of whole bodies.
@@ -51,6 +52,7 @@ class CellThresholds:
     shorter_look: float = 0.7
     widened: float = 1e-12
     least_widened: float = 1e-30
+    settled: float = 1e-20
     force_passes: int = 8
     force_progress: float = 1e-3
     rigid_passes: int = 20
