@@ -124,18 +124,22 @@ class Enumeration:
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller; None if no stationary point is in it."""
         for _ in range(self._thresholds.most_rounds):
-            sides = self._forces.tightened(cell.low, cell.high)
-            sides = None if sides is None else self._balance.tightened(*sides)
-            if sides is None:
-                return None
-            smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
-            if np.any(smaller.low > smaller.high) or (smaller := self._elastic.tightened(smaller)) is None:
+            smaller = self._tightened_once(cell)
+            if smaller is None:
                 return None
             shrinks = np.any(smaller.high - smaller.low < self._thresholds.shorter * (cell.high - cell.low))
             cell = settled(self.problem, smaller)
             if not shrinks:
                 break
         return cell
+
+    def _tightened_once(self, cell: Box) -> Box | None:
+        sides = self._forces.tightened(cell.low, cell.high)
+        sides = None if sides is None else self._balance.tightened(*sides)
+        if sides is None:
+            return None
+        smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
+        return None if np.any(smaller.low > smaller.high) else self._elastic.tightened(smaller)
 
     def enter(self, x: Array) -> None:
         """Keep the stationary point at a place, or very near it, if there is one and it is new.

@@ -15,8 +15,10 @@ import numpy as np
 from ..typing import Array
 from .boxes import Box, clipped
 from .monotone_radius import least_products
-from .rigid_balance import EPSILON, RigidBalance, product
+from .rigid_balance import RigidBalance, product
 from .scalar_problem import ScalarProblem
+
+EPSILON = float(np.finfo(float).eps)
 
 
 class ElasticRadius:
@@ -40,17 +42,16 @@ class ElasticRadius:
         """A smaller cell with the same stationary points; None if there is none in it.
 
         Args:
-            cell: the cell; its x is the point y.
+            cell: the cell; its x, or what is nearest to it there, is the point y.
         """
         if not self._known:
             return cell
+        cell = replace(cell, x=clipped(cell.x, cell.low, cell.high))
         balance = self._balance
         if (forces := balance.forces(cell.low, cell.high)) is None:
             return None
-        parts = balance.elastic_parts(cell.low, cell.high, forces)
-        ends = (
-            None if (parts := self._near(cell, forces, *parts)) is None else balance.moved(cell.low, cell.high, *parts)
-        )
+        parts = self._near(cell, forces, *balance.elastic_parts(cell.low, cell.high, forces))
+        ends = None if parts is None else balance.moved(cell.low, cell.high, *parts)
         return None if ends is None else replace(cell, low=ends[0], high=ends[1], x=clipped(cell.x, *ends))
 
     def _near(self, cell: Box, forces: tuple[Array, Array], first: Array, last: Array) -> tuple[Array, Array] | None:

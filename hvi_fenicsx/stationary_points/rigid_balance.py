@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, Integers
 from .curved_laws import CurvedLaws
 from .graph_clip import GraphClip, clipped_again
-from .rigid_motions import EPSILON, RigidMotions
+from .rigid_motions import RigidMotions
 from .scalar_problem import ArcTable, ScalarProblem
+
+EPSILON = float(np.finfo(float).eps)
 
 
 class RigidBalance:
@@ -40,7 +42,8 @@ class RigidBalance:
         self._arcs = ArcTable.of(problem.chains[:n])
         self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
         motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
-        self.pivots, self.motions = motions.pivots, motions.shapes
+        self.pivots: Integers = motions.pivots
+        self.motions: Array = motions.shapes
         others = np.ix_(motions.others, motions.others)
         self._flexibility = np.zeros((n, n))
         self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
@@ -123,7 +126,8 @@ class RigidBalance:
     def _balanced(self, least: Array, most: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
         """Smaller intervals of the forces: the net force along each rigid motion is that of the load."""
         force, size = self._problem.force, np.maximum(np.abs(low), np.abs(high))
-        for motion, net in zip(self.motions.T, self._net.T, strict=True):
+        for j in range(len(self.pivots)):
+            motion, net = self.motions[:, j], self._net[:, j]
             i = np.flatnonzero(motion)
             r = motion[i]
             ends = np.sort(np.stack([r * least[i], r * most[i]]), axis=0)
@@ -145,7 +149,8 @@ class RigidBalance:
             last: of e, (n,), finite.
         """
         begin, end = low[self.pivots], high[self.pivots]
-        for j, motion in enumerate(self.motions.T):
+        for j in range(len(begin)):
+            motion = self.motions[:, j]
             i = np.flatnonzero(motion)
             others = np.delete(np.arange(len(begin)), j)
             rest_low, rest_high = product(self.motions[np.ix_(i, others)], begin[others], end[others])
