@@ -21,12 +21,14 @@ from .cell_parts import parts
 from .cell_verdict import LawsOfCells
 from .curved_cells import CurvedCells
 from .curved_laws import CurvedLaws
+from .elastic_radius import ElasticRadius
 from .linear_test import LinearTest
 from .point_list import PointList, StationaryPoint
 from .polyline_cells import PolylineCells
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
 from .scalar_problem import ScalarProblem
+from .settled import settled
 from .tightening import ForceIntervals
 
 
@@ -56,7 +58,8 @@ class Enumeration:
         if self.laws is None and np.any(self.problem.force_error):
             raise ValueError("of polylines near curved laws the laws themselves are needed")
         self._forces = ForceIntervals(self.problem, joints_at_ends=False)
-        self._balance = RigidBalance(self.problem)
+        self._balance = RigidBalance(self.problem, self.laws)
+        self._elastic = ElasticRadius(self.problem, self._balance)
         self._thresholds = self.problem.thresholds.cells
         self.points = PointList(self.problem.size, self.problem.thresholds.points.same)
         self._cells: LawsOfCells = PolylineCells(self.problem) if self.laws is None else CurvedCells(self.laws)
@@ -121,18 +124,22 @@ class Enumeration:
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller; None if no stationary point is in it."""
         for _ in range(self._thresholds.most_rounds):
-            sides = self._forces.tightened(cell.low, cell.high)
-            sides = None if sides is None else self._balance.tightened(*sides)
-            if sides is None:
-                return None
-            smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
-            if np.any(smaller.low > smaller.high):
+            smaller = self._tightened_once(cell)
+            if smaller is None:
                 return None
             shrinks = np.any(smaller.high - smaller.low < self._thresholds.shorter * (cell.high - cell.low))
-            cell = smaller
+            cell = settled(self.problem, smaller)
             if not shrinks:
                 break
         return cell
+
+    def _tightened_once(self, cell: Box) -> Box | None:
+        sides = self._forces.tightened(cell.low, cell.high)
+        sides = None if sides is None else self._balance.tightened(*sides)
+        if sides is None:
+            return None
+        smaller = monotone_radius.tightened(self._relaxation, replace(cell, low=sides[0], high=sides[1]))
+        return None if np.any(smaller.low > smaller.high) else self._elastic.tightened(smaller)
 
     def enter(self, x: Array) -> None:
         """Keep the stationary point at a place, or very near it, if there is one and it is new.

@@ -18,13 +18,16 @@ class CellThresholds:
         widened: relative widening of what intervals of forces leave, for rounding.
         least_widened: the least widening, where displacements are about 1: without it, an interval that is clipped
             again and again about a joint at zero would end there.
+        settled: intervals shorter than this about a jump or at a bound are that place.
         force_passes: passes over all unknowns by their own balance.
         force_progress: a pass that makes no interval shorter by this share is the last.
         rigid_passes: passes over all unknowns by the balance of whole bodies.
         rigid_progress: a pass of these that makes no interval shorter by this share is the last.
         rigid: eigenvalues of S below this share of the largest are those of rigid motions.
+        same_share: shares of a rigid motion that are this near to 0, 1 or -1 are these numbers.
         part: share of the largest curvature.
         widened_radius: relative widening of the radius, for rounding and for the residual of y.
+        radius_passes: passes over what elastic parts differ by from those of a point.
         hull_rounding: corners nearer to the hull than this share of the products compared are kept.
         many_corners: where there are more corners than this, those inside the hull are left out.
         wide: intervals of pivots that are wider than this many times the largest joint are divided in growing parts,
@@ -49,13 +52,16 @@ class CellThresholds:
     shorter_look: float = 0.7
     widened: float = 1e-12
     least_widened: float = 1e-30
+    settled: float = 1e-20
     force_passes: int = 8
     force_progress: float = 1e-3
     rigid_passes: int = 20
     rigid_progress: float = 0.1
     rigid: float = 1e-11
+    same_share: float = 1e-9
     part: float = 0.9
     widened_radius: float = 1e-9
+    radius_passes: int = 8
     hull_rounding: float = 1e-15
     many_corners: int = 8
     wide: float = 30.0

@@ -16,6 +16,7 @@ from ..typing import Array
 from .arcs import FREE, Chain, chain, total
 from .law_graphs import LawGraph, exact_graph, law_graph, near_graph
 from .lengths import Lengths
+from .rigid_motions import with_motions
 from .scalar_problem import ScalarProblem
 from .thresholds import DEFAULT, PolylineThresholds, Thresholds
 
@@ -55,8 +56,10 @@ def scalar_problem(
     chains = [*unknowns, *(laws.chains[v] for v in vectors)]
     whole = tuple(total(one) if one else FREE for one in chains)
     lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, polylines.off_drops)
+    stiffness, motions = with_motions(problem.stiffness, thresholds.cells)
     return ScalarProblem(
-        stiffness=problem.stiffness,
+        stiffness=stiffness,
+        motions=motions,
         force=problem.load(factor),
         lower=lower,
         upper=upper,

@@ -127,6 +127,27 @@ class CurvedLaws:
         bears = (low <= self.near.lower) | (high >= self.near.upper)
         return least, np.where(bears, np.inf, most)
 
+    def forces(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bounds of the laws' forces on intervals, jumps at the ends included, (n,) each.
+
+        The traction is H' - G', and neither of the two falls.
+
+        Args:
+            low: of the intervals, (n,).
+            high: of the intervals, (n,).
+        """
+        least, most = np.zeros((2, self.near.size))
+        for bonds in self.problem.bonds:
+            at, signs, law = bonds.unknowns[:, 0], bonds.signs[:, 0], bonds.law
+            begin, end = np.sort(np.stack([signs * low[at], signs * high[at]]), axis=0)
+            ends = (
+                bonds.weights * signs * (law.convex.left(begin) - law.concave.right(end)),
+                bonds.weights * signs * (law.convex.right(end) - law.concave.left(begin)),
+            )
+            np.add.at(least, at, np.minimum(*ends))
+            np.add.at(most, at, np.maximum(*ends))
+        return least, most
+
     def tractions(self, x: Array) -> tuple[Array, Array]:
         """The forces of the laws where none jumps, and the sum of the sizes of their parts, (n,) each.
 

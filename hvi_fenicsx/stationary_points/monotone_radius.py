@@ -27,7 +27,7 @@ def tightened(relaxation: Relaxation, box: Box) -> Box:
     problem, limits = relaxation.problem, relaxation.problem.thresholds.cells
     solved, curvature = relaxation.solve(box, limits.part)
     y = solved.x
-    short = -np.minimum(_least_products(problem, box, y, curvature.added), 0.0).sum()
+    short = -np.minimum(least_products(problem, box, y, curvature.added), 0.0).sum()
     size = float(np.abs(problem.force) @ np.abs(y)) + problem.energy_size(y)
     with np.errstate(invalid="ignore"):
         reach = curvature.radii * np.sqrt(short * (1.0 + limits.widened_radius) + 1e-14 * size)
@@ -47,8 +47,17 @@ def tightened(relaxation: Relaxation, box: Box) -> Box:
     )
 
 
-def _least_products(problem: ScalarProblem, box: Box, y: Array, added: Array) -> Array:
-    """The least (x - y)(t - τ) + d (x - y)² on the graph of each law in the box, (n,)."""
+def least_products(problem: ScalarProblem, box: Box, y: Array, added: Array) -> Array:
+    """The least (x - y)(t - τ) + d (x - y)² on the graph of each law in the box, (n,).
+
+    What a bound bears adds nothing negative, since y is within the bounds.
+
+    Args:
+        problem: the problem.
+        box: the box; where it is a point, y is there.
+        y: a point in it, (n,).
+        added: d, (n,).
+    """
     arcs, at, d = problem.arcs, y[:, None], added[:, None]
     tau = (problem.force - problem.stiffness @ y)[:, None]
     low, high = np.maximum(arcs.low, box.low[:, None]), np.minimum(arcs.high, box.high[:, None])

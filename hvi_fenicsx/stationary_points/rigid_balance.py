@@ -2,17 +2,21 @@
 
 With τ = f - Sx the forces that laws and bounds bear, a rigid motion r (Sr = 0) demands r·τ = r·f. And
 x = Tx_p + G(f - τ), where x_p are a few unknowns, pivots, that fix the rigid motion T x_p. So intervals of the forces,
-which also cells that reach far have, bound the differences of displacements. S and G are what they were computed to be:
-what Sr and I - T_p - GS are off zero is counted, with the rounding of these products.
+which also cells that reach far have, bound the differences of displacements.
+
+Elastic forces have no net force: what Sr is off zero by the rounding of S (:mod:`.rigid_motions`) is taken for zero.
+Else a body a million slips away would be held by rounding, where a load that is above its limit by 1e-7 pulls. What is
+beyond rounding counts, and so does what I - T_p - GS is off zero.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import qr
 
-from ..typing import Array
+from ..typing import Array, Integers
+from .curved_laws import CurvedLaws
 from .graph_clip import GraphClip, clipped_again
+from .rigid_motions import RigidMotions
 from .scalar_problem import ArcTable, ScalarProblem
 
 EPSILON = float(np.finfo(float).eps)
@@ -22,37 +26,41 @@ class RigidBalance:
     """What net balance and elasticity leave of a cell.
 
     Args:
-        problem: the problem.
+        problem: the problem; of curved laws that of the polylines near them.
+        laws: the laws, where these are curved.
 
     Attributes:
         pivots: unknowns that fix the rigid motions, one for each.
+        motions: T, (n, k).
+        exact: whether S resists no motion, and G is near enough to an inverse for bounds of what it is off.
+        softness: the largest square of each e whose elastic energy is ½, (n,); where this is exact.
     """
 
-    def __init__(self, problem: ScalarProblem) -> None:
-        self._problem, n = problem, problem.size
+    def __init__(self, problem: ScalarProblem, laws: CurvedLaws | None = None) -> None:
+        self._problem, self._laws, n = problem, laws, problem.size
         self._widened = problem.thresholds.cells.widened
         self._arcs = ArcTable.of(problem.chains[:n])
         self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
-        values, vectors = np.linalg.eigh(problem.stiffness)
-        rigid = values <= problem.thresholds.cells.rigid * values[-1]
-        shapes, elastic = vectors[:, rigid], vectors[:, ~rigid]
-        self.pivots = qr(shapes.T, pivoting=True, mode="r")[1][: shapes.shape[1]]
-        self._motions = shapes @ np.linalg.inv(shapes[self.pivots])
-        self._motions[np.abs(self._motions) < 1e-13] = 0.0
-        flexibility = (elastic / values[~rigid]) @ elastic.T
-        self._flexibility = flexibility - self._motions @ flexibility[self.pivots]
-        self._measure_errors()
+        motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
+        self.pivots: Integers = motions.pivots
+        self.motions: Array = motions.shapes
+        others = np.ix_(motions.others, motions.others)
+        self._flexibility = np.zeros((n, n))
+        self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
+        resistance, rounding = motions.resistance(problem.stiffness)
+        self._net = np.where(resistance <= rounding, 0.0, resistance + rounding)
+        self._rest = self._error()
+        self.exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
+        self.softness = np.diag(self._flexibility) + 2.0 * np.diag(self._rest @ np.abs(self._flexibility))
 
-    def _measure_errors(self) -> None:
-        """How far the products with S are off what they are for exact numbers, rounding included."""
+    def _error(self) -> Array:
+        """How far G is off the inverse on elastic parts, for exact numbers, rounding included, (n, n)."""
         stiffness, n = self._problem.stiffness, self._problem.size
         rest = np.eye(n) - self._flexibility @ stiffness
-        rest[:, self.pivots] -= self._motions
+        rest[:, self.pivots] -= self.motions
         sizes = np.eye(n) + np.abs(self._flexibility) @ np.abs(stiffness)
-        sizes[:, self.pivots] += np.abs(self._motions)
-        self._rest = np.abs(rest) + n * EPSILON * sizes
-        net = stiffness @ self._motions
-        self._net = np.abs(net) + n * EPSILON * (np.abs(stiffness) @ np.abs(self._motions))
+        sizes[:, self.pivots] += np.abs(self.motions)
+        return np.asarray(np.abs(rest) + n * EPSILON * sizes)
 
     def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """A smaller cell with the same stationary points; None if there is none in it.
@@ -64,13 +72,39 @@ class RigidBalance:
         limits = self._problem.thresholds.cells
         return clipped_again(self._once, low, high, most_rounds=limits.rigid_passes, progress=limits.rigid_progress)
 
+    def forces(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        """What laws and bounds bear in a cell, (n,) each; None if the net forces cannot be in balance.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+        """
+        return self._balanced(*self._forces(low, high), low, high)
+
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
-        if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
+        if (forces := self.forces(low, high)) is None:
             return None
         rounding = self._widened * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
         slack = rounding + self._problem.force_error
         ends = self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)
-        return None if ends is None else self._elastic(*ends, *forces)
+        if ends is None or not np.all(np.isfinite(forces)):
+            return ends
+        return self.moved(*ends, *self._elastic_parts(*ends, *forces))
+
+    def elastic_parts(self, low: Array, high: Array, forces: tuple[Array, Array]) -> tuple[Array, Array]:
+        """The intervals of e = x - T x_p in a cell, (n,) each.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+            forces: what laws and bounds bear there.
+        """
+        moved_low, moved_high = product(self.motions, low[self.pivots], high[self.pivots])
+        first, last = low - moved_high, high - moved_low
+        if not np.all(np.isfinite(forces)):
+            return first, last
+        begin, end = self._elastic_parts(low, high, *forces)
+        return np.maximum(first, begin), np.minimum(last, end)
 
     def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
         """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""
@@ -81,16 +115,19 @@ class RigidBalance:
             ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
         least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
         most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
-        wide = self._widened * (np.abs(least) + np.abs(most)) + problem.force_error
-        return (
-            np.where(low <= problem.lower, -np.inf, least - wide),
-            np.where(high >= problem.upper, np.inf, most + wide),
-        )
+        wide = self._widened * (np.abs(least) + np.abs(most))
+        least, most = least - wide - problem.force_error, most + wide + problem.force_error
+        if self._laws is not None:
+            first, last = self._laws.forces(low, high)
+            wide = self._widened * (np.abs(first) + np.abs(last))
+            least, most = np.maximum(least, first - wide), np.minimum(most, last + wide)
+        return np.where(low <= problem.lower, -np.inf, least), np.where(high >= problem.upper, np.inf, most)
 
     def _balanced(self, least: Array, most: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
         """Smaller intervals of the forces: the net force along each rigid motion is that of the load."""
         force, size = self._problem.force, np.maximum(np.abs(low), np.abs(high))
-        for motion, net in zip(self._motions.T, self._net.T, strict=True):
+        for j in range(len(self.pivots)):
+            motion, net = self.motions[:, j], self._net[:, j]
             i = np.flatnonzero(motion)
             r = motion[i]
             ends = np.sort(np.stack([r * least[i], r * most[i]]), axis=0)
@@ -102,42 +139,55 @@ class RigidBalance:
             least[i], most[i] = np.maximum(least[i], new[0]), np.minimum(most[i], new[1])
         return None if np.any(least > most) else (least, most)
 
-    def _elastic(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
-        """Smaller intervals of the displacements: x = T x_p + e with e = G(f - τ)."""
-        if not np.all(np.isfinite(least) & np.isfinite(most)):
-            return low, high
-        first, last = self._elastic_parts(low, high, least, most)
+    def moved(self, low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals of the displacements x = T x_p + e; None if one is empty.
+
+        Args:
+            low: of x, (n,), finite.
+            high: of x, (n,), finite.
+            first: of e, (n,), finite.
+            last: of e, (n,), finite.
+        """
         begin, end = low[self.pivots], high[self.pivots]
-        for j, motion in enumerate(self._motions.T):
+        for j in range(len(begin)):
+            motion = self.motions[:, j]
             i = np.flatnonzero(motion)
             others = np.delete(np.arange(len(begin)), j)
-            rest_low, rest_high = _product(self._motions[np.ix_(i, others)], begin[others], end[others])
+            rest_low, rest_high = product(self.motions[np.ix_(i, others)], begin[others], end[others])
             ways = np.sort(np.stack([low[i] - last[i] - rest_high, high[i] - first[i] - rest_low]) / motion[i], axis=0)
             slack = self._widened * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
             begin[j], end[j] = max(begin[j], ways[0].max() - slack), min(end[j], ways[1].min() + slack)
         if np.any(begin > end):
             return None
-        moved_low, moved_high = _product(self._motions, begin, end)
+        moved_low, moved_high = product(self.motions, begin, end)
         slack = self._widened * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
         low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
         return None if np.any(low > high) else (low, high)
 
     def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
         """The intervals of e, made short: G is changed along rigid motions, where the net force is known."""
-        problem, motions, n = self._problem, self._motions, self._problem.size
+        problem, motions, n = self._problem, self.motions, self._problem.size
         weights = (most - least) ** 2 + 1e-300
         normal = motions.T @ (weights[:, None] * motions)
         shift = -np.linalg.lstsq(normal, (self._flexibility * weights @ motions).T, rcond=None)[0].T
         flexibility = self._flexibility + shift @ motions.T
-        first, last = _product(flexibility, problem.force - most, problem.force - least)
+        first, last = product(flexibility, problem.force - most, problem.force - least)
         size = np.maximum(np.abs(low), np.abs(high))
+        if self.exact:  # then only e is off, by less than itself
+            size = np.minimum(size, 2.0 * np.max(np.abs([first, last])))
         forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
         error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * (np.abs(flexibility) @ forces)
         return first - error, last + error
 
 
-def _product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """The ends of matrix @ [low, high]."""
+def product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The ends of matrix @ [low, high].
+
+    Args:
+        matrix: (m, n).
+        low: of the intervals, (n,).
+        high: of the intervals, (n,).
+    """
     plus, minus = np.maximum(matrix, 0.0), np.minimum(matrix, 0.0)
     return plus @ low + minus @ high, plus @ high + minus @ low
 

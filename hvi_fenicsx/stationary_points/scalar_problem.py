@@ -15,6 +15,7 @@ from ..laws.arc import Arc
 from ..typing import Array, Integers, Mask
 from .arcs import INF, ROUNDING, Chain
 from .lengths import Lengths
+from .rigid_motions import RigidMotions
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -33,6 +34,7 @@ class ScalarProblem:
         error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
         force_error: the forces of the laws differ from those of the chains by this at most, (n,).
         farthest: displacements up to which this is known.
+        motions: the rigid motions, which S does not resist; None where they are not told.
         thresholds: the numbers that tune the search.
     """
 
@@ -46,6 +48,7 @@ class ScalarProblem:
     error: float = 0.0
     force_error: Array | float = 0.0
     farthest: float = INF
+    motions: RigidMotions | None = None
     thresholds: Thresholds = DEFAULT
 
     @property

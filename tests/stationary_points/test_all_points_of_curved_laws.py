@@ -306,3 +306,11 @@ def test_a_bound_that_bears_is_no_straight_traction() -> None:
     found = searched(condensed.problem([[0.0, 0.0], [0.0, 3.0]], [-0.3, 0.4], bonds, lower=[-1.0, -np.inf]))
     assert (found.reason, found.complete) == ("all equilibria, proven: 1", True)
     np.testing.assert_allclose(found.points[0].x, [-1.0, 0.0], atol=1e-12)
+
+
+def test_bonds_that_stick_at_the_end_of_a_cell_are_taken_for_sticking() -> None:
+    """What is left about a jump at zero is never divided: it took 133 cells where 31 are enough."""
+    law = {"law": "exponential", "peak_traction": 8e6, "residual_traction": 5e5, "delta": 3e-6}
+    found = searched(condensed_scene(model(4, 6e6, 1e6, law)))
+    assert len(found.points) == 5
+    assert found.nodes <= 50
