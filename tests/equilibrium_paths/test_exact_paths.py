@@ -340,3 +340,17 @@ def test_laws_that_are_not_piecewise_linear_are_refused() -> None:
     system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
     with pytest.raises(InputError, match="piecewise linear"):
         ExactFollower(Condensation(system).problem, PathOptions())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_factor_that_stands_neither_rises_nor_falls(seed: int) -> None:
+    """Points in a row slide off at the sum of the bonds' peaks: no limit point. Where bonds soften after that: one."""
+    random = np.random.default_rng(seed)
+    n, pull, plateau = 5, random.uniform(0.5, 1.5, 5), [(0, 0), (1, 1), (90, 1)]
+    row, weights = chain(n, random.uniform(5.0, 20.0)), random.uniform(0.5, 1.5, n)
+    for points, limits in ((plateau, 0), ([*plateau, (1090, 0)], 1)):
+        given = problem(row, pull, bonds(graph(points), np.arange(n), weights))
+        follower, states = path(given, programme=(10.0,), follow=Follow.EXACT)
+        assert follower.end is End.ESCAPES
+        folds = [s.factor for s in states if s.event is Event.FOLD]
+        assert folds == pytest.approx([weights.sum() / pull.sum()] * limits)
