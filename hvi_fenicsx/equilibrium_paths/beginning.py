@@ -16,7 +16,7 @@ from .descent import Descent
 from .passing import go_on
 from .placing import place
 from .step import FACTOR
-from .thresholds import DEFAULT, ExactThresholds
+from .thresholds import DEFAULT, SettlingThresholds, Thresholds
 from .tracer import Tracer
 
 
@@ -48,7 +48,7 @@ class Beginning:
 
 
 def at_rest(
-    problem: CondensedProblem, remember: Collection[int], aim: float, thresholds: ExactThresholds = DEFAULT.exact
+    problem: CondensedProblem, remember: Collection[int], aim: float, thresholds: Thresholds = DEFAULT
 ) -> Beginning:
     """The state at the factor 0, before constant loads act: these are applied along a path of their own.
 
@@ -58,7 +58,7 @@ def at_rest(
         aim: the factor that the path goes to first.
         thresholds: of the path.
     """
-    bonds = BondTable(problem, remember, thresholds)
+    bonds = BondTable(problem, remember, thresholds.exact)
     chains = [bonds.chain(i) for i in range(problem.size)]
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     force = _nearest(bonds, x, problem.force - problem.elastic @ x)
@@ -68,7 +68,7 @@ def at_rest(
     rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
-        settled = _settled(bonds, replace(problem, force=held, force_rate=rate))
+        settled = _settled(bonds, replace(problem, force=held, force_rate=rate), thresholds.settling)
         if isinstance(settled, Nowhere):
             off = settled is Nowhere.AWAY
             return Beginning(cells=None, memory=bonds.memory, reason=settled.value, escapes=off)
@@ -88,10 +88,14 @@ def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:
     return np.where((problem.lower == problem.upper), wanted, found)
 
 
-def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | Nowhere:
-    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; or why nowhere."""
+def _settled(bonds: BondTable, problem: CondensedProblem, limits: SettlingThresholds) -> Cells | Nowhere:
+    """Where a small part of the loads takes a body that nothing holds at rest, and back to no load; or why nowhere.
+
+    All contacts end at no load, and rounding says which one is first: those that do so at a load that is rounding are
+    still closed where the path begins.
+    """
     chains = [bonds.chain(i) for i in range(problem.size)]
-    first = bonds.thresholds.first_load
+    first = limits.first_load
     load = problem.load(first)
     start = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     landing = Descent(bonds, load).land(start, start)
@@ -100,10 +104,17 @@ def _settled(bonds: BondTable, problem: CondensedProblem) -> Cells | Nowhere:
     cells = place(problem.elastic, chains, landing.x, load - problem.elastic @ landing.x)
     equations = problem.elastic, problem.force, problem.force_rate
     tracer = Tracer(*equations, cells, first, heading=-1, thresholds=bonds.thresholds)
+    rounding = _rounding(problem, cells.x)
     while True:
         step = tracer.advance(0.0)
         if step.variable is None:
             return Nowhere.UNKNOWN
-        if step.variable == FACTOR:
+        if step.variable == FACTOR or abs(tracer.factor) <= max(limits.no_load * first, limits.roundings * rounding):
             return Nowhere.NEUTRAL if tracer.cells.is_singular() else tracer.cells
         go_on(tracer, bonds, step)
+
+
+def _rounding(problem: CondensedProblem, x: Array) -> float:
+    """The factor of a load that is no larger than the rounding of the elastic forces."""
+    elastic = float(np.max(problem.elastic.diagonal)) * float(np.max(np.abs(x)))
+    return float(np.finfo(float).eps) * elastic / (float(np.max(np.abs(problem.force_rate))) or 1.0)

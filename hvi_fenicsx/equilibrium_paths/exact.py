@@ -71,9 +71,8 @@ class ExactFollower(Follower):
 
     @override
     def _begun(self) -> Iterator[PathState]:
-        programme, remember = self._options.programme, self._options.remember
-        exact = self._options.thresholds.exact
-        start = self._beginning or at_rest(self._problem, remember, programme[0], exact)
+        options = self._options
+        start = self._beginning or at_rest(self._problem, options.remember, options.programme[0], options.thresholds)
         if start.constant is not None:
             start = self._loaded(start, start.constant)
         self._bonds.restore(start.memory)

@@ -18,7 +18,6 @@ class ExactThresholds:
         near_end: a coordinate so near to an end of its segment is at it, relative to the sizes of coordinates.
         balanced: forces that balance may leave so much of the largest one.
         same_place: a difference of displacements that does not count, relative.
-        first_load: part of the first load at which a body that nothing holds at rest is looked for.
         standing: so many events at one place, and four for each unknown, lead nowhere.
         softest: relative accuracy of the direction in which a cell is softest.
     """
@@ -31,7 +30,6 @@ class ExactThresholds:
     near_end: float = 1e-9
     balanced: float = 1e-9
     same_place: float = 1e-7
-    first_load: float = 1e-3
     standing: int = 20
     softest: float = 1e-8
 
@@ -127,16 +125,18 @@ class JumpThresholds:
 
 @dataclass(frozen=True, kw_only=True)
 class SettlingThresholds:
-    """Where a path begins that nothing holds at rest, where laws are curved.
+    """Where a path begins that nothing holds at rest.
 
     Attributes:
-        steps: from a small load back to none at most,
+        first_load: part of the first load at which the body is looked for.
+        steps: where laws are curved, from there back to no load at most,
         more_steps: and so many more for each site.
         no_load: a part of the small factor that is none,
         roundings: and so many roundings of the elastic forces: all contacts end at no load, and rounding says which one
             is first.
     """
 
+    first_load: float = 1e-3
     steps: int = 50
     more_steps: int = 20
     no_load: float = 1e-9

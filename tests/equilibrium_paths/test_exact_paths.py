@@ -354,3 +354,20 @@ def test_a_factor_that_stands_neither_rises_nor_falls(seed: int) -> None:
         assert follower.end is End.ESCAPES
         folds = [s.factor for s in states if s.event is Event.FOLD]
         assert folds == pytest.approx([weights.sum() / pull.sum()] * limits)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_beam_above_its_floor_comes_to_rest_there_whatever_rounding_makes_of_the_gap(seed: int) -> None:
+    """All contacts end at no load; two of them, which hold the beam, have to stay closed where the path begins."""
+    random = np.random.default_rng(seed)
+    places, n = np.sort(random.uniform(0.0, 1.0, 5)), 5
+    lengths, bending = np.diff(places), np.zeros((n - 2, n))
+    for i, (left, right) in enumerate(itertools.pairwise(lengths)):
+        bending[i, i : i + 3] = 1.0 / left, -1.0 / left - 1.0 / right, 1.0 / right
+    gaps = 0.3 * (1.0 + 1e-12 * random.uniform(-1.0, 1.0, n))
+    given = problem(bending.T @ bending, random.uniform(0.05, 0.15, n), upper=gaps)
+    follower, states = path(given, programme=(1.0,))
+    assert follower.end is End.REACHED, follower.reason
+    for state in states:
+        assert violation(given, state.x, state.factor, 0.1) < 1e-9
+        assert np.count_nonzero(state.x >= gaps - 1e-12) >= 2

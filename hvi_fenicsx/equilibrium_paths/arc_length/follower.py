@@ -91,7 +91,7 @@ class ArcLengthFollower(Follower):
             return self._loaded(rest.constant)
         if rest.held:
             return rest.z
-        first = self._options.thresholds.exact.first_load * self._options.programme[0]
+        first = self._options.thresholds.settling.first_load * self._options.programme[0]
         held = self._is_held(first)
         z = settled(self._problem, self._sites, rest.z, first, self._lag, self._watcher, held=held)
         if isinstance(z, Nowhere):
