@@ -20,7 +20,7 @@ class Passing:
         direction: along its graph, 1 or -1.
         before: the segment that it leaves.
         after: the one on which it goes on.
-        folds: whether the factor turns.
+        folds: whether the factor turns; where it stands between rising and falling, at the end of that.
         neutral: whether the factor stands now or stood before.
         unstable_change: by how many directions more the energy falls, unless neutral.
         bifurcation: whether there are other ways to go on.
@@ -51,13 +51,13 @@ def go_on(tracer: Tracer, bonds: BondTable, step: Step) -> Passing:
     """
     assert step.variable is not None
     assert step.before is not None
-    before, stood, i = tracer.factor_rate, tracer.stands, step.variable
+    trend, stood, i = tracer.trend, tracer.stands, step.variable
     forward = bool(tracer.rates[i] > 0.0)
     if step.reversed:
         _turn_back(tracer, bonds, i, forward=forward)
     else:
         tracer.enter(i, *tracer.cells.beyond(i, forward=forward))
-    after, folds = tracer.cells.segment(i), tracer.factor_rate * before < 0.0
+    after, folds = tracer.cells.segment(i), tracer.trend * trend < 0
     return Passing(
         unknown=i,
         direction=1 if forward else -1,

@@ -66,7 +66,7 @@ def no_load(problem: CondensedProblem, x: Array, first: float, limits: SettlingT
     """
     stiffest = float(np.max(problem.elastic.diagonal, initial=0.0))
     rounding = np.finfo(float).eps * stiffest * float(np.max(np.abs(x), initial=0.0))
-    load = float(np.max(np.abs(problem.force_rate), initial=0.0))
+    load = float(np.max(np.abs(problem.force_rate), initial=0.0)) or 1.0
     return max(limits.no_load * abs(first), limits.roundings * rounding / load)
 
 

@@ -46,6 +46,7 @@ class Tracer:
         rates: how all coordinates change with the driving variable, (n,).
         factor_rate: how the factor does.
         stands: whether the factor stands still while unknowns move.
+        trend: the sign of the factor's rate where it last did not stand; 0 before that.
 
     Raises:
         numpy.linalg.LinAlgError: the tangent is singular.
@@ -74,6 +75,7 @@ class Tracer:
         if small is not None:
             self.small = np.array(small)
         self._basis = Basis(stiffness, rate, cells, driver, inverse, thresholds)
+        self.trend = 0
         self._find_direction()
 
     # -- the perturbation
@@ -108,6 +110,8 @@ class Tracer:
             rates[self.driver] = self.heading
         self.rates: Array = rates
         self.stands = self._factor_stands()
+        if not self.stands:
+            self.trend = int(np.sign(self.factor_rate))
 
     def _residual(self) -> Array:
         cells = self.cells
@@ -281,7 +285,7 @@ class Tracer:
 
     def turn(self) -> None:
         """Go back."""
-        self.heading = -self.heading
+        self.heading, self.trend = -self.heading, -self.trend
         self._find_direction()
 
 

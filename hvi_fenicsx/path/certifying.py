@@ -2,8 +2,9 @@
 
 On Γc: each unknown must be on the graph of its laws and bounds, with the force that the body leaves there; S and f come
 from the factorised body. The certificate of the whole body (:mod:`.certify`) reassembles all forces from the forms;
-where bonds remember, what was judged on Γc must be what these forces leave there. So it must at states where the loads
-are nothing beside those of the whole programme: there is nothing else by which to measure what is left of forces.
+where bonds remember, what was judged on Γc must be what these forces leave there. So it must at states where loads and
+what moves the body are nothing beside those of the whole programme, as where an obstacle just touches it: there is
+nothing else by which to measure what is left of forces.
 
 Where rounding alone may speak against a state, its displacement is corrected as that of a single run
 (:mod:`.certify.correction`) or, with what bonds remember, along the graphs (:mod:`.refinement`); the corrected one is
@@ -83,7 +84,7 @@ class Certifier:
         self._system, self._condensation, self._factored = system, condensation, factored
         self._tolerance, self._kind, self._remember = tolerance, kind, remember
         self._distance = kind.distances(condensation.problem, remember)
-        self._whole_load = self._load(largest)
+        self._whole_load, self._whole_drive = self._load(largest), self._drive(largest)
 
     def verdict(self, state: PathState, number: int) -> Verdict:
         """What a state is found to be. Collective.
@@ -179,8 +180,18 @@ class Certifier:
         return found
 
     def _is_unloaded(self, state: PathState) -> bool:
-        """Whether the loads are less than the tolerance of those of the whole programme. Collective."""
-        return self._load(state.factor) <= self._tolerance * self._whole_load
+        """Whether what drives the body is less than the tolerance of that in the whole programme. Collective."""
+        return self._drive(state.factor) <= self._tolerance * self._whole_drive
+
+    def _drive(self, factor: float) -> float:
+        """The norm of loads and prescribed displacements, or what laws and obstacles demand at rest. Collective.
+
+        An obstacle that has not come to the body yet drives nothing, however far it has moved.
+        """
+        load, demanded = self._condensation.load(factor), references.demanded(self._factored.at(factor))
+        found = max(float(load.norm()), float(np.max(demanded)))
+        load.destroy()
+        return found
 
     def _in_balance(self, state: PathState, u: fem.Function, forces: Forces, carried: Array) -> bool:
         """Whether forces from the forms are those that were judged on Γc, and none are left elsewhere. Collective.

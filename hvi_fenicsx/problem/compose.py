@@ -14,7 +14,7 @@ import dolfinx
 import numpy as np
 from dolfinx import fem
 
-from ..effects import Evaluate, Place, load_name
+from ..effects import Drive, Evaluate, Place, load_name
 from ..errors import InputError
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
@@ -82,7 +82,11 @@ def _evaluation(domain: Domain, facets: Mapping[str, Entities], placed: Placed) 
 
 def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, formula: SpatialValue) -> float:
     """The largest absolute value of a formula where an effect acts. Collective."""
-    values = formula.at(_points(domain, _entities(domain, facets, placed)))
+    found = _entities(domain, facets, placed)
+    points = _points(domain, found)
+    if placed[1].drive is Drive.LOAD or placed[1].place is Place.BODY:  # integrated, not taken at vertices
+        points = np.concatenate([points, _midpoints(domain, found)])
+    values = formula.at(points)
     finite = bool(np.all(np.isfinite(values)))
     gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
     if not all(ok for ok, _ in gathered):
@@ -108,6 +112,16 @@ def _points(domain: Domain, entities: tuple[int, Any]) -> Array:
     if not len(found):
         return np.empty((0, 3))  # dolfinx divides by their number
     return domain.mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(domain.mesh, dimension, found))]
+
+
+def _midpoints(domain: Domain, entities: tuple[int, Any]) -> Array:
+    """The midpoints of entities, m, (n, 3): a load may be zero at all vertices, but for rounding."""
+    dimension, found = entities
+    if found is None:
+        found = np.arange(domain.mesh.topology.index_map(dimension).size_local, dtype=np.int32)
+    if not len(found):
+        return np.empty((0, 3))  # dolfinx divides by their number
+    return np.asarray(dolfinx.mesh.compute_midpoints(domain.mesh, dimension, found))
 
 
 def _problem(

@@ -135,29 +135,33 @@ def of(problem: Problem, load: Array, thresholds: Thresholds = DEFAULT) -> Refer
     free.reshape(-1)[problem.fixed_here] = 0.0
     everywhere = np.ones(len(problem.bodies.bodies))
     found = References(problem, everywhere, everywhere, everywhere > 0, everywhere > 0, holding, thresholds)
-    loaded, moved = _total(problem, _sums(problem, np.linalg.norm(load, axis=1))), _moved(problem)
+    loaded, moved = _total(problem, _sums(problem, np.linalg.norm(load, axis=1))), demanded(problem)
     drive = np.maximum(loaded, moved)
     scale = np.where(drive > 0.0, drive / (np.max(drive) or 1.0), 1.0)
     return replace(found, load=found.norms(free), scale=scale, moved=moved > 0.0, driven=drive > 0.0)
 
 
-def _moved(problem: Problem) -> Array:
-    """The sum of what laws push at rest, or the largest displacement that is demanded, by body. Collective."""
-    force, demanded = np.zeros((2, len(problem.bodies.bodies)))
+def demanded(problem: Problem) -> Array:
+    """The sum of what laws push at rest, or the largest displacement that is demanded, by body. Collective.
+
+    Args:
+        problem: the problem.
+    """
+    force, displacement = np.zeros((2, len(problem.bodies.bodies)))
     for term in problem.terms:
         rest = np.zeros(len(term.surface.blocks))
         push = term.weights * _outside(rest, *term.law.interval(rest))
         np.add.at(force, problem.bodies.labels[term.surface.blocks], push)
     for bounds in problem.bounds:
         away = _outside(np.zeros_like(bounds.lower), bounds.lower, bounds.upper)
-        np.maximum.at(demanded, problem.bodies.labels[bounds.surface.blocks], away)
+        np.maximum.at(displacement, problem.bodies.labels[bounds.surface.blocks], away)
     prescribed = fem.Function(problem.space)
     for condition in problem.conditions:
         condition.set(prescribed.x.array)
     sizes = np.max(np.abs(prescribed.x.array.reshape(-1, problem.scales.dimension)), axis=1)
-    np.maximum.at(demanded, problem.bodies.labels, sizes)
-    problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, demanded, op=MPI.MAX)
-    return np.maximum(_total(problem, force), demanded)
+    np.maximum.at(displacement, problem.bodies.labels, sizes)
+    problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, displacement, op=MPI.MAX)
+    return np.maximum(_total(problem, force), displacement)
 
 
 def _outside(x: Array, lower: Array, upper: Array) -> Array:

@@ -231,6 +231,19 @@ def test_with_energies_that_differ_every_state_is_an_equilibrium_of_its_own_mixi
     assert np.all(np.diff([s.dissipated for s in states]) > -1e-6 * states[-1].dissipated)
 
 
+def test_bonds_by_mode_that_pass_rest_together_lose_nothing_on_their_first_pieces() -> None:
+    """Below the peak the path is a ray of the load's direction, so the work is half of load times displacement."""
+    given = strip(graph(SOFTENING), [-0.4, 1.0], closes=True)
+    given = replace(given, bonds=(replace(given.bonds[0], mixity=PowerLaw(3.0, 1.5)),))
+    follower, states = path(given, programme=(0.3, -0.3, 0.3), remember=(0,))
+    assert follower.end is End.REACHED, follower.reason
+    assert [s.factor for s in states if s.event is Event.TURN] == [0.3, -0.3]
+    size = max(s.work for s in states)
+    for state in states:
+        assert state.dissipated == pytest.approx(0.0, abs=1e-12 * size)
+        assert state.work == pytest.approx(0.5 * given.load(state.factor) @ state.x, abs=1e-12 * size)
+
+
 @pytest.mark.parametrize("angle", [0.0, 50.0])
 def test_a_jump_releases_what_a_bond_by_mode_does_not_dissipate(angle: float) -> None:
     """As above on soft springs: torn off at once at the peak; by hand, the energy falls by e²/(2k) + e/2."""

@@ -340,3 +340,34 @@ def test_laws_that_are_not_piecewise_linear_are_refused() -> None:
     system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
     with pytest.raises(InputError, match="piecewise linear"):
         ExactFollower(Condensation(system).problem, PathOptions())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_factor_that_stands_neither_rises_nor_falls(seed: int) -> None:
+    """Points in a row slide off at the sum of the bonds' peaks: no limit point. Where bonds soften after that: one."""
+    random = np.random.default_rng(seed)
+    n, pull, plateau = 5, random.uniform(0.5, 1.5, 5), [(0, 0), (1, 1), (90, 1)]
+    row, weights = chain(n, random.uniform(5.0, 20.0)), random.uniform(0.5, 1.5, n)
+    for points, limits in ((plateau, 0), ([*plateau, (1090, 0)], 1)):
+        given = problem(row, pull, bonds(graph(points), np.arange(n), weights))
+        follower, states = path(given, programme=(10.0,), follow=Follow.EXACT)
+        assert follower.end is End.ESCAPES
+        folds = [s.factor for s in states if s.event is Event.FOLD]
+        assert folds == pytest.approx([weights.sum() / pull.sum()] * limits)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_beam_above_its_floor_comes_to_rest_there_whatever_rounding_makes_of_the_gap(seed: int) -> None:
+    """All contacts end at no load; two of them, which hold the beam, have to stay closed where the path begins."""
+    random = np.random.default_rng(seed)
+    places, n = np.sort(random.uniform(0.0, 1.0, 5)), 5
+    lengths, bending = np.diff(places), np.zeros((n - 2, n))
+    for i, (left, right) in enumerate(itertools.pairwise(lengths)):
+        bending[i, i : i + 3] = 1.0 / left, -1.0 / left - 1.0 / right, 1.0 / right
+    gaps = 0.3 * (1.0 + 1e-12 * random.uniform(-1.0, 1.0, n))
+    given = problem(bending.T @ bending, random.uniform(0.05, 0.15, n), upper=gaps)
+    follower, states = path(given, programme=(1.0,))
+    assert follower.end is End.REACHED, follower.reason
+    for state in states:
+        assert violation(given, state.x, state.factor, 0.1) < 1e-9
+        assert np.count_nonzero(state.x >= gaps - 1e-12) >= 2

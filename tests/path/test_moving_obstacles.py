@@ -124,3 +124,21 @@ def test_laws_that_would_feel_the_displacement_of_an_obstacle_are_refused(law: s
     table["boundary"]["top"][law] = FRICTION
     with pytest.raises(hvi.InputError, match=said):
         hvi.check(hvi.Scene.model_validate(table))
+
+
+@pytest.mark.parametrize("gap", [1e-4, 1.23e-4])
+def test_a_plate_that_just_touches_a_block_leaves_a_state_that_is_certified(gap: float) -> None:
+    """Nothing is strained there: forces and displacements are rounding, and relative to nothing of their own."""
+    plate = {"point": [0.0, 0.3925 + gap], "normal": [0.0, -1.0], "displacement": [4e-5, -2.6e-4]}
+    scene = {
+        "domain": {"shape": "rectangle", "size": [1.0, 0.3925], "cells": [3, 1]},
+        "material": {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": 0.0},
+        "boundary": {
+            "base": {"on": "bottom", "displacement": [0.0, 0.0]},
+            "lid": {"on": "top", "contact": {"obstacle": plate}},
+        },
+    }
+    path = hvi.follow(hvi.Scene.model_validate(scene), degree=2, to=[1.0, 0.0, 1.0])
+    assert path.events.count("contact") > 7
+    assert path.uncertified == 0
+    assert path.rows[-1].energy == pytest.approx(0.5 * E * (2.6e-4 - gap) ** 2 / 0.3925, rel=1e-9)

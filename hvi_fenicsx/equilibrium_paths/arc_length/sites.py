@@ -90,14 +90,14 @@ class Sites(SiteGraphs):
         )
 
     def setting_out(self, values: Values, direction: Array) -> Values | None:
-        """The values with the mode in which lengths of 0 begin to grow; None where no mode matters.
+        """The values with the mode in which lengths of 0, but for rounding, grow; None where no mode matters.
 
         Args:
             values: at the point.
             direction: of the coordinates, (n,).
         """
         radials, p = self.radials, self.of_lengths
-        rest = values.s[p] == 0.0
+        rest = values.s[p] <= self.thresholds.curve.no_length
         if not radials.differ or not np.any(rest):
             return None
         e = np.where(rest[radials.owner], radials.directions(direction), values.directions)
