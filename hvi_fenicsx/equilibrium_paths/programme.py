@@ -50,6 +50,8 @@ class Follower(ABC):
             yield from self._all_states()
         except Stopped:
             self._finish(End.INTERRUPTED, "interrupted")
+        except np.linalg.LinAlgError:
+            self._finish(End.LOST, "after the last state the equations of the path are singular")
 
     def _all_states(self) -> Iterator[PathState]:
         if self._resume is None:

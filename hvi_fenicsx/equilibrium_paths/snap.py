@@ -9,6 +9,7 @@ remember on the way.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,9 +60,10 @@ def snap(
         held = _held_back(bonds, load, cells, restraint, inverse)
         if held is None or held.rates[moved] * direction <= 0.0:
             continue
-        found = _to_its_end(held, bonds, load, restraint, step)
-        if found is not None:
-            return found
+        with suppress(np.linalg.LinAlgError):
+            found = _to_its_end(held, bonds, load, restraint, step)
+            if found is not None:
+                return found
         bonds.restore(memory)
     return None
 

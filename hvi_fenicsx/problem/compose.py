@@ -31,6 +31,8 @@ from .scaling import Placed, Scales
 from .spaces import coefficients_of
 from .thresholds import DEFAULT, Thresholds
 
+_BETWEEN = ", between the vertices of the mesh"
+
 
 @dataclass(frozen=True)
 class Model:
@@ -83,14 +85,20 @@ def _evaluation(domain: Domain, facets: Mapping[str, Entities], placed: Placed) 
 def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, formula: SpatialValue) -> float:
     """The largest absolute value of a formula where an effect acts. Collective."""
     found = _entities(domain, facets, placed)
-    points = _points(domain, found)
+    largest = _largest_at(domain, placed, formula, _points(domain, found), "")
     if placed[1].drive is Drive.LOAD or placed[1].place is Place.BODY:  # integrated, not taken at vertices
-        points = np.concatenate([points, _midpoints(domain, found)])
+        largest = max(largest, _largest_at(domain, placed, formula, _midpoints(domain, found), _BETWEEN))
+    return largest
+
+
+def _largest_at(domain: Domain, placed: Placed, formula: SpatialValue, points: Array, where: str) -> float:
+    """The largest absolute value at points. Collective."""
     values = formula.at(points)
     finite = bool(np.all(np.isfinite(values)))
     gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
     if not all(ok for ok, _ in gathered):
-        raise InputError(f"{scaling.place(placed)}: the formula {formula.source!r} is not finite everywhere there")
+        text = f"the formula {formula.source!r} is not finite everywhere there{where}"
+        raise InputError(f"{scaling.place(placed)}: {text}")
     return max(value for _, value in gathered)
 
 

@@ -111,7 +111,8 @@ def _parameter(parameter: inspect.Parameter) -> str:
 def _row(model: type[BaseModel], name: str) -> str:
     field, text = model.model_fields[name], descriptions(model).get(name, "")
     value = ", ".join(filter(None, [_escaped(text), _limits(field), _choices(field)]))
-    default = _toml(field.get_default(call_default_factory=True)) if not field.is_required() else "required"
+    required = field.is_required() or (name == "shape" and issubclass(model, DomainShape))  # its name tells the kind
+    default = "required" if required else _toml(field.get_default(call_default_factory=True))
     default = _toml(DEFAULT_ELASTICITY) if field.annotation is Effect else default
     return f"| `{name}` | {value} | {default} |"
 

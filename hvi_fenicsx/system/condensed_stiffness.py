@@ -153,7 +153,7 @@ class DenseStiffness(CondensedStiffness):
     """
 
     def __init__(self, array: Array) -> None:
-        self._array = array
+        self._array, self._rounding = array, spectrum.rounding_of(array)
 
     @property
     @override
@@ -216,7 +216,7 @@ class DenseStiffness(CondensedStiffness):
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
         free = np.flatnonzero(moving)
-        return spectrum.negative_directions(self._moving(free, slope), negligible)
+        return spectrum.negative_directions(self._moving(free, slope), negligible, self._rounding)
 
     @override
     def free(self) -> None:

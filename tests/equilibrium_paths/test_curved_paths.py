@@ -176,6 +176,17 @@ def test_a_body_that_a_small_load_takes_away_comes_off(kind: type[Follower]) -> 
     assert follower.end is End.ESCAPES
 
 
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+@pytest.mark.parametrize("rounding", [0.0, 1e-17, -1e-17])
+def test_a_body_that_slides_on_its_floor_comes_off(kind: type[Follower], rounding: float) -> None:
+    """The floor holds all that moves but the sliding, which elasticity resists by nothing, or by rounding."""
+    stiffness = np.block([[np.full((1, 1), rounding), np.zeros((1, 3))], [np.zeros((3, 1)), chain(3, 1.0)]])
+    given = problem(stiffness, [1.0, -1.0, -1.0, -1.0], lower=[-np.inf, 0.0, 0.0, 0.0])
+    follower = kind(given, PathOptions(programme=(1.0,)))
+    assert list(follower.states()) == []
+    assert follower.end is End.ESCAPES
+
+
 @pytest.mark.parametrize("gap", [0.3, 1e3])
 def test_how_far_a_body_is_above_its_floor_does_not_matter(gap: float) -> None:
     law = Exponential(1.0, 0.2, 0.5)

@@ -95,6 +95,10 @@ TABLE: dict[str, tuple[str, str]] = {
     ),
     "a load that is not finite between the vertices": (
         "boundary.press.traction=[0.0, '-exp(1e7*x*(0.25-x)*(0.5-x)*(0.75-x)*(1-x)*(0.375-x))']",
+        "(0.375-x))' is not finite everywhere there, between the vertices",
+    ),
+    "a load that is not finite where it is integrated": (
+        "boundary.press.traction=[0.0, '-exp(1e9*sin(8*pi*x)**2)']",
         "boundary.press.traction: the formula is not finite everywhere there, between the vertices",
     ),
     "a law on no way": (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
-from ...system.spectrum import is_singular
+from ...system.spectrum import is_singular, rounding_of
 from ...typing import Array
 from ..segments import Kind, Segment
 from .sites import Sites
@@ -75,4 +75,4 @@ def is_held(sites: Sites, z: Array) -> bool:
         sites: where all sites are.
         z: their coordinates, (n,).
     """
-    return not is_singular(sites.motions(sites.values(z)).matrix)
+    return not is_singular(sites.motions(sites.values(z)).matrix, rounding_of(sites.stiffness))
