@@ -249,7 +249,7 @@ class ArcLengthFollower(Follower):
             sites=self._sites,
             here=self._curve.here,
             load=problem.load(factor),
-            heading=-self._curve.trend or 1,
+            heading=1 if aim > factor else -1,
             lag=self._lag,
             held=self._is_held(factor),
             step=self._watcher.step,
