@@ -78,6 +78,26 @@ def test_a_jump_is_tried_in_another_way_where_its_first_curve_comes_to_singular_
         assert hvi.solve(hvi.Scene.model_validate(loaded), estimate=False).exit_code == code
 
 
+def test_a_block_sinks_where_its_bed_bears_no_more_although_bonds_turn_back_on_the_way() -> None:
+    """The bed bears its peak all along at most: 5514 N/m² against 3641 N/m²."""
+    friction = {"law": "exponential", "peak_traction": 1838.0, "residual_traction": 0.0, "delta": 1.765e-4}
+    bed = {**friction, "peak_traction": 5514.0, "residual_traction": 486.0}
+    scene = {
+        "domain": {"shape": "rectangle", "size": [1.0, 0.3169], "cells": [3, 2]},
+        "material": {"model": "plane_stress", "youngs_modulus": 2517000.0, "poisson_ratio": 0.3},
+        "boundary": {
+            "pull": {"on": "right", "traction": [4849.0, 0.0]},
+            "press": {"on": "top", "traction": [0.0, -3641.0]},
+            "floor": {"on": "bottom", "friction": friction, "support": bed},
+            "wall": {"on": "left", "displacement": [0.0, "free"]},
+        },
+    }
+    path = hvi.follow(hvi.Scene.model_validate(scene), to=1.6)
+    assert path.end == "escapes"
+    assert path.peak_factor == pytest.approx(5514.0 / 3641.0, rel=1e-4)
+    assert path.peak_factor < 5514.0 / 3641.0
+
+
 def jumped(path: Any) -> float:
     """The factor at which most energy is released."""
     return float(max((path.rows[n] for n in path.jumps), key=lambda row: row.released).factor)

@@ -8,6 +8,7 @@ energy falls all the way until equilibrium is reached or a body is out of all re
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from enum import Enum
 
 import numpy as np
@@ -118,8 +119,9 @@ class Relaxation:
 
     def _stepped_or_back(self) -> _Went:
         """One step in time; where it led nowhere, nothing has changed."""
-        kept, z = self._sites.kept(), self.z
-        went = self._stepped()
+        kept, z, went = self._sites.kept(), self.z, _Went.NOWHERE
+        with suppress(Refused, np.linalg.LinAlgError):
+            went = self._stepped()
         if went is _Went.NOWHERE:
             self._sites.restore(kept)
             self.z = z
