@@ -165,8 +165,9 @@ class Events(Equations):
         largest = float(np.max(np.abs(after.tangent)))
         if self.trend * after.tangent[-1] < -self.limits.undecided * largest:
             return Outcome.FOLD, None
-        rates = self.sites.rates(after.y[:-1], after.tangent[:-1]) * self.sites.outward
-        back = np.flatnonzero(rates < -self.limits.undecided * largest)
+        rates = self.sites.rates(after.y[:-1], after.tangent[:-1])
+        clear = np.abs(rates) > self.limits.undecided * largest
+        back = np.flatnonzero(self.sites.turning_back(after.values, rates) & clear)
         return (Outcome.TURNED, int(back[0])) if back.size else None
 
     def _rate_of(self, outcome: Outcome, site: int | None) -> Callable[[Place], float]:

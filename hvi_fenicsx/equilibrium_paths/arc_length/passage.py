@@ -117,6 +117,7 @@ class Crossing:
         self._lag, self._left = lag, lag.copy()
         self._cells: Counter[tuple[bytes, frozenset[int]]] = Counter()
         self._turned: set[int] = set()
+        self._rests = np.zeros(len(lag), dtype=bool)
         self._arrived: int | None = None
         self.passages: list[Passage] = []
 
@@ -172,7 +173,7 @@ class Crossing:
         return self._sites.rates(here.y[:-1], here.tangent[:-1])
 
     def _rates(self) -> Array:
-        """How fast the sites go; 0 for those that stand but for rounding, (m,).
+        """How fast the sites go; 0 for those that stand but for rounding, (m,): a slow one that goes to and fro does.
 
         So does the one that arrived where its rate may have either sign: it was the step that took it out.
         """
@@ -180,6 +181,7 @@ class Crossing:
         if self._arrived is not None and self._sites.bent:
             allowed[self._arrived] = self._limits.undecided
         rates[np.abs(rates) <= allowed * np.max(np.abs(self._curve.here.tangent))] = 0.0
+        rates[self._rests] = 0.0
         return rates
 
     def _near(self) -> tuple[Mask, Mask]:
@@ -190,16 +192,20 @@ class Crossing:
 
     def _ways(self, rates: Array) -> Array:
         """The ways to the ends that the sites approach; infinite where they approach none, (m,)."""
-        low, high = self._near()
-        comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | (rates * self._sites.outward < 0.0)
+        comes = self._comes(rates)
         found = np.full(len(rates), np.inf)
         found[comes] = self._left[comes] / np.abs(rates[comes])
         return found
 
-    def _go(self, rates: Array, way: float) -> None:
+    def _comes(self, rates: Array) -> Mask:
+        """Which sites are at an end that they approach, or turn back, (m,)."""
         low, high = self._near()
+        back = self._sites.turning_back(self._curve.here.values, rates)
+        return ((rates < 0.0) & low) | ((rates > 0.0) & high) | back
+
+    def _go(self, rates: Array, way: float) -> None:
+        (low, high), comes = self._near(), self._comes(rates)
         loads = rates * self._sites.outward > 0.0
-        comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | (rates * self._sites.outward < 0.0)
         change = way * np.abs(rates)
         self._left = np.where(comes, self._left - change, self._left + np.where(low | high, change, 0.0))
         self._left = np.where(loads & ~comes, self._lag, np.maximum(self._left, 0.0))
@@ -209,7 +215,7 @@ class Crossing:
         sites, curve, before = self._sites, self._curve, self._sites.segment(k)
         forward, slow = bool(rates[k] > 0.0), self._is_slow(k)
         y = curve.here.y
-        if forward * 2.0 - 1.0 == -sites.outward[k] and not self._unmoved(k):
+        if forward * 2.0 - 1.0 == -sites.outward[k] and not sites.unmoved(curve.here.values)[k]:
             y = self._turned_back(k, forward=forward)
         else:
             sites.enter(k, int(sites.numbers[k]) + (1 if forward else -1))
@@ -217,6 +223,7 @@ class Crossing:
         row = curve.here.tangent if slow else curve.row(k)
         sign = 1.0 if slow or forward else -1.0
         curve.head(curve.tangent(curve.here.values, row, sign))
+        self._rests[k] = slow and any(passage.site == k for passage in self.passages)
         self.passages.append(Passage(site=k, before=before, after=sites.segment(k)))
 
     def _is_slow(self, k: int) -> bool:
@@ -227,10 +234,6 @@ class Crossing:
         values, stiffest = self._curve.here.values, float(np.max(np.diag(self._sites.stiffness)))
         forces = (stiffest * np.abs(values.moves) + np.abs(values.rises)) * np.abs(self._all_rates())
         return bool(forces[k] <= self._limits.slow_force * np.max(forces))
-
-    def _unmoved(self, k: int) -> bool:
-        """Whether the site has not left 0 but for rounding: there is nothing to remember."""
-        return abs(float(self._curve.here.values.lengths[k])) <= self._limits.rounding * self._sites.length
 
     def _turned_back(self, k: int, *, forward: bool) -> Array:
         """Coordinates and factor on the secant of where the bonds have been, (n + 1,)."""

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ...system.spectrum import negative_directions
-from ...typing import Array
+from ...typing import Array, Mask
 from .blocks import Blocks
 from .site_graphs import SiteGraphs
 
@@ -104,6 +104,24 @@ class Sites(SiteGraphs):
         energies = values.energies.copy()
         energies[p] = radials.energies(e)
         return replace(values, directions=e, energies=energies)
+
+    def unmoved(self, values: Values) -> Mask:
+        """Which sites have not left 0 but for rounding, (m,): there is nothing to remember.
+
+        Args:
+            values: of the sites.
+        """
+        return np.asarray(np.abs(values.lengths) <= self.thresholds.curve.rounding * self.length)
+
+    def turning_back(self, values: Values, rates: Array) -> Mask:
+        """Which bonds with memory go back, (m,); a vector that has not left 0 passes it instead.
+
+        Args:
+            values: of the sites.
+            rates: how fast the sites go along their graphs, (m,).
+        """
+        passes = np.isinf(self.low) & (self.outward > 0.0) & self.unmoved(values)
+        return (rates * self.outward < 0.0) & ~passes
 
     def _by_unknown(self, values: Array, parts: Array) -> Array:
         """What sites have by unknown, (n,).
