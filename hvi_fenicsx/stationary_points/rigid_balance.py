@@ -177,8 +177,9 @@ class RigidBalance:
             return low, high
         most = np.where(self._same[np.ix_(k, k)], parts.differences(k), np.inf)
         least, low, high = -most.T, low.copy(), high.copy()
-        low[k] = (low[k] + least - self._widened * (np.abs(low[k]) + np.abs(least))).max(axis=1)
-        high[k] = (high[k] + most + self._widened * (np.abs(high[k]) + np.abs(most))).min(axis=1)
+        begin = (low[k] + least - self._widened * (np.abs(low[k]) + np.abs(least))).max(axis=1)
+        end = (high[k] + most + self._widened * (np.abs(high[k]) + np.abs(most))).min(axis=1)
+        low[k], high[k] = np.maximum(low[k], begin), np.minimum(high[k], end)
         return None if np.any(low > high) else (low, high)
 
     def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> ElasticParts:

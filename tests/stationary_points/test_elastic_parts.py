@@ -29,6 +29,7 @@ def test_a_point_in_a_row_is_near_to_the_next(known: int) -> None:
     low[known], high[known] = -0.2, 0.2
     ends = RigidBalance(row()).tightened(low, high)
     assert ends is not None
+    assert np.all((ends[0] >= low) & (ends[1] <= high))
     for i in {max(known - 1, 0), min(known + 1, SIZE - 1)} - {known}:
         bonds = min(max(i, known), SIZE - max(i, known))
         stretch = (2.0 * bonds * PEAK + LOAD) / SPRING
