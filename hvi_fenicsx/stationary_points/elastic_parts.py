@@ -1,8 +1,8 @@
 """Elastic parts e = G(f - τ) of displacements for intervals of the forces τ, and by how much two of them differ.
 
 The difference of two parts has an interval of its own, often far shorter than those of the two: what both have in
-common drops out. So the displacements of a long body on soft ground may be unknown, but hardly those of one vertex
-where those of the next are known.
+common drops out. So where one vertex of a soft floor is known, the next is nearly known, however far the floor
+stretches.
 """
 
 from __future__ import annotations
