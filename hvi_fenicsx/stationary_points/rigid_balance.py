@@ -2,7 +2,8 @@
 
 With τ = f - Sx the forces that laws and bounds bear, a rigid motion r (Sr = 0) demands r·τ = r·f. And
 x = Tx_p + G(f - τ), where x_p are a few unknowns, pivots, that fix the rigid motion T x_p. So intervals of the forces,
-which also cells that reach far have, bound the differences of displacements.
+which also cells that reach far have, bound the differences of displacements: those to the pivots, and of any two that
+all rigid motions move alike, as two vertices that slide on one floor.
 
 Elastic forces have no net force: what Sr is off zero by the rounding of S (:mod:`.rigid_motions`) is taken for zero.
 Else a body a million slips away would be held by rounding, where a load that is above its limit by 1e-7 pulls. What is
@@ -15,6 +16,7 @@ import numpy as np
 
 from ..typing import Array, Integers
 from .curved_laws import CurvedLaws
+from .elastic_parts import ElasticParts
 from .graph_clip import GraphClip, clipped_again
 from .rigid_motions import RigidMotions
 from .scalar_problem import ArcTable, ScalarProblem
@@ -44,6 +46,8 @@ class RigidBalance:
         motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
         self.pivots: Integers = motions.pivots
         self.motions: Array = motions.shapes
+        self._same = np.all(self.motions[:, None, :] == self.motions, axis=2)
+        self._beside = np.flatnonzero(self._same.sum(axis=1) > 1)
         others = np.ix_(motions.others, motions.others)
         self._flexibility = np.zeros((n, n))
         self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
@@ -89,7 +93,9 @@ class RigidBalance:
         ends = self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)
         if ends is None or not np.all(np.isfinite(forces)):
             return ends
-        return self.moved(*ends, *self._elastic_parts(*ends, *forces))
+        parts = self._elastic_parts(*ends, *forces)
+        moved = self.moved(*ends, *parts.ends)
+        return None if moved is None else self._moved_alike(*moved, parts)
 
     def elastic_parts(self, low: Array, high: Array, forces: tuple[Array, Array]) -> tuple[Array, Array]:
         """The intervals of e = x - T x_p in a cell, (n,) each.
@@ -103,7 +109,7 @@ class RigidBalance:
         first, last = low - moved_high, high - moved_low
         if not np.all(np.isfinite(forces)):
             return first, last
-        begin, end = self._elastic_parts(low, high, *forces)
+        begin, end = self._elastic_parts(low, high, *forces).ends
         return np.maximum(first, begin), np.minimum(last, end)
 
     def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
@@ -164,20 +170,34 @@ class RigidBalance:
         low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
         return None if np.any(low > high) else (low, high)
 
-    def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
+    def _moved_alike(self, low: Array, high: Array, parts: ElasticParts) -> tuple[Array, Array] | None:
+        """Smaller intervals of displacements that all motions move alike: they differ as their elastic parts do."""
+        k = self._beside
+        if not k.size:
+            return low, high
+        most = np.where(self._same[np.ix_(k, k)], parts.differences(k), np.inf)
+        least, low, high = -most.T, low.copy(), high.copy()
+        begin = (low[k] + least - self._widened * (np.abs(low[k]) + np.abs(least))).max(axis=1)
+        end = (high[k] + most + self._widened * (np.abs(high[k]) + np.abs(most))).min(axis=1)
+        low[k], high[k] = np.maximum(low[k], begin), np.minimum(high[k], end)
+        return None if np.any(low > high) else (low, high)
+
+    def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> ElasticParts:
         """The intervals of e, made short: G is changed along rigid motions, where the net force is known."""
         problem, motions, n = self._problem, self.motions, self._problem.size
         weights = (most - least) ** 2 + 1e-300
         normal = motions.T @ (weights[:, None] * motions)
         shift = -np.linalg.lstsq(normal, (self._flexibility * weights @ motions).T, rcond=None)[0].T
         flexibility = self._flexibility + shift @ motions.T
-        first, last = product(flexibility, problem.force - most, problem.force - least)
+        rows, middle = flexibility * (0.5 * (most - least)), flexibility @ (problem.force - 0.5 * (least + most))
+        reach = np.abs(rows).sum(axis=1)
         size = np.maximum(np.abs(low), np.abs(high))
         if self.exact:  # then only e is off, by less than itself
-            size = np.minimum(size, 2.0 * np.max(np.abs([first, last])))
+            size = np.minimum(size, 2.0 * np.max(np.abs(middle) + reach))
         forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
-        error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * (np.abs(flexibility) @ forces)
-        return first - error, last + error
+        sizes = np.abs(self._flexibility) @ forces + np.abs(shift) @ (np.abs(motions.T) @ forces)
+        error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * sizes
+        return ElasticParts(middle=middle, rows=rows, error=error)
 
 
 def product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
