@@ -131,7 +131,10 @@ class Jump:
     def _released(self) -> Landing | None:
         """The landing of an overdamped motion."""
         start = self.here.y[:-1] if self.sites.on_drops() else self._beyond()
-        found = self._relaxed(start, self.load, self._directions())
+        return self._come_to_rest(start, self._directions())
+
+    def _come_to_rest(self, z: Array, directions: Array) -> Landing | None:
+        found = self._relaxed(z, self.load, directions)
         return found if found is None or found.z is None else self._landed(found.z)
 
     def _directions(self) -> Array:
@@ -159,8 +162,7 @@ class Jump:
         found = self._relaxed(self.here.y[:-1].copy(), self.load + push * rate, directions)
         if found is None or found.z is None:
             return found
-        found = self._relaxed(found.z, self.load, directions)
-        return found if found is None or found.z is None else self._landed(found.z)
+        return self._come_to_rest(found.z, directions)
 
 
 def _starts(here: Place) -> Iterator[Array]:
