@@ -43,7 +43,12 @@ def squeezed(net: float, law: Table, balanced: float = BALANCED, **solver: Any) 
 
 
 @pytest.mark.parametrize(
-    ("balanced", "push", "solver"), [(1e9, 2.0, "auto"), (1e8, 2.0, "gamg"), (1e8, 1.2, "gamg"), (1e8, 1.2, "lu")]
+    ("balanced", "push", "solver"),
+    [
+        (1e9, 2.0, "auto"),
+        (1e8, 2.0, "gamg"),
+        *(pytest.param(1e8, 1.2, solver, marks=pytest.mark.long) for solver in ("gamg", "lu")),
+    ],
 )
 def test_a_small_net_push_beside_large_balanced_loads_is_never_lost(balanced: float, push: float, solver: str) -> None:
     """Nothing carries it: it is more than the friction's peak."""

@@ -32,6 +32,7 @@ def pulled(n: int, spring: float) -> CondensedProblem:
     return problem(stiffness, np.eye(1, n + 1, n)[0], bonds(SHARP, np.arange(n)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("follow", Follow)
 def test_what_is_borne_does_not_depend_on_the_spring_that_a_load_pulls_at(follow: Follow) -> None:
     """Statics: all of the load is in the spring. Its end moves by 2e4, beside corners of the law that are 1e-6 wide."""

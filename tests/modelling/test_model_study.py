@@ -44,6 +44,7 @@ def test_meshes_of_a_model_are_refinements_of_its_body(body: hvi.Body) -> None:
     assert "<td>given mesh, refined once, exact law</td><td>162</td>" in found._repr_html_()
 
 
+@pytest.mark.long
 def test_data_on_the_mesh_leave_the_model_that_mesh(body: hvi.Body, tmp_path: Path) -> None:
     model = with_ufl(body)
     for axis in ({"mesh": [0, 1]}, {"accuracy": [0.1]}):

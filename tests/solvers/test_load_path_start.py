@@ -105,6 +105,7 @@ def test_above_its_strength_in_space_with_friction_on_a_length_the_curve_says_wh
     assert solved(anchor(0.999 * borne)).converged
 
 
+@pytest.mark.long
 def test_where_a_bond_weakens_exponentially_the_curve_says_which_load_is_borne() -> None:
     found = solved(exponential_bar(1.05))
     assert found.exit_code == 4

@@ -184,6 +184,7 @@ def test_random_starts_find_all_points_of_a_floor_with_contact_and_no_others(smo
     assert len(reached) == len(points) == 3
 
 
+@pytest.mark.long
 def test_with_a_small_width_there_are_as_many_points_as_without_smoothing() -> None:
     plain = enumerated(condensed_scene(support([4, 2])))
     smooth = enumerated(condensed_scene(support([4, 2], smoothing="chks", epsilon=1e-4)))

@@ -50,7 +50,8 @@ def scanned(law: laws.Superpotential, pull: Array) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("law", "share", "count"), [(CHKS, 0.9, 5), (PAPER, 0.9, 5), (TEETH, 0.9, 9), (TEETH, 0.5, 17)]
+    ("law", "share", "count"),
+    [(CHKS, 0.9, 5), (PAPER, 0.9, 5), (TEETH, 0.9, 9), pytest.param(TEETH, 0.5, 17, marks=pytest.mark.long)],
 )
 def test_minimisers_and_saddles_of_two_bonds_are_those_of_a_scan(
     law: laws.Superpotential, share: float, count: int

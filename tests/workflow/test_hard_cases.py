@@ -237,6 +237,7 @@ STOOD = ("c8e5a9caa4", "ba3ba6f79c")
 """Smoothed laws: a body that leans far, and events near to each other."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("key", STOOD)
 def test_a_path_that_found_no_step_short_enough_reaches_its_end(key: str) -> None:
     """All rows are certified, and the end is not against what limit analysis proves."""
