@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..system.condensed_problem import CondensedProblem
+from ..typing import Array
 from .rounds import Round
 from .settling import Nowhere
 from .state import End, Event, PathOptions, PathState
@@ -116,6 +118,11 @@ class Follower(ABC):
     def _is_off(self) -> bool:
         """Whether no load, law or bound acts any more, and nothing would hold a body that floats."""
 
+    def _is_under_way(self) -> bool:
+        """Whether the path has been resumed on its way just now: it goes on as it went."""
+        resumed, self._resume = self._resume, None
+        return resumed is not None and resumed.event not in (Event.START, Event.TURN)
+
     def _is_adrift(self) -> bool:
         """Whether the load is back at zero and the body free; where any load is borne, the next one takes it up."""
         return self._floats and self._peak > 0.0 and self._is_off()
@@ -172,12 +179,40 @@ class Follower(ABC):
         else:
             self._finish(End.ESCAPES, reason)
 
+    def _end_for_ever(self, *, stands: bool) -> None:
+        """End where nothing ends the curve: where the factor stands, a body comes off."""
+        if stands:
+            self._come_off(self.factor, f"at the factor {self.factor:.6g} a body comes off")
+        else:
+            self._lose(self.factor, "the path leads away from the wanted factor for ever")
+
+    def _end_jump(self, *, escapes: bool) -> None:
+        """End in a jump that leads to no equilibrium."""
+        if escapes:
+            self._come_off(self.factor, f"at the factor {self.factor:.6g} no equilibrium is left: a body comes off")
+        else:
+            self._lose(self.factor, f"no stable equilibrium found at the factor {self.factor:.6g}")
+
     def _lose(self, factor: float, reason: str) -> None:
         """End without an answer; where no larger factor is borne, that is one."""
         if abs(factor - self._options.borne) <= self._small:
             self._finish(End.ESCAPES, self._not_borne())
         else:
             self._finish(End.LOST, reason)
+
+
+def constant_alone(problem: CondensedProblem, held: Array) -> CondensedProblem | None:
+    """The path from rest to the constant loads, its factor from 0 to 1; None where there are none.
+
+    Args:
+        problem: the problem.
+        held: the loads that rest bears, (n,).
+    """
+    away = problem.force - held
+    size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
+    if np.max(np.abs(away), initial=0.0) <= 1e-14 * size:
+        return None
+    return replace(problem, force=held, force_rate=away)
 
 
 def why_not_loaded(follower: Follower) -> str:
