@@ -278,8 +278,8 @@ class SiteGraphs(SiteLaws):
             memory: as :attr:`memory` was.
         """
         if memory is not None:
-            for number, law in enumerate(self.vertices):
-                law.restore(memory[number, :])
+            for row, law in enumerate(self.vertices):
+                law.restore(memory[row, :])
         for k, number in enumerate(numbers):
             self.rebuild(k)
             self.enter(k, int(number))
