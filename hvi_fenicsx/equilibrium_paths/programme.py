@@ -57,7 +57,7 @@ class Follower(ABC):
 
     def _all_states(self) -> Iterator[PathState]:
         if self._resume is None:
-            yield from self._begun()
+            yield from self._first_states()
         else:
             self._restore(self._resume)
             self._peak = max(map(abs, self._options.programme[: self._leg]), default=0.0)
@@ -71,10 +71,19 @@ class Follower(ABC):
         if self.end is None:  # resumed from its last state
             self._finish(End.REACHED, "the programme is done")
 
+    def _first_states(self) -> Iterator[PathState]:
+        """The first state; none where its factor is not borne."""
+        low, high = self._options.borne
+        if low <= self._small and high >= -self._small:
+            yield from self._begun()
+        else:
+            self._finish(End.ESCAPES, "no equilibrium bears the constant loads alone: a body comes off")
+
     def _gone_to(self, aim: float) -> Iterator[PathState]:
         """A leg; none where no factor on it is borne."""
-        if aim > self._options.borne and self.factor >= self._options.borne - self._small:
-            self._finish(End.ESCAPES, self._not_borne())
+        limit, way = self._limit(self.factor), 1.0 if aim >= self.factor else -1.0
+        if way * (aim - limit) > 0.0 and way * (self.factor - limit) >= -self._small:
+            self._finish(End.ESCAPES, self._not_borne(limit))
             yield self._state(Event.END)
         else:
             yield from self._towards(aim)
@@ -84,8 +93,17 @@ class Follower(ABC):
         """A difference of factors that does not count."""
         return self._options.thresholds.at_limit * max(map(abs, self._options.programme))
 
-    def _not_borne(self) -> str:
-        return f"no factor above {self._options.borne:.6g} is borne by any equilibrium: a body comes off"
+    def _limit(self, factor: float) -> float:
+        """The last factor that may be borne, from one on towards the aim of the present leg."""
+        (low, high), programme = self._options.borne, self._options.programme
+        return high if programme[min(self._leg, len(programme) - 1)] >= factor else low
+
+    def _not_borne(self, limit: float) -> str:
+        """Why a path ends at a limit of the factors that may be borne."""
+        low, high = self._options.borne
+        side = "but" if high - low <= self._small else "above" if limit == high else "below"
+        shown = 0.0 if abs(limit) <= self._small else limit
+        return f"no factor {side} {shown:.6g} is borne by any equilibrium: a body comes off"
 
     def _after_leg(self, programme: Sequence[float]) -> PathState:
         if self._leg < len(programme):
@@ -194,9 +212,10 @@ class Follower(ABC):
             self._lose(self.factor, f"no stable equilibrium found at the factor {self.factor:.6g}")
 
     def _lose(self, factor: float, reason: str) -> None:
-        """End without an answer; where no larger factor is borne, that is one."""
-        if abs(factor - self._options.borne) <= self._small:
-            self._finish(End.ESCAPES, self._not_borne())
+        """End without an answer; where no factor beyond is borne, that is one."""
+        limit = self._limit(factor)
+        if abs(factor - limit) <= self._small:
+            self._finish(End.ESCAPES, self._not_borne(limit))
         else:
             self._finish(End.LOST, reason)
 
