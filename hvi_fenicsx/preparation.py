@@ -69,17 +69,17 @@ class Preparation:
         """The problem that is assembled."""
         return self.system.problem
 
-    def load_factors(self, load: str | None = None) -> LoadFactors:
-        """Between which factors of a load the body is held, the other loads constant. Collective.
+    def load_factors(self, *loads: str) -> LoadFactors:
+        """Between which factors of some loads together the body is held, the others constant. Collective.
 
         Args:
-            load: None for the whole load; else ``part.traction`` or ``region.force`` (``body.force``), or just the part
-                or region.
+            loads: ``part.traction`` or ``region.force`` (``body.force``), or just the part or region; none for the
+                whole load.
 
         Raises:
             InputError: on all ranks alike: there is no such load.
         """
-        return existence.load_factors(self.problem, self.system.forces, load)
+        return existence.load_factors(self.problem, self.system.forces, *loads)
 
 
 def prepare(
@@ -113,7 +113,7 @@ def prepare(
     margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"
     _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
     with timer("assembly"):
-        system.attach_free_motions(solvability.free)
+        system.attach_free_motions(solvability.loose)
         warnings = _warnings(scene, system, solvability)
     return Preparation(
         scene=scene,

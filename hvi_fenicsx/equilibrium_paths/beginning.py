@@ -12,6 +12,7 @@ from ..typing import Array
 from .bonds import BondTable
 from .cells import Cells
 from .placing import place
+from .programme import constant_alone
 from .settling import Nowhere, settled
 from .thresholds import DEFAULT, Thresholds
 
@@ -51,21 +52,16 @@ def at_rest(
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     force = _nearest(bonds, x, problem.force - problem.elastic @ x)
     held = problem.elastic @ x + force
-    away = problem.force - held
-    size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
-    rate = away if np.max(np.abs(away), initial=0.0) > 1e-14 * size else aim * problem.force_rate
+    constant = constant_alone(problem, held)
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
-        next_loads = replace(problem, force=held, force_rate=rate)
+        next_loads = constant or replace(problem, force=held, force_rate=aim * problem.force_rate)
         found = settled(bonds, next_loads, np.zeros(problem.size), thresholds.settling)
         if isinstance(found, Nowhere):
             off = found is Nowhere.AWAY
             return Beginning(cells=None, memory=bonds.memory, reason=found.value, escapes=off)
         cells = found
-    if rate is not away:
-        return Beginning(cells=cells, memory=bonds.memory)
-    alone = replace(problem, force=held, force_rate=away)
-    return Beginning(cells=cells, memory=bonds.memory, constant=alone)
+    return Beginning(cells=cells, memory=bonds.memory, constant=constant)
 
 
 def _nearest(bonds: BondTable, x: Array, wanted: Array) -> Array:

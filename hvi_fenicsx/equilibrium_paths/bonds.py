@@ -208,8 +208,7 @@ class BondTable:
     @property
     def memory(self) -> Array:
         """What each bond remembers: displacements and tractions on either side, zero without memory, (bonds, 4)."""
-        kept = [b.passed or Passed() for b in self.bonds]
-        return np.array([[*p.displacements, *p.tractions] for p in kept]).reshape(-1, 4)
+        return np.array([(b.passed or Passed()).row for b in self.bonds]).reshape(-1, 4)
 
     def restore(self, memory: Array) -> None:
         """Take over what bonds remembered.
@@ -219,8 +218,7 @@ class BondTable:
         """
         for number, bond in enumerate(self.bonds):
             if bond.passed is not None:
-                low, high, low_traction, high_traction = (float(memory[number, k]) for k in range(4))
-                passed = Passed(displacements=(low, high), tractions=(low_traction, high_traction))
+                passed = Passed.of(memory[number, :])
                 if passed != bond.passed:
                     bond.passed, bond.present = passed, remembering(bond.graph, passed)
 

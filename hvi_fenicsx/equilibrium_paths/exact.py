@@ -151,7 +151,7 @@ class ExactFollower(Follower):
             step = self.tracer.advance(aim)
             cells = self.tracer.cells
             if step.variable is None:
-                self._endless()
+                self._end_for_ever(stands=self.tracer.stands)
                 yield self._state(Event.END)
                 return
             self._balance.go(cells.x, cells.bond_force, self.tracer.factor)
@@ -164,9 +164,7 @@ class ExactFollower(Follower):
 
     def _orient(self, aim: float) -> None:
         wanted = np.sign(aim - self.tracer.factor)
-        resumed, self._resume = self._resume, None
-        under_way = resumed is not None and resumed.event not in (Event.START, Event.TURN)
-        if not under_way and self.tracer.factor_rate * wanted < 0.0:
+        if not self._is_under_way() and self.tracer.factor_rate * wanted < 0.0:
             self.tracer.turn()
 
     @override
@@ -209,13 +207,6 @@ class ExactFollower(Follower):
         place = place_of(self._problem, passing.unknown, group)
         return self._state(classify(passing), place, bifurcation=passing.bifurcation)
 
-    def _endless(self) -> None:
-        """Nothing stops the curve: at a factor that stands a body escapes."""
-        if self.tracer.stands:
-            self._come_off(self.factor, f"at the factor {self.factor:.6g} a body comes off")
-        else:
-            self._lose(self.factor, "the path leads away from the wanted factor for ever")
-
     # -- jumps
 
     def _must_jump(self, aim: float) -> bool:
@@ -235,15 +226,13 @@ class ExactFollower(Follower):
             yield self._landed(found.cells, factor, aim, found.inverse)
             return
         landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False)
+        if landing.found:
+            yield self._landed(self._placed(landing.x, factor), factor, aim)
+            return
         if landing.escapes:
             self._bonds.restore(memory)
-            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
-            yield self._state(Event.END)
-        elif not landing.found:
-            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
-            yield self._state(Event.END)
-        else:
-            yield self._landed(self._placed(landing.x, factor), factor, aim)
+        self._end_jump(escapes=landing.escapes)
+        yield self._state(Event.END)
 
     @override
     def _settled(self, towards: float) -> PathState | Nowhere:

@@ -42,6 +42,17 @@ class Passed:
     displacements: tuple[float, float] = (0.0, 0.0)
     tractions: tuple[float, float] = (0.0, 0.0)
 
+    @property
+    def row(self) -> list[float]:
+        """All four numbers, as states of a path keep them."""
+        return [*self.displacements, *self.tractions]
+
+    @classmethod
+    def of(cls, row: Array) -> Passed:
+        """The same from its row, (4,)."""
+        low, high, low_traction, high_traction = map(float, row)
+        return cls(displacements=(low, high), tractions=(low_traction, high_traction))
+
     def reached(self, x: float, traction: float, *, even: bool) -> Passed:
         """The memory after a greater displacement.
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..system.condensed_problem import CondensedProblem
+from ..typing import Array
 from .rounds import Round
 from .settling import Nowhere
 from .state import End, Event, PathOptions, PathState
@@ -55,7 +57,7 @@ class Follower(ABC):
 
     def _all_states(self) -> Iterator[PathState]:
         if self._resume is None:
-            yield from self._begun()
+            yield from self._first_states()
         else:
             self._restore(self._resume)
             self._peak = max(map(abs, self._options.programme[: self._leg]), default=0.0)
@@ -69,10 +71,19 @@ class Follower(ABC):
         if self.end is None:  # resumed from its last state
             self._finish(End.REACHED, "the programme is done")
 
+    def _first_states(self) -> Iterator[PathState]:
+        """The first state; none where its factor is not borne."""
+        low, high = self._options.borne
+        if low <= self._small and high >= -self._small:
+            yield from self._begun()
+        else:
+            self._finish(End.ESCAPES, "no equilibrium bears the constant loads alone: a body comes off")
+
     def _gone_to(self, aim: float) -> Iterator[PathState]:
         """A leg; none where no factor on it is borne."""
-        if aim > self._options.borne and self.factor >= self._options.borne - self._small:
-            self._finish(End.ESCAPES, self._not_borne())
+        limit, way = self._limit(self.factor), 1.0 if aim >= self.factor else -1.0
+        if way * (aim - limit) > 0.0 and way * (self.factor - limit) >= -self._small:
+            self._finish(End.ESCAPES, self._not_borne(limit))
             yield self._state(Event.END)
         else:
             yield from self._towards(aim)
@@ -82,8 +93,17 @@ class Follower(ABC):
         """A difference of factors that does not count."""
         return self._options.thresholds.at_limit * max(map(abs, self._options.programme))
 
-    def _not_borne(self) -> str:
-        return f"no factor above {self._options.borne:.6g} is borne by any equilibrium: a body comes off"
+    def _limit(self, factor: float) -> float:
+        """The last factor that may be borne, from one on towards the aim of the present leg."""
+        (low, high), programme = self._options.borne, self._options.programme
+        return high if programme[min(self._leg, len(programme) - 1)] >= factor else low
+
+    def _not_borne(self, limit: float) -> str:
+        """Why a path ends at a limit of the factors that may be borne."""
+        low, high = self._options.borne
+        side = "but" if high - low <= self._small else "above" if limit == high else "below"
+        shown = 0.0 if abs(limit) <= self._small else limit
+        return f"no factor {side} {shown:.6g} is borne by any equilibrium: a body comes off"
 
     def _after_leg(self, programme: Sequence[float]) -> PathState:
         if self._leg < len(programme):
@@ -115,6 +135,11 @@ class Follower(ABC):
     @abstractmethod
     def _is_off(self) -> bool:
         """Whether no load, law or bound acts any more, and nothing would hold a body that floats."""
+
+    def _is_under_way(self) -> bool:
+        """Whether the path has been resumed on its way just now: it goes on as it went."""
+        resumed, self._resume = self._resume, None
+        return resumed is not None and resumed.event not in (Event.START, Event.TURN)
 
     def _is_adrift(self) -> bool:
         """Whether the load is back at zero and the body free; where any load is borne, the next one takes it up."""
@@ -172,12 +197,41 @@ class Follower(ABC):
         else:
             self._finish(End.ESCAPES, reason)
 
+    def _end_for_ever(self, *, stands: bool) -> None:
+        """End where nothing ends the curve: where the factor stands, a body comes off."""
+        if stands:
+            self._come_off(self.factor, f"at the factor {self.factor:.6g} a body comes off")
+        else:
+            self._lose(self.factor, "the path leads away from the wanted factor for ever")
+
+    def _end_jump(self, *, escapes: bool) -> None:
+        """End in a jump that leads to no equilibrium."""
+        if escapes:
+            self._come_off(self.factor, f"at the factor {self.factor:.6g} no equilibrium is left: a body comes off")
+        else:
+            self._lose(self.factor, f"no stable equilibrium found at the factor {self.factor:.6g}")
+
     def _lose(self, factor: float, reason: str) -> None:
-        """End without an answer; where no larger factor is borne, that is one."""
-        if abs(factor - self._options.borne) <= self._small:
-            self._finish(End.ESCAPES, self._not_borne())
+        """End without an answer; where no factor beyond is borne, that is one."""
+        limit = self._limit(factor)
+        if abs(factor - limit) <= self._small:
+            self._finish(End.ESCAPES, self._not_borne(limit))
         else:
             self._finish(End.LOST, reason)
+
+
+def constant_alone(problem: CondensedProblem, held: Array) -> CondensedProblem | None:
+    """The path from rest to the constant loads, its factor from 0 to 1; None where there are none.
+
+    Args:
+        problem: the problem.
+        held: the loads that rest bears, (n,).
+    """
+    away = problem.force - held
+    size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
+    if np.max(np.abs(away), initial=0.0) <= 1e-14 * size:
+        return None
+    return replace(problem, force=held, force_rate=away)
 
 
 def why_not_loaded(follower: Follower) -> str:

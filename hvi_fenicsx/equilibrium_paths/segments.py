@@ -248,7 +248,7 @@ def _jump(components: Sequence[Component], at: float) -> Segment | None:
 
 
 def _piece(components: Sequence[Component], start: float, end: float) -> Segment:
-    middle = _between(start, end)
+    middle = between(start, end)
     slopes = [c.slope(middle) for c in components]
     fresh = any(c.fresh(middle, slope) for c, slope in zip(components, slopes, strict=True))
     anchor, side = _anchor(start, end)
@@ -270,8 +270,13 @@ def _anchor(start: float, end: float) -> tuple[float, str]:
     return (start, "right") if math.isfinite(start) else (end, "left")
 
 
-def _between(start: float, end: float) -> float:
-    """A displacement inside an interval, of the sign of the interval."""
+def between(start: float, end: float) -> float:
+    """A displacement inside an interval, of the sign of the interval.
+
+    Args:
+        start: its low end, or -inf.
+        end: its high end, or inf.
+    """
     if math.isfinite(start) and math.isfinite(end):
         return 0.5 * (start + end)
     if math.isfinite(start):

@@ -23,7 +23,10 @@ class Nowhere(Enum):
 
     AWAY = "nothing holds the body at rest"
     UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
-    NEUTRAL = "nothing holds the body at rest, and where a small load takes it, it may still move without a force"
+    NEUTRAL = (
+        "nothing holds the body at rest, and where a small load takes it, it may still move without a force, as one "
+        'that rolls; a support, or weak friction such as law = "linear_spring" where it touches, gives it a path'
+    )
 
 
 def settled(bonds: BondTable, problem: CondensedProblem, rest: Array, limits: SettlingThresholds) -> Cells | Nowhere:

@@ -144,7 +144,7 @@ class PathOptions:
         follow: how to go on where the path is not stable.
         remember: numbers of the problem's bonds that remember.
         most_events: events at most.
-        borne: the largest factor with which there may be an equilibrium, where that is known.
+        borne: the least and the largest factor with which there may be an equilibrium, where these are known.
         held: between these factors there is one, whatever the bonds remember; as far as that is known.
         stops: factors at which a path that is not straight has a state, each time it comes to one.
         thresholds: the numbers that tune how it is followed.
@@ -154,7 +154,7 @@ class PathOptions:
     follow: Follow = Follow.STABLE
     remember: Collection[int] = ()
     most_events: int = 1_000_000
-    borne: float = float("inf")
+    borne: tuple[float, float] = (-float("inf"), float("inf"))
     held: tuple[float, float] = (0.0, 0.0)
     stops: Sequence[float] = ()
     thresholds: Thresholds = DEFAULT

@@ -22,7 +22,7 @@ from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..scene import PathTable
 from ..solvers import obstacle_force
-from ..system import loading
+from ..system import existence, loading
 from ..system.condensation import Condensation
 from . import records
 from .certifying import Certifier, Verdict
@@ -152,14 +152,14 @@ class PathRun:
     def _limits(self) -> dict[str, Any]:
         """With which factors there is an equilibrium, and with which none, where rigid motions tell. Collective.
 
-        They tell it of one load or of all; where supports and obstacles are moved to does not matter to them.
+        Where supports and obstacles are moved to does not matter to them, nor do given strains.
         """
-        loads = set(self.prepared.system.forces)
-        scaled = sorted(loads.intersection(self.scaled))
-        if not scaled or 1 < len(scaled) < len(loads):
-            return {}
-        known = self.prepared.load_factors(None if len(scaled) == len(loads) else scaled[0])
-        return {"borne": known.peak, "held": (known.held_from, known.held)}
+        loads = existence.loads_of_rigid_motions(self.prepared.problem, self.prepared.system.forces)
+        scaled = sorted(loads.keys() & set(self.scaled))
+        if not scaled:
+            return {"borne": (np.inf, -np.inf)} if self.prepared.solvability.state == "escapes" else {}
+        known = self.prepared.load_factors(*scaled)
+        return {"borne": (known.peak_from, known.peak), "held": (known.held_from, known.held)}
 
     def _take(self, state: PathState, verdict: Verdict) -> None:
         self.states.append(state)

@@ -64,25 +64,25 @@ def _verdict(problem: RigidProblem, reduced: ReducedProblem) -> Solvability:
         return undecided(modes(reduced.frame, problem.body), analysis.paper_c, str(error))
 
 
-def load_factors(
-    comm: MPI.Comm, problem: RigidProblem, load: str | None = None, thresholds: Thresholds = DEFAULT
-) -> LoadFactors:
-    """Factors of one load, the others constant, or of the whole load. Collective; the same on all ranks.
+def load_factors(comm: MPI.Comm, problem: RigidProblem, *loads: str, thresholds: Thresholds = DEFAULT) -> LoadFactors:
+    """Factors of some loads together, the others constant. Collective; the same on all ranks.
 
     Args:
         comm: the ranks of the mesh.
         problem: the body and what it meets.
-        load: its name; None: the whole load.
+        loads: their names; none: the whole load.
         thresholds: what counts as zero, and when to give up.
 
     Raises:
         InputError: there is no such load.
         SolverError: the linear programmes broke down.
     """
-    if load is not None and load not in problem.loads:
-        raise InputError(f"there is no load {load!r}; there are: {', '.join(problem.loads) or 'none'}")
+    names = loads or tuple(problem.loads)
+    for name in names:
+        if name not in problem.loads:
+            raise InputError(f"there is no load {name!r}; there are: {', '.join(problem.loads) or 'none'}")
     unmoved = LoadFactors(-np.inf, np.inf, np.inf, None, None)
-    return _judged(comm, problem, thresholds, unmoved, lambda found: Analysis(problem, found).load_factors(load))
+    return _judged(comm, problem, thresholds, unmoved, lambda found: Analysis(problem, found).load_factors(names))
 
 
 def _judged(

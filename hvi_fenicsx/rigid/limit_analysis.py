@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -62,10 +63,15 @@ class Analysis:
         return GlobalProgramme(Programme(self.reduced.frame, self.reduced.slips, scale, self.thresholds))
 
     @cached_property
+    def loose(self) -> Array:
+        """Orthonormal basis (k, q) of the motions that nothing holds."""
+        rows = np.vstack([self.reduced.contact, *self._resisted()])
+        return null_space(triangle(rows), self.thresholds)
+
+    @cached_property
     def free(self) -> Array:
         """Orthonormal basis (k, q) of the motions that nothing holds and on which the load does no work."""
-        rows = np.vstack([self.reduced.contact, *self._resisted()])
-        loose = null_space(triangle(rows), self.thresholds)
+        loose = self.loose
         work = self.work @ loose
         return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None], self.thresholds)
 
@@ -84,7 +90,6 @@ class Analysis:
         start = -self._factor(self.growth, -self.work, still)[0] if self._pushes else -np.inf
         margin = self._margin(self.growth)
         state = self._state(margin)
-        free = natural_basis(self.reduced.frame @ self.free, self.problem.body.shifts, self.thresholds)
         return Solvability(
             state=state,
             margin=None if margin is None else self._flat(margin.value),
@@ -96,9 +101,15 @@ class Analysis:
             ),
             critical=critical,
             kernel=modes(self.reduced.frame, self.problem.body),
-            free=modes(free, self.problem.body),
+            loose=self._named(self.loose),
+            free=self._named(self.free),
             paper=self._paper(),
         )
+
+    def _named(self, basis: Array) -> tuple[Mode, ...]:
+        """The motions of a basis on the kernel's, as simple as they go."""
+        natural = natural_basis(self.reduced.frame @ basis, self.problem.body.shifts, self.thresholds)
+        return modes(natural, self.problem.body)
 
     @property
     def _pushes(self) -> bool:
@@ -109,13 +120,14 @@ class Analysis:
         """Whether a load factor between none and all of the load."""
         return self.thresholds.tie < factor < 1.0
 
-    def load_factors(self, load: str | None) -> LoadFactors:
-        """The factors of one load, the others constant, or of the whole load."""
-        moved = self.work if load is None else self.reduced.loads[load]
-        held, mode = self._factor(self.growth, moved, self.work - moved)
-        peak, peak_mode = self._factor(self.peak, moved, self.work - moved)
-        start, _ = self._factor(self.growth, -moved, self.work - moved)
-        return LoadFactors(-start, held, peak, mode, peak_mode)
+    def load_factors(self, loads: Collection[str]) -> LoadFactors:
+        """The factors of some loads together, the others constant."""
+        moved = np.asarray(sum((self.reduced.loads[name] for name in loads), np.zeros_like(self.work)))
+        rest = self.work - moved
+        held, mode = self._factor(self.growth, moved, rest)
+        peak, peak_mode = self._factor(self.peak, moved, rest)
+        start, first = (self._factor(f, -moved, rest)[0] for f in (self.growth, self.peak))
+        return LoadFactors(-start, held, peak, mode, peak_mode, peak_from=-first)
 
     def _factor(self, f: Functional, moved: Array, rest: Array) -> tuple[float, Mode | None]:
         """The largest λ with <rest + λ moved, y> <= f(y) on the cone, and the motion that limits it."""

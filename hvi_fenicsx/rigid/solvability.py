@@ -42,9 +42,9 @@ class PaperConditions:
 
 @dataclass(frozen=True)
 class LoadFactors:
-    """The factors of a load, the others constant, between which a body is held, and where the peak ends.
+    """The factors of a load, the others constant, between which a body is held, and beyond which nothing bears it.
 
-    For λ in (held_from, held) the state is `held`; for λ > peak it is `escapes`.
+    For λ in (held_from, held) the state is `held`; for λ > peak or λ < peak_from it is `escapes`.
 
     Attributes:
         held_from: see above.
@@ -52,6 +52,7 @@ class LoadFactors:
         peak: see above.
         mode: the motion that limits the load at `held`, None where nothing does.
         peak_mode: the motion that limits the load at `peak`, likewise.
+        peak_from: see above; above peak: no factor is borne.
         tie: relative difference of two factors that is rounding.
     """
 
@@ -60,6 +61,7 @@ class LoadFactors:
     peak: float
     mode: Mode | None
     peak_mode: Mode | None
+    peak_from: float = -np.inf
     tie: float = DEFAULT.tie
 
     @property
@@ -95,7 +97,8 @@ class Solvability:
         direction: the motion of escape (in the state borderline: the one in balance), None if held.
         critical: the motion that limits lambda_held.
         kernel: a basis of Y.
-        free: a basis of the motions that nothing holds and on which the load does no work, both ways.
+        loose: a basis of the motions that nothing holds.
+        free: a basis of those of them on which the load does no work, both ways; in all states but `escapes` all do.
         paper: the paper's own conditions.
         held_from: see LoadFactors.held_from, where a law pushes the body; else -inf.
         trouble: in the state undecided, what broke down; margin and factors are then unknown (None, nan).
@@ -108,6 +111,7 @@ class Solvability:
     direction: Mode | None
     critical: Mode | None
     kernel: tuple[Mode, ...]
+    loose: tuple[Mode, ...]
     free: tuple[Mode, ...]
     paper: PaperConditions
     held_from: float = -np.inf
@@ -144,6 +148,7 @@ def unmovable() -> Solvability:
         direction=None,
         critical=None,
         kernel=(),
+        loose=(),
         free=(),
         paper=PaperConditions(0.0, None),
     )
@@ -165,6 +170,7 @@ def undecided(kernel: tuple[Mode, ...], c: float, trouble: str) -> Solvability:
         direction=None,
         critical=None,
         kernel=kernel,
+        loose=(),
         free=(),
         paper=PaperConditions(c, np.nan),
         trouble=trouble,
@@ -201,6 +207,7 @@ def combine(bodies: Sequence[Solvability]) -> Solvability:
         lambda_peak=min(body.lambda_peak for body in known),
         critical=first.critical,
         kernel=kernel,
+        loose=tuple(mode for body in known for mode in body.loose),
         free=tuple(mode for body in known for mode in body.free),
         paper=PaperConditions(c, _combined_margin([body.paper.margin for body in known])),
     )
@@ -209,8 +216,8 @@ def combine(bodies: Sequence[Solvability]) -> Solvability:
 def combine_factors(bodies: Sequence[LoadFactors]) -> LoadFactors:
     """The factors of a load on several bodies: the scene is held where all of them are. Local."""
     last, peak = min(bodies, key=lambda one: one.held), min(bodies, key=lambda one: one.peak)
-    start = max(one.held_from for one in bodies)
-    return LoadFactors(start, last.held, peak.peak, last.mode, peak.peak_mode)
+    start, first = max(one.held_from for one in bodies), max(one.peak_from for one in bodies)
+    return LoadFactors(start, last.held, peak.peak, last.mode, peak.peak_mode, peak_from=first)
 
 
 def _combined_margin(margins: Sequence[float | None]) -> float | None:

@@ -46,24 +46,25 @@ def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvabilit
     found = combine([analyse(comm, body) for body in rigid_problems(problem, forces)])
     if (obstacles := _with_obstacles(problem, forces)) is not None:
         known = [_of_body(body, analyse(comm, body)) for body in obstacles]
-        found = replace(combine(known), kernel=found.kernel, free=found.free, paper=found.paper)
+        found = replace(combine(known), kernel=found.kernel, loose=found.loose, free=found.free, paper=found.paper)
     return replace(found, direction=parting.named(problem, found.direction))
 
 
-def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], load: str | None = None) -> LoadFactors:
-    """Between which factors of a load the body is held, the other loads constant. Collective.
+def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], *loads: str) -> LoadFactors:
+    """Between which factors of some loads together the body is held, the other loads constant. Collective.
 
     Args:
         problem: the problem.
         forces: its load vectors by name.
-        load: the name of a load, or of the part or region that it acts on alone; None for the whole load.
+        loads: names of loads, or of the parts or regions that they act on alone; none for the whole load.
 
     Raises:
         InputError: on all ranks alike: there is no such load.
     """
     comm, bodies = problem.domain.mesh.comm, _with_obstacles(problem, forces) or rigid_problems(problem, forces)
-    name = None if load is None else load_name(list(dict.fromkeys(n for body in bodies for n in body.loads)), load)
-    found = rigid.combine_factors([_limits(body, rigid.load_factors(comm, body, name)) for body in bodies])
+    known = list(dict.fromkeys(n for body in bodies for n in body.loads))
+    names = [load_name(known, load) for load in loads]
+    found = rigid.combine_factors([_limits(body, rigid.load_factors(comm, body, *names)) for body in bodies])
     mode, peak = (parting.named(problem, limiting) for limiting in (found.mode, found.peak_mode))
     return replace(found, mode=mode, peak_mode=peak)
 

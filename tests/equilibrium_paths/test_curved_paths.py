@@ -15,12 +15,13 @@ from test_exact_paths import SOFTENING, bar, largest_imbalance, peeled, random_p
 
 from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.equilibrium_paths import segments
-from hvi_fenicsx.equilibrium_paths.arc_length import equations
+from hvi_fenicsx.equilibrium_paths.arc_length import equations, passage
 from hvi_fenicsx.equilibrium_paths.arc_length.bordered import Bordered
 from hvi_fenicsx.equilibrium_paths.arc_length.distances import CurvedDistances
 from hvi_fenicsx.equilibrium_paths.arc_length.equations import Refused
 from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
-from hvi_fenicsx.equilibrium_paths.arc_length.passage import Crossing, Passage
+from hvi_fenicsx.equilibrium_paths.arc_length.jump import Jump
+from hvi_fenicsx.equilibrium_paths.arc_length.passage import Crossing, Passage, _Approach
 from hvi_fenicsx.equilibrium_paths.arc_length.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_paths.arc_length.sites import Sites, Values
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
@@ -466,8 +467,8 @@ def test_a_motion_passes_many_sharp_drops_in_few_steps(smoothing: str, monkeypat
 class GoingRound(Crossing):
     """Passages that lead from each of two cells to the other for ever."""
 
-    def _ways(self, rates: Array) -> Array:
-        return np.zeros_like(rates)
+    def _ways(self, approach: _Approach) -> Array:
+        return np.zeros_like(approach.rates)
 
     def _pass(self, k: int, rates: Array) -> None:
         sites = self._sites
@@ -485,11 +486,31 @@ def test_passages_that_go_round_end_soon() -> None:
     assert len(crossing.passages) < 10
 
 
+def test_a_jump_lands_nowhere_from_where_passages_go_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The path could not go on from there: it would be told as lost, though another way may lead on."""
+    follower, _ = path(line(graph(DROP), 30), programme=(0.1,))
+    here, given, sites = follower._curve.here, follower._problem, follower._sites
+    jump = Jump(
+        problem=given,
+        sites=sites,
+        here=here,
+        load=given.load(0.1),
+        heading=1,
+        lag=follower._lag,
+        held=True,
+        step=lambda: None,
+    )
+    elsewhere = here.y[:-1] + 1e-6
+    assert jump._landed(elsewhere) is not None
+    monkeypatch.setattr(passage, "Crossing", GoingRound)
+    assert jump._landed(elsewhere) is None
+
+
 class TurningBack(GoingRound):
     """Passages that leave all numbers as they are: each site turns back once, to a graph of its own."""
 
-    def _ways(self, rates: Array) -> Array:
-        return np.array([np.inf if k in self._turned else 0.0 for k in range(len(rates))])
+    def _ways(self, approach: _Approach) -> Array:
+        return np.array([np.inf if k in self._turned else 0.0 for k in range(len(approach.rates))])
 
     def _pass(self, k: int, rates: Array) -> None:
         self._turned.add(k)

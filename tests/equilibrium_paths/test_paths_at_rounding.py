@@ -68,9 +68,10 @@ class HardlyOnwards(Crossing):
 def test_a_bond_that_turned_back_stays_on_its_secant_where_its_rate_is_rounding() -> None:
     """Where the curve has taken it back, the sign of a rate of 1e-9 at the turn itself says nothing."""
     follower, _ = path(line(Exponential(1.0, 0.3, 0.5), 4), programme=(1.5,), remember=(0,))
-    crossing = HardlyOnwards(follower._curve, follower._lag, lambda: None)
+    here, crossing = follower._curve.here, HardlyOnwards(follower._curve, follower._lag, lambda: None)
     site = crossing.site = next(k for k, outward in enumerate(follower._sites.outward) if outward)
-    assert [p.site for p in crossing.run(site, turned=True)] == [site]
+    turn = Move(outcome=Outcome.TURNED, site=site, before=here, after=here)
+    assert [p.site for p in crossing.run(turn)] == [site]
 
 
 def test_an_event_that_is_near_does_not_shorten_the_steps_after_it() -> None:

@@ -191,6 +191,14 @@ def test_pushed_the_other_way_the_same_tower_bears_less_than_nothing() -> None:
     """The push may be reversed up to the same limit: the factors form an interval around 0."""
     factors = load_factors(ALONE, block(1.0, weight=2.0, height=4.0), "push")
     assert factors.held_from == pytest.approx(-0.25, abs=1e-9)
+    slides = load_factors(ALONE, block(1.0, weight=8.0, height=4.0), "push")
+    assert (slides.held_from, slides.peak_from) == (pytest.approx(-0.5, abs=1e-9), pytest.approx(-1.0, abs=1e-9))
+
+
+def test_several_loads_together_have_factors_of_their_own() -> None:
+    """Weight and push grow together: a tenth of the weight tips at no factor, and slides where friction bears it."""
+    both = load_factors(ALONE, block(0.2, weight=2.0, height=4.0), "push", "weight")
+    assert (both.held, both.peak) == (pytest.approx(2.5, abs=1e-8), pytest.approx(5.0, abs=1e-8))
 
 
 def test_weight_is_a_load_of_which_there_must_be_enough() -> None:

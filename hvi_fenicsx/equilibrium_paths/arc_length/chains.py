@@ -10,8 +10,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...system.condensed_problem import CondensedProblem
-from ..segments import Kind, Segment
-from .deviations import between
+from ..segments import Kind, Segment, between
 from .radials import Radials
 from .vertex_laws import VertexLaw
 

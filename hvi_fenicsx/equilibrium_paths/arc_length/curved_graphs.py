@@ -30,13 +30,8 @@ class CurvedGraphs:
     def __init__(self, problem: CondensedProblem, remember: Collection[int], state: PathState) -> None:
         self._factors = factors(problem)
         known = felt(problem, self._factors)
-        laws = vertex_laws(known, remember)
-        if state.memory is not None:
-            for row, law in enumerate(laws):
-                law.restore(state.memory[row, :])
-        self._sites = Sites(known, laws)
-        for k in range(len(self._sites)):
-            self._sites.enter(k, int(state.position.numbers[k]))
+        self._sites = Sites(known, vertex_laws(known, remember))
+        self._sites.put(state.position.numbers, state.memory)
         self._z = state.position.small.copy()
         self._read()
 
@@ -57,11 +52,5 @@ class CurvedGraphs:
         self._z = self._z + np.linalg.lstsq(matrix, load / self._factors, rcond=rank)[0]
         s = self._sites.s(self._z)
         for k in np.flatnonzero((s < self._sites.low) | (s > self._sites.high)):
-            self._pass_end(int(k), forward=bool(s[k] > self._sites.high[k]))
+            self._sites.leave(self._z, int(k), forward=bool(s[k] > self._sites.high[k]))
         self._read()
-
-    def _pass_end(self, k: int, *, forward: bool) -> None:
-        """Put a site at the end that it has passed, on the next segment."""
-        end = float(self._sites.high[k] if forward else self._sites.low[k])
-        self._sites.enter(k, int(self._sites.numbers[k]) + (1 if forward else -1))
-        self._sites.set(self._z, k, end)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...laws import Superpotential
 from ...typing import Array, Integers, Mask
-from ..segments import Segment
+from ..segments import Segment, between
 from ..thresholds import CurveThresholds
 from .vertex_laws import VertexLaw
 
@@ -161,20 +161,6 @@ class Deviations:
             sites = group.gathered(self._thresholds.inset).sites
             np.minimum.at(found, sites, self._thresholds.reach * (group.law.length_scale + np.abs(x[sites])))
         return found
-
-
-def between(low: float, high: float) -> float:
-    """A displacement inside an interval.
-
-    Args:
-        low: its low end, or -inf.
-        high: its high end, or inf.
-    """
-    if np.isfinite(low) and np.isfinite(high):
-        return 0.5 * (low + high)
-    if np.isfinite(low):
-        return low + 1.0 + abs(low)
-    return high - 1.0 - abs(high) if np.isfinite(high) else 0.0
 
 
 def _group(rows: list[tuple[int, VertexLaw]]) -> _Group:

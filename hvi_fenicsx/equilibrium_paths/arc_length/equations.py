@@ -254,8 +254,7 @@ class Equations:
 
     def at_factor(self, aim: float) -> Condition:
         """A wanted factor."""
-        last = np.zeros(len(self.here.y))
-        last[-1] = 1.0
+        last = self._factor_row
         return lambda y: float(y[-1]) - aim / self.unit, lambda y: last
 
     def place(self, y: Array, tangent: Array, passed: int | None = None) -> None:
@@ -276,10 +275,30 @@ class Equations:
         units = np.eye(len(self.here.y))[columns]
         return factors.exchange(columns, np.stack([change_along(unit) for unit in units], axis=1))
 
-    def head(self, tangent: Array) -> None:
-        """Set out from the present point.
+    @property
+    def _factor_row(self) -> Array:
+        """The factor as a linear function of the variables, (n + 1,)."""
+        return np.eye(1, len(self.here.y), len(self.here.y) - 1)[0]
+
+    def head(self, row: Array, sign: float = 1.0) -> None:
+        """Set out from the present point in the direction in which a linear function grows.
 
         Args:
-            tangent: of length 1, (n + 1,).
+            row: the function, (n + 1,).
+            sign: -1: in which it falls.
+
+        Raises:
+            numpy.linalg.LinAlgError: the function stands along the curve.
         """
-        self.here = replace(self.here, tangent=tangent)
+        self.here = replace(self.here, tangent=self.tangent(self.here.values, row, sign))
+
+    def set_out(self, sign: float = 1.0) -> None:
+        """Set out from the present point in the direction in which the factor grows.
+
+        Args:
+            sign: -1: in which it falls.
+
+        Raises:
+            numpy.linalg.LinAlgError: the factor stands along the curve.
+        """
+        self.head(self._factor_row, sign)

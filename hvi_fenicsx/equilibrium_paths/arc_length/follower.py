@@ -60,7 +60,6 @@ class ArcLengthFollower(Follower):
         self._fineness = fineness
         self._sites = Sites(problem, vertex_laws(problem, options.remember), options.thresholds)
         self._lag = order(problem, [int(group[0]) for group in self._sites.unknowns()])
-        self._remembers = any(law.passed is not None for law in self._sites.vertices)
         self._last: PathState | None = None
         self._curve: Curve
         self._rounds: Rounds
@@ -119,19 +118,14 @@ class ArcLengthFollower(Follower):
     @override
     def _restore(self, state: PathState) -> None:
         position, sites = state.position, self._sites
-        if state.memory is not None:
-            for number, law in enumerate(sites.vertices):
-                law.restore(state.memory[number, :])
-        for k in range(len(sites)):
-            sites.rebuild(k)
-            sites.enter(k, int(position.numbers[k]))
+        sites.put(position.numbers, state.memory)
         self._follow_from(position.small.copy(), state.factor)
         self._unstable, self._leg, self._last = state.unstable, position.leg, state
         self._balance = Balance(self._problem, sites, state.work, state.dissipated)
         self._balance.begin(self._curve.here.values, self._curve.factor)
         if state.event not in (Event.START, Event.TURN):
-            row = np.eye(1, self._problem.size + 1, position.driver)[0]
-            self._head(row, position.heading)
+            self._curve.head(np.eye(1, self._problem.size + 1, position.driver)[0], position.heading)
+            self._trend()
             self._curve.length = position.step
 
     # -- one leg of the programme
@@ -171,29 +165,23 @@ class ArcLengthFollower(Follower):
 
     def _orient(self, aim: float) -> None:
         """Set out towards a factor; a path that is resumed on its way goes on as it went."""
-        resumed, self._resume = self._resume, None
-        if resumed is not None and resumed.event not in (Event.START, Event.TURN):
+        if self._is_under_way():
             return
-        row = np.eye(1, self._problem.size + 1, self._problem.size)[0]
-        self._head(row, 1 if aim > self._curve.factor else -1)
+        self._curve.set_out(1.0 if aim > self._curve.factor else -1.0)
+        self._trend()
         if self._crossed():
             self._curve.settle_at_factor()
         self._trend()
 
-    def _crossed(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
+    def _crossed(self, move: Move | None = None) -> list[Passage]:
         """The passages at the present point; where there is no end of them, the path is lost."""
         crossing = Crossing(self._curve, self._lag, self._watcher.check)
         try:
-            return crossing.run(arrived, turned=turned)
+            return crossing.run(move)
         except (Refused, np.linalg.LinAlgError):
             where = f"at the factor {self._curve.factor:.6g} several bonds are at ends of their pieces"
             self._lose(self.factor, f"{where}, and each way on leads from one of them to the other")
             return crossing.passages
-
-    def _head(self, row: Array, sign: float) -> None:
-        curve = self._curve
-        curve.head(curve.tangent(curve.here.values, row, sign))
-        self._trend()
 
     def _trend(self) -> None:
         rate = self._curve.factor_rate
@@ -211,7 +199,7 @@ class ArcLengthFollower(Follower):
         if self._is_adrift():  # all bonds are broken at once: nothing is left to pass
             return self._state(Event.KINK)
         before = self._curve.trend
-        passages = self._crossed(move.site, turned=move.outcome is Outcome.TURNED)
+        passages = self._crossed(move)
         self._curve.settle()
         self._trend()
         self._unstable = self._sites.unstable_directions(self._curve.here.values)
@@ -227,13 +215,10 @@ class ArcLengthFollower(Follower):
         return max(self._unstable + (1 if held < 0.0 else -1), 0)
 
     def _ended(self, outcome: Outcome) -> None:
-        curve, shown = self._curve, f"{self._curve.factor:.6g}"
         if outcome is Outcome.STUCK:
-            self._lose(self.factor, f"at the factor {shown} no step is short enough to stay on the path")
-        elif abs(curve.factor_rate) <= 1e-6:
-            self._come_off(self.factor, f"at the factor {shown} a body comes off")
+            self._lose(self.factor, f"at the factor {self.factor:.6g} no step is short enough to stay on the path")
         else:
-            self._lose(self.factor, "the path leads away from the wanted factor for ever")
+            self._end_for_ever(stands=abs(self._curve.factor_rate) <= 1e-6)
 
     @override
     def _is_off(self) -> bool:
@@ -255,15 +240,12 @@ class ArcLengthFollower(Follower):
             step=self._watcher.step,
         )
         landing = jump.landing()
-        if landing is None:
-            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
-            yield self._state(Event.END)
-        elif landing.z is None:
-            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
-            assert self._last is not None
-            yield replace(self._last, event=Event.END, place=None, released=0.0)
-        else:
+        if landing is not None and landing.z is not None:
             yield self._landed(landing.z, factor, aim)
+            return
+        self._end_jump(escapes=landing is not None)
+        assert self._last is not None
+        yield replace(self._last, event=Event.END, place=None, released=0.0)
 
     @override
     def _settled(self, towards: float) -> PathState | Nowhere:
@@ -291,14 +273,11 @@ class ArcLengthFollower(Follower):
             work=self._balance.work,
             dissipated=stored.dissipated,
             unstable=self._unstable,
-            memory=self._memory() if self._remembers else None,
+            memory=self._sites.memory,
             bifurcation=event is Event.FOLD and len(passages) > 1,
             position=self._position(),
         )
         return self._last
-
-    def _memory(self) -> Array:
-        return np.array([law.memory() for law in self._sites.vertices]).reshape(-1, 4)
 
     def _position(self) -> Position:
         tangent = self._curve.here.tangent

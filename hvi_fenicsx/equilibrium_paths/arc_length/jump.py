@@ -19,7 +19,7 @@ from .curve import Curve
 from .energies import displacement_rate
 from .equations import Place, Refused
 from .events import Outcome
-from .passage import Crossing, advancing
+from .passage import Crossing, advancing, set_out
 from .relaxation import Relaxation
 from .sites import Sites
 
@@ -93,11 +93,11 @@ class Jump:
         """Along the curve of one restraint in a direction that was not tried; None where it leads to no end."""
         sites = self.sites
         curve = Curve(self.load, restraint * float(np.mean(sites.forces)), sites, self.here.y[:-1].copy(), 0.0)
-        tangent = curve.tangent(curve.here.values, row)
+        curve.head(row)
+        tangent = curve.here.tangent
         if any(np.allclose(tangent, other, rtol=0.0, atol=curve.limits.rounding) for other in tried):
             return None
         tried.append(tangent)
-        curve.head(tangent)
         if curve.factor_rate > 1e-7:
             return None
         Crossing(curve, self.lag, self.step).run()
@@ -116,17 +116,17 @@ class Jump:
         return None
 
     def _landed(self, z: Array) -> Landing | None:
-        """The landing at a stable equilibrium; None where it is the state itself, or bears no load that is wanted."""
+        """The landing at a stable equilibrium; None where it is the state itself, or no way leads to wanted loads."""
         if float(np.max(np.abs(z - self.here.y[:-1]), initial=0.0)) <= 1e-9:
             return None
         kept = self.sites.kept()
         curve = Curve(self.load, self.heading * self.problem.force_rate, self.sites, z.copy(), 0.0)
-        row = np.eye(1, len(z) + 1, len(z))[0]
+        leads_on = False
         with suppress(Refused, np.linalg.LinAlgError):
-            curve.head(curve.tangent(curve.here.values, row))
-            Crossing(curve, self.lag, self.step).run()
+            set_out(curve, 1.0, self.lag, self.step)
+            leads_on = curve.factor_rate >= 0.0
         self.sites.restore(kept)
-        return Landing(z=z) if curve.factor_rate >= 0.0 else None
+        return Landing(z=z) if leads_on else None
 
     def _released(self) -> Landing | None:
         """The landing of an overdamped motion."""

@@ -100,7 +100,39 @@ def advancing(curve: Curve, aim: float, lag: Array, step: Callable[[], None], mo
         move = curve.advance(aim)
         yield move
         if move.outcome in (Outcome.END, Outcome.TURNED):
-            Crossing(curve, lag, step).run(move.site, turned=move.outcome is Outcome.TURNED)
+            Crossing(curve, lag, step).run(move)
+
+
+def set_out(curve: Curve, sign: float, lag: Array, step: Callable[[], None]) -> None:
+    """Let a curve set out along its factor, and the sites pass that have to.
+
+    Args:
+        curve: the curve.
+        sign: 1 where the factor is to grow, -1 where it is to fall.
+        lag: an order of the sites, (m,).
+        step: is called before each passage; it may raise an error to end them.
+
+    Raises:
+        Refused: there is no end of passing.
+        numpy.linalg.LinAlgError: the factor stands along the curve.
+    """
+    curve.set_out(sign)
+    Crossing(curve, lag, step).run()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Approach:
+    """Which sites come to ends of their segments along the present direction.
+
+    Attributes:
+        rates: how fast the sites go, (m,).
+        near: which of them are at an end, (m,).
+        comes: which of them are at an end that they approach, or turn back, (m,).
+    """
+
+    rates: Array
+    near: Mask
+    comes: Mask
 
 
 class Crossing:
@@ -121,35 +153,36 @@ class Crossing:
         self._arrived: int | None = None
         self.passages: list[Passage] = []
 
-    def run(self, arrived: int | None = None, *, turned: bool = False) -> list[Passage]:
-        """Let all sites pass that have to, those that arrived first.
+    def run(self, move: Move | None = None) -> list[Passage]:
+        """Let all sites pass that have to, the one that arrived first.
 
         Args:
-            arrived: the site that is at its end already, or that turned back.
-            turned: whether it turned back.
+            move: the step that took a site to its end, or in which it turned back.
 
         Raises:
             Refused: there is no end of passing.
         """
-        if arrived is not None:
-            self._left[arrived], self._arrived = 0.0, arrived
-            rates = self._rates()
-            rates[arrived] = self._outwards(arrived)
-            if turned:
-                rates[arrived] = -1e-9 * self._sites.outward[arrived]
-            self._pass(arrived, rates)
+        if move is not None and move.site is not None:
+            self._pass_arrived(move.site, turned=move.outcome is Outcome.TURNED)
         for _ in range(50 + 20 * len(self._sites)):
             self._check()
-            rates = self._rates()
-            ways = self._ways(rates)
+            approach = self._approach()
+            ways = self._ways(approach)
             k = int(np.argmin(ways)) if len(ways) else 0
             if not len(ways) or not np.isfinite(ways[k]):
                 return self.passages
-            self._go(rates, float(ways[k]))
+            self._go(approach, float(ways[k]))
             self._left[k] = 0.0
-            self._pass(k, rates)
+            self._pass(k, approach.rates)
             self._count()
         raise Refused
+
+    def _pass_arrived(self, k: int, *, turned: bool) -> None:
+        """Let the site pass that is at its end already, or that turned back."""
+        self._left[k], self._arrived = 0.0, k
+        rates = self._rates()
+        rates[k] = -1e-9 * self._sites.outward[k] if turned else self._outwards(k)
+        self._pass(k, rates)
 
     def _count(self) -> None:
         """Count the cells that the passages come to.
@@ -184,30 +217,25 @@ class Crossing:
         rates[self._rests] = 0.0
         return rates
 
-    def _near(self) -> tuple[Mask, Mask]:
-        """Which sites are at the low end, and which at the high end of their segments."""
-        sites, s = self._sites, self._curve.here.values.s
-        allowed = self._limits.rounding * (1.0 + np.abs(s))
-        return s <= sites.low + allowed, s >= sites.high - allowed
+    def _approach(self) -> _Approach:
+        sites, values, rates = self._sites, self._curve.here.values, self._rates()
+        allowed = self._limits.rounding * (1.0 + np.abs(values.s))
+        low, high = values.s <= sites.low + allowed, values.s >= sites.high - allowed
+        comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | sites.turning_back(values, rates)
+        return _Approach(rates=rates, near=low | high, comes=comes)
 
-    def _ways(self, rates: Array) -> Array:
+    def _ways(self, approach: _Approach) -> Array:
         """The ways to the ends that the sites approach; infinite where they approach none, (m,)."""
-        comes = self._comes(rates)
-        found = np.full(len(rates), np.inf)
-        found[comes] = self._left[comes] / np.abs(rates[comes])
+        comes = approach.comes
+        found = np.full(len(comes), np.inf)
+        found[comes] = self._left[comes] / np.abs(approach.rates[comes])
         return found
 
-    def _comes(self, rates: Array) -> Mask:
-        """Which sites are at an end that they approach, or turn back, (m,)."""
-        low, high = self._near()
-        back = self._sites.turning_back(self._curve.here.values, rates)
-        return ((rates < 0.0) & low) | ((rates > 0.0) & high) | back
-
-    def _go(self, rates: Array, way: float) -> None:
-        (low, high), comes = self._near(), self._comes(rates)
-        loads = rates * self._sites.outward > 0.0
-        change = way * np.abs(rates)
-        self._left = np.where(comes, self._left - change, self._left + np.where(low | high, change, 0.0))
+    def _go(self, approach: _Approach, way: float) -> None:
+        """A way of the order ε along the present direction."""
+        comes, change = approach.comes, way * np.abs(approach.rates)
+        loads = approach.rates * self._sites.outward > 0.0
+        self._left = np.where(comes, self._left - change, self._left + np.where(approach.near, change, 0.0))
         self._left = np.where(loads & ~comes, self._lag, np.maximum(self._left, 0.0))
 
     def _pass(self, k: int, rates: Array) -> None:
@@ -218,11 +246,9 @@ class Crossing:
         if forward * 2.0 - 1.0 == -sites.outward[k] and not sites.unmoved(curve.here.values)[k]:
             y = self._turned_back(k, forward=forward)
         else:
-            sites.enter(k, int(sites.numbers[k]) + (1 if forward else -1))
+            sites.enter_next(k, forward=forward)
         curve.place(y, curve.here.tangent, passed=k)
-        row = curve.here.tangent if slow else curve.row(k)
-        sign = 1.0 if slow or forward else -1.0
-        curve.head(curve.tangent(curve.here.values, row, sign))
+        curve.head(curve.here.tangent if slow else curve.row(k), 1.0 if slow or forward else -1.0)
         self._rests[k] = slow and any(passage.site == k for passage in self.passages)
         self.passages.append(Passage(site=k, before=before, after=sites.segment(k)))
 

@@ -18,7 +18,7 @@ from ...typing import Array
 from .curve import Curve
 from .equations import Refused
 from .events import Outcome
-from .passage import Crossing
+from .passage import Crossing, set_out
 from .sites import Sites
 
 
@@ -135,9 +135,7 @@ class Relaxation:
             return _Went.NOWHERE
         held = sites.stiffness @ values.x + values.force
         curve = Curve(held, left, sites, self.z, 0.0)
-        row = np.eye(1, len(self.z) + 1, len(self.z))[0]
-        curve.head(curve.tangent(curve.here.values, row))
-        Crossing(curve, self._lag, self._step).run()
+        set_out(curve, 1.0, self._lag, self._step)
         curve.shortest = self._limits.shortest
         went = self._followed(curve)
         self.z = curve.here.y[:-1].copy()
@@ -162,14 +160,10 @@ class Relaxation:
             if move.outcome is Outcome.STUCK:
                 break
             if move.outcome in (Outcome.END, Outcome.TURNED):
-                Crossing(curve, self._lag, self._step).run(move.site, turned=move.outcome is Outcome.TURNED)
+                Crossing(curve, self._lag, self._step).run(move)
         return _Went.PARTLY if curve.factor > 0.0 else _Went.NOWHERE
 
     def _leave_drops(self, directions: Array) -> None:
         """Let the laws that drop do so."""
-        sites = self._sites
-        for k in sites.on_drops():
-            forward = directions[k] >= 0.0
-            end = float(sites.high[k] if forward else sites.low[k])
-            sites.enter(k, int(sites.numbers[k]) + (1 if forward else -1))
-            sites.set(self.z, k, end)
+        for k in self._sites.on_drops():
+            self._sites.leave(self.z, k, forward=bool(directions[k] >= 0.0))

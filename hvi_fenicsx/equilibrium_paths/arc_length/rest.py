@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...system.condensed_problem import CondensedProblem
 from ...system.spectrum import is_singular, rounding_of
 from ...typing import Array
+from ..programme import constant_alone
 from ..segments import Kind, Segment
 from .sites import Sites
 
@@ -47,15 +48,7 @@ def at_rest(problem: CondensedProblem, sites: Sites) -> Rest:
         sites.enter(k, number)
         if i is not None:
             z[i], force[i] = sites.coordinate(k, at, s_force), s_force
-    held = problem.stiffness @ x + force
-    away = problem.force - held
-    size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
-    is_loaded = np.max(np.abs(away), initial=0.0) > 1e-14 * size
-    return Rest(
-        z=z,
-        held=is_held(sites, z),
-        constant=replace(problem, force=held, force_rate=away) if is_loaded else None,
-    )
+    return Rest(z=z, held=is_held(sites, z), constant=constant_alone(problem, problem.stiffness @ x + force))
 
 
 def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:

@@ -11,7 +11,7 @@ from ..watch import Watch
 from .curve import Curve
 from .equations import Refused
 from .events import Outcome
-from .passage import Crossing, advancing
+from .passage import advancing, set_out
 from .relaxation import Relaxation
 from .rest import is_held
 from .sites import Sites
@@ -50,9 +50,7 @@ def settled(
 def _unloaded(curve: Curve, none: float, lag: Array, watch: Watch) -> Array | None:
     """The coordinates where a curve comes to the factor 0, straight from one that is none."""
     limits = curve.sites.thresholds.settling
-    row, first = np.eye(1, len(curve.here.y), len(curve.here.y) - 1)[0], curve.factor
-    curve.head(curve.tangent(curve.here.values, row, -np.sign(first)))
-    Crossing(curve, lag, watch.step).run()
+    set_out(curve, -np.sign(curve.factor), lag, watch.step)
     for move in advancing(curve, 0.0, lag, watch.step, limits.steps + limits.more_steps * len(curve.sites)):
         if abs(curve.factor) <= none:
             return curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]

@@ -179,6 +179,27 @@ class SiteGraphs(SiteLaws):
         force = (self._force[k] - self._rises[k] * self._base[k]) / self._force_units[k]
         return bool(abs(x) + abs(force) <= 1e-12)
 
+    def enter_next(self, k: int, *, forward: bool) -> None:
+        """Put a site on the segment next to its own.
+
+        Args:
+            k: the site.
+            forward: whether on the one that comes after its own.
+        """
+        self.enter(k, int(self.numbers[k]) + (1 if forward else -1))
+
+    def leave(self, z: Array, k: int, *, forward: bool) -> None:
+        """Put a site on the segment next to its own, at the end at which they meet.
+
+        Args:
+            z: all coordinates, changed, (n,).
+            k: the site.
+            forward: whether on the one that comes after its own.
+        """
+        end = float(self.high[k] if forward else self.low[k])
+        self.enter_next(k, forward=forward)
+        self.set(z, k, end)
+
     def coordinate(self, k: int, x: float, force: float) -> float:
         """The s of a displacement and its force on the present segment.
 
@@ -241,6 +262,27 @@ class SiteGraphs(SiteLaws):
         return [int(k) for k in np.flatnonzero((self._moves == 0.0) & (self._rises < 0.0) & ~self._bound)]
 
     # -- memory
+
+    @property
+    def memory(self) -> Array | None:
+        """What the laws at all vertices remember, (v, 4), as :meth:`.VertexLaw.memory`; None where none does."""
+        if all(law.passed is None for law in self.vertices):
+            return None
+        return np.array([law.memory() for law in self.vertices])
+
+    def put(self, numbers: Integers, memory: Array | None) -> None:
+        """Put all sites where they were at a state of a path.
+
+        Args:
+            numbers: of their segments, (m,).
+            memory: as :attr:`memory` was.
+        """
+        if memory is not None:
+            for row, law in enumerate(self.vertices):
+                law.restore(memory[row, :])
+        for k, number in enumerate(numbers):
+            self.rebuild(k)
+            self.enter(k, int(number))
 
     def kept(self) -> Kept:
         """Where all sites are and what their laws remember, for :meth:`restore`."""

@@ -93,8 +93,7 @@ class VertexLaw:
 
     def memory(self) -> list[float]:
         """What it remembers: least and greatest coordinate, and the tractions there; zeros without memory."""
-        kept = self.passed or Passed()
-        return [*kept.displacements, *kept.tractions]
+        return (self.passed or Passed()).row
 
     def restore(self, memory: Array) -> None:
         """Take over what it remembered.
@@ -103,8 +102,7 @@ class VertexLaw:
             memory: as :meth:`memory`, (4,).
         """
         if self.passed is not None:
-            low, high, low_traction, high_traction = map(float, memory)
-            self.passed = Passed(displacements=(low, high), tractions=(low_traction, high_traction))
+            self.passed = Passed.of(memory)
 
 
 def chords(law: Superpotential, more: Array) -> TractionGraph:
