@@ -57,6 +57,15 @@ def test_an_unrolled_bore_has_the_area_of_its_shell(turn: float, around: int) ->
     assert flat.how == "unrolled about y"
 
 
+def test_an_axis_that_its_facets_miss_is_named() -> None:
+    """A vertex at one end lies nearer to the axis than the others."""
+    geometry, body = bore(2.0 * np.pi)
+    body.points[-1] *= [0.8, 1.0, 0.8]
+    flat = laid_flat(geometry, body)
+    assert flat.how == "unrolled about y"
+    assert np.allclose(flat.ways[:, 1], [0.0, 1.0, 0.0])
+
+
 @pytest.mark.parametrize("around", [AROUND, 8])
 def test_where_a_bore_touches_is_in_the_middle_of_its_map(around: int) -> None:
     points, _ = shell(2.0 * np.pi, around)

@@ -15,6 +15,8 @@ CLOSED = 0.5
 """A part whose normals add up to less than this share of its area may go round an axis."""
 ALONG = 0.05
 """So small a share of its area looks along that axis, and at least twice as much along any direction across."""
+STRAIGHT = np.cos(np.radians(2.0))
+"""An axis is along a coordinate axis from this cosine on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,13 +69,17 @@ def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
 
 
 def _axis(areas: Array) -> Array | None:
-    """The axis that a part goes round, its largest component positive; None where it goes round none."""
+    """The axis that a part goes round, its largest component positive; None where it goes round none.
+
+    Facets are not quite along the axis of a round bore: one that is nearly along a coordinate axis is along it.
+    """
     sizes = np.maximum(np.linalg.norm(areas, axis=1), 1e-300)
     shares, directions = np.linalg.eigh(areas.T @ (areas / sizes[:, None]) / float(sizes.sum()))
     if shares[0] > ALONG or shares[1] < 2.0 * ALONG:
         return None
     found = directions[:, 0]
-    return np.asarray(found * np.sign(found[np.argmax(np.abs(found))]))
+    largest = int(np.argmax(np.abs(found)))
+    return np.eye(3)[largest] if abs(found[largest]) > STRAIGHT else np.asarray(found * np.sign(found[largest]))
 
 
 def _projected(points: Array, triangles: Integers, total: Array, how: str) -> FlatPart:
@@ -103,7 +109,7 @@ def _unrolled(points: Array, triangles: Integers, axis: Array, touches: Mask) ->
     angles, radius = angles[rows], float(np.linalg.norm(arms, axis=1).mean())
     height = points @ axis
     onward = np.column_stack([-np.sin(angles), np.cos(angles)]) @ plane
-    named = "xyz"[int(np.argmax(axis))] if np.max(axis) > 1.0 - 1e-9 else ""
+    named = "xyz"[int(np.argmax(axis))] if np.max(axis) == 1.0 else ""
     return FlatPart(
         points=np.column_stack([radius * (angles + 2.0 * np.pi * turns), height[rows]]),
         rows=rows,
