@@ -80,7 +80,8 @@ def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array, thresh
     if depth < -thresholds.overlap * pair.first.width:
         raise InputError(
             f'interface.{pair.name}.between: at {at} "{pair.sides.second}" lies {-depth:.3g} m inside of the body '
-            f'of "{pair.sides.first}": move one of the bodies, or name the sides that face each other'
+            f'of "{pair.sides.first}": move one of the bodies, name the sides that face each other, or mesh '
+            "curved sides more finely"
         )
 
 
