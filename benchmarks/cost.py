@@ -73,14 +73,14 @@ def counts(scene: str, run: Figures) -> list[object]:
 def draw(page: str, rows: Sequence[Sequence[object]]) -> None:
     figure, axes = plt.subplots(figsize=(8, 0.45 * len(rows) + 1.5))
     names = [f"{r[0]}, {float(str(r[1])) / 1e3:,.0f}k dofs" for r in rows]
-    for shift, column, label in ((0.2, 5, "best algebraic linear solve"), (-0.2, 7, "geometric multigrid solve")):
+    for shift, column, label in ((-0.2, 5, "best algebraic linear solve"), (0.2, 7, "geometric multigrid solve")):
         values = [float(str(r[column]).strip("*") or "nan") for r in rows]
         axes.barh([i + shift for i in range(len(rows))], values, 0.38, label=f"over the {label}")
     axes.axvline(1.0, color="black", lw=0.8)
     axes.set_yticks(range(len(rows)), names)
-    axes.invert_yaxis()
+    axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel("time of the contact problem over that of a linear solve")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.4, -0.22 if len(rows) < 6 else -0.12), ncol=2, frameon=False)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=2, frameon=False)
     picture(page, figure)
 
 

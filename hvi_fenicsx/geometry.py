@@ -12,6 +12,8 @@ from .typing import Array, Integers
 
 Point = tuple[float, float]
 """Coordinates, m."""
+_ROUNDING = 1e-9
+"""A coordinate so small beside the largest one of a point is zero."""
 
 
 class Curve(Protocol):
@@ -108,6 +110,16 @@ class Outline:
         """The curved sides by name."""
         starts = zip(self.points, self.sides, strict=True)
         return {name: Arc(c, float(np.hypot(p[0] - c[0], p[1] - c[1]))) for p, (name, c) in starts if c is not None}
+
+
+def spot(point: Array) -> str:
+    """A point in words, for messages: its coordinates with six digits, in brackets.
+
+    Args:
+        point: m, (d,).
+    """
+    rounding = _ROUNDING * float(np.abs(point).max())
+    return f"({', '.join(f'{c if abs(c) > rounding else 0.0:.6g}' for c in point)})"
 
 
 def chains(edges: Integers, rank: Integers | None = None) -> list[Integers]:

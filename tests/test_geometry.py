@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hvi_fenicsx.geometry import chains
+from hvi_fenicsx.geometry import chains, spot
 
 
 def found(pairs: list[tuple[int, int]], rank: list[int] | None = None) -> list[list[int]]:
@@ -32,3 +32,9 @@ def test_chains_that_touch_use_every_edge_once(seed: int) -> None:
     edges = [pair for chain in chains(pairs) for pair in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True)]
     assert sorted(edges) == sorted(map(tuple, pairs.tolist()))
     assert chains(pairs)[0][0] == 5
+
+
+def test_a_point_in_a_message_has_no_rounding() -> None:
+    assert spot(np.array([-0.65830001, 1.889649253085104e-14])) == "(-0.6583, 0)"
+    assert spot(np.array([1e-9, 2e-9, 0.0])) == "(1e-09, 2e-09, 0)"
+    assert spot(np.zeros(2)) == "(0, 0)"

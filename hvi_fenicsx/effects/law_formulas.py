@@ -17,6 +17,7 @@ import numpy as np
 from .. import laws
 from ..errors import InputError
 from ..formula import Formula
+from ..geometry import spot
 from ..schema import Keys
 from ..spatial_value import SpatialValue
 from ..typing import Array, Mask
@@ -91,7 +92,7 @@ class PlacedLaw:
             for i in np.flatnonzero(parameter.differs(points, *factors))[:1]:
                 lengths, tractions = (f"{factor[i]:.6g}" for factor in factors[::-1])
                 found.append(
-                    f"{parameter.key} is {parameter.given.at(points[[i]])[0]:.6g} at {tuple(map(float, points[i]))}, "
+                    f"{parameter.key} is {parameter.given.at(points[[i]])[0]:.6g} at {spot(points[i])}, "
                     f"where the other parameters multiply the lengths by {lengths} and the tractions by {tractions}: "
                     "the law would have another shape there than elsewhere, and only lengths and tractions as wholes "
                     "may change from place to place. State all tractions, and all lengths, with one formula each, or "

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from .. import compat
 from ..errors import InputError
+from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Array
 from .joined import PlacedBody
@@ -52,9 +53,8 @@ def check(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> None:
             first, second = (_near(comm, own[k], low, high) for k in (i, j))
             at = _inside(first.middles, second)
             if len(at):
-                place = ", ".join(f"{c:.6g}" for c in at[0])
                 raise InputError(
-                    f'domain.{bodies[i].name}: at ({place}) it overlaps the body "{bodies[j].name}"; '
+                    f'domain.{bodies[i].name}: at {spot(at[0])} it overlaps the body "{bodies[j].name}"; '
                     "move one of them by its origin, or make them one body"
                 )
 

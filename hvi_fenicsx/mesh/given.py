@@ -11,6 +11,7 @@ from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..errors import InputError
+from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Entities
 from . import folds, nodes, second_order
@@ -65,7 +66,7 @@ def _curves(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> dict[str, Curved
     for name, facets in sides.items():
         curve = np.concatenate(agree(mesh.comm, points[nodes.facet_nodes(space, facets)]))
         if len(turning := second_order.turning_back(curve)):
-            place = tuple(map(float, curve[turning[0]].mean(axis=0)))
+            place = spot(curve[turning[0]].mean(axis=0))
             raise InputError(f"body: the side {name!r} has at {place} a {second_order.TURNING_BACK}")
         if second_order.is_curved(curve):
             found[name] = CurvedFacets(curve)
@@ -121,7 +122,7 @@ def _check_cells(mesh: dmesh.Mesh) -> None:
 def _check_folds(mesh: dmesh.Mesh) -> None:
     points, cells = mesh.geometry.x[:, : mesh.geometry.dim], compat.geometry_dofmap(mesh).astype(np.int64)
     folded = folds.folded_cells(points, cells)
-    middles = [tuple(map(float, points[cells[k]].mean(axis=0))) for k in folded[:1]]
+    middles = [spot(points[cells[k]].mean(axis=0)) for k in folded[:1]]
     found = [middle for rank in agree(mesh.comm, middles) for middle in rank]
     if found:
         raise InputError(f"body: the mesh is folded at {found[0]}: cells lie over each other there; move its vertices")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..geometry import spot
 from ..typing import Integers
 from . import folds, gmsh_arrays
 
@@ -120,8 +121,8 @@ def _check_folds(gmsh: Any, path: Path, dimension: int) -> None:
     folded = folds.folded_cells(found.points[:, :dimension], found.cells)
     if len(folded):
         nodes = found.cells[folded[0]]
-        where = ", ".join(f"{c:g}" for c in found.points[nodes].mean(axis=0)[:dimension])
-        text = f"the mesh is folded at ({where}): the cell of nodes {', '.join(map(str, nodes + 1))} lies over another"
+        where = spot(found.points[nodes].mean(axis=0)[:dimension])
+        text = f"the mesh is folded at {where}: the cell of nodes {', '.join(map(str, nodes + 1))} lies over another"
         raise InputError(f"mesh file {path}: {text} one; remesh")
 
 

@@ -14,6 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..geometry import spot
 from ..mesh import connected_pieces
 from ..mesh.domain import Domain
 from ..rigid import AnyBody, JoinedBodies, Mode, RigidBody, rigid_fields
@@ -147,10 +148,9 @@ def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Integers, points:
     first = points[np.concatenate([hinges, apart])[:1]]
     found = [p for rank in agree(domain.mesh.comm, first.tolist()) for p in rank]
     if found:
-        at = ", ".join(f"{c:.6g}" for c in found[0][: domain.dimension])
         raise InputError(
-            f"the mesh: at ({at}) two bodies share a vertex but no facet, and would turn about it as about a hinge; "
-            "let them share a facet, or give each its own vertex"
+            f"the mesh: at {spot(found[0][: domain.dimension])} two bodies share a vertex but no facet, and would turn "
+            "about it as about a hinge; let them share a facet, or give each its own vertex"
         )
     return labels
 
@@ -172,11 +172,16 @@ def _names(domain: Domain, cells: Integers, bodies: Sequence[RigidBody]) -> list
     for name in sorted(domain.regions):
         inside = np.concatenate(agree(domain.mesh.comm, np.unique(cells[domain.regions[name]])))
         if len(within := np.unique(inside)) == 1:
-            regions.setdefault(int(within[0]), []).append(f'"{name}"')
+            regions.setdefault(int(within[0]), []).append(name)
     return [
-        f"body {', '.join(regions[i])}" if i in regions else f"body {i + 1} at {_point(body)}"
+        f"body {_listed(regions[i])}" if i in regions else f"body {i + 1} at {_point(body)}"
         for i, body in enumerate(bodies)
     ]
+
+
+def _listed(regions: Sequence[str]) -> str:
+    """Names of regions in words, without the regions `upper.core` of a body `upper` that is among them."""
+    return ", ".join(f'"{name}"' for name in regions if name.rpartition(".")[0] not in regions)
 
 
 def _point(body: RigidBody) -> str:

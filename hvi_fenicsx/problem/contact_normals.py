@@ -118,7 +118,7 @@ def _at_shared_vertices(
         for name, i in sorted(places, key=lambda place: place[0] not in flat):
             found = _turned(_Row(f"boundary.{name}", normals[name][i], name in flat, False), rows, thresholds)
             if isinstance(found, str):
-                bad.append(f"boundary.{name}: at the vertex {tuple(map(float, surfaces[name].points[i]))} {found}")
+                bad.append(f"boundary.{name}: at the vertex {surfaces[name].spot(i)} {found}")
                 break
             normals[name][i] = found.direction
             rows.append(found)

@@ -78,7 +78,7 @@ def _stated(context: DomainForms, where: Surface, obstacle: Towards) -> Array:
     """
     found = obstacle.towards(where.points[:, : context.dimension])
     bad = np.flatnonzero(~np.all(np.isfinite(found), axis=1))
-    said = [str(tuple(map(float, where.points[i]))) for i in bad[:1]]
+    said = [where.spot(i) for i in bad[:1]]
     for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
         raise InputError(f"boundary.{where.part}.contact: no direction leads from {text} to the obstacle; state one")
     return found
@@ -226,7 +226,7 @@ def check_bounds(
         axis = np.argmax(np.abs(b.surface.normals), axis=1)
         held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
         out = held & ((un < b.lower - thresholds.outside_bounds) | (un > b.upper + thresholds.outside_bounds))
-        bad += [f"{b.surface.part} at {tuple(map(float, b.surface.points[i]))}" for i in np.flatnonzero(out)[:1]]
+        bad += [f"{b.surface.part} at {b.surface.spot(i)}" for i in np.flatnonzero(out)[:1]]
     found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
     if found:
         raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
@@ -263,7 +263,7 @@ def _contradiction(one: Bounds, other: Bounds, unit: float, thresholds: Threshol
     bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > thresholds.outside_bounds * (1.0 + np.abs(low))))
     shared = "" if one is other else f", a vertex of boundary.{other.surface.part} too"
     return [
-        f"{one.surface.part}: at {tuple(map(float, one.surface.points[i[k]]))}{shared}, u·n would have to be at least "
+        f"{one.surface.part}: at {one.surface.spot(i[k])}{shared}, u·n would have to be at least "
         f"{low[k] * unit:.6g} m and at most {high[k] * unit:.6g} m"
         for k in bad[:1]
     ]

@@ -14,7 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError
-from ..geometry import tangents
+from ..geometry import spot, tangents
 from ..typing import Array, Entities, Integers
 from . import facet_integrals
 from .vectors import nodal
@@ -56,6 +56,10 @@ class Surface:
     def values(self, u: Array) -> Array:
         """The vectors at these vertices of a local array of a P1 vector field; shape (m, d)."""
         return u.reshape(-1, self.normals.shape[1])[self.blocks]
+
+    def spot(self, i: int) -> str:
+        """Where its vertex i is, for messages."""
+        return spot(self.points[i, : self.normals.shape[1]])
 
 
 def make_surface(

@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from ..effects import Condition
 from ..errors import InputError
+from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from .domain_forms import DomainForms
@@ -94,9 +95,9 @@ def _values(condition: fem.DirichletBC, values: Array) -> tuple[Entities, Array]
 
 def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
     block, component = divmod(dof, context.dimension)
-    at = ", ".join(f"{c:.6g}" for c in context.points[block][: context.dimension])
+    at = spot(context.points[block][: context.dimension])
     one, other = (float(value) * scales.displacement for value in pair)
     return (
-        f"boundary.{parts[0]} and boundary.{parts[1]} meet at ({at}) and prescribe displacements along "
+        f"boundary.{parts[0]} and boundary.{parts[1]} meet at {at} and prescribe displacements along "
         f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'
     )

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError
+from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Array
 from .contact_surface import Surface
@@ -34,11 +35,11 @@ def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, threshold
         points, normals = (np.concatenate(arrays) for arrays in zip(*gathered, strict=True))
         found = _facing(points, normals, thresholds.same_point * length)
         if found is not None:
-            at = ", ".join(f"{c:.6g}" for c in found[: normals.shape[1]])
             raise InputError(
-                f"boundary.{surface.part}: two sides lie on each other at ({at}) and face each other. Contact and laws "
-                "of a boundary part act between the body and a rigid obstacle: each side would be held by an "
-                "obstacle of its own. Give the part one of the sides only, or name both in an [interface.NAME]"
+                f"boundary.{surface.part}: two sides lie on each other at {spot(found[: normals.shape[1]])} and face "
+                "each other. Contact and laws of a boundary part act between the body and a rigid obstacle: each side "
+                "would be held by an obstacle of its own. Give the part one of the sides only, or name both "
+                "in an [interface.NAME]"
             )
 
 

@@ -75,14 +75,13 @@ def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array, thresh
     Raises:
         InputError: on all ranks alike, with the place where they overlap most.
     """
-    d = surface.normals.shape[1]
-    deepest = [(float(gap[i]), tuple(map(float, surface.points[i][:d]))) for i in _lowest(gap)]
-    depth, at = min((place for rank in agree(comm, deepest) for place in rank), default=(0.0, ()))
+    deepest = [(float(gap[i]), surface.spot(i)) for i in _lowest(gap)]
+    depth, at = min((place for rank in agree(comm, deepest) for place in rank), default=(0.0, ""))
     if depth < -thresholds.overlap * pair.first.width:
-        place = ", ".join(f"{c:.6g}" for c in at)
         raise InputError(
-            f'interface.{pair.name}.between: at ({place}) "{pair.sides.second}" lies {-depth:.3g} m inside of the body '
-            f'of "{pair.sides.first}": move one of the bodies, or name the sides that face each other'
+            f'interface.{pair.name}.between: at {at} "{pair.sides.second}" lies {-depth:.3g} m inside of the body '
+            f'of "{pair.sides.first}": move one of the bodies, name the sides that face each other, or mesh '
+            "curved sides more finely"
         )
 
 

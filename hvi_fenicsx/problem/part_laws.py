@@ -177,7 +177,7 @@ def _factor(
     """
     found, most = given.at(where.points), thresholds.largest_scale
     bad = np.flatnonzero(~((found >= 1.0 / most) & (found <= most)))
-    said = [f"{found[i]:g} at {tuple(map(float, where.points[i]))}" for i in bad[:1]]
+    said = [f"{found[i]:g} at {where.spot(i)}" for i in bad[:1]]
     for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
         reason = (
             f"it must be positive at every vertex, from {1.0 / most:g} to {most:g}. Where there is no law, leave that "

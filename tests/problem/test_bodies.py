@@ -134,6 +134,22 @@ def test_bodies_without_regions_of_their_own_are_numbered_from_the_left(folder: 
     assert verdict.kernel[2].name == "rotation about (0.5, 0.5) of body 1 at (0.5, 0.5)"
 
 
+def test_a_body_of_a_file_is_called_by_its_table(tmp_path: Path) -> None:
+    """The regions of its file are regions of it."""
+    meshes.make(tmp_path / "square.msh", meshes.GOOD)
+    table = blocks(tmp_path / "square.msh", 2, 0.0, 0.0)
+    plate = {"shape": "rectangle", "size": [1.0, 0.5], "cells": [2, 1], "origin": [0.0, -0.5]}
+    table["domain"] = {"upper": table["domain"], "lower": plate}
+    table["boundary"] = {
+        "wall": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
+        "pull": {"on": "upper.top", "traction": [0.0, 1e6]},
+    }
+    table["interface"] = {"seam": {"between": ["upper.bottom", "lower.top"], "contact": {"gap": 0.0}}}
+    verdict = prepare(Scene.model_validate(table)).solvability
+    assert verdict.direction is not None
+    assert verdict.direction.name == 'translation along +y of body "upper": it lifts off body "lower"'
+
+
 def test_bodies_are_numbered_from_the_left_though_the_right_one_lies_lower(folder: Path, tmp_path: Path) -> None:
     file = meshes.transformed(tmp_path / "m.msh", folder / "nameless.msh", [1, 0, 0, 0, -0.1, 1, 0, 0, 0, 0, 1, 0])
     table = blocks(file, 2, 0.0, 0.0)

@@ -54,14 +54,14 @@ def obstacle(height: float, normal: float) -> dict[str, dict[str, list[float]]]:
 @pytest.mark.parametrize(
     ("parts", "text"),
     [
-        ({"floor": ("bottom", {"lower": "1e-6*(1 - 4*x)", "upper": 0.0})}, "boundary.floor: at (0.0, 0.0, 0.0), u·n"),
+        ({"floor": ("bottom", {"lower": "1e-6*(1 - 4*x)", "upper": 0.0})}, "boundary.floor: at (0, 0), u·n"),
         (
             {"floor": ("bottom", {"lower": 1e-6, "upper": 2e-6}), "stop": ("right", obstacle(3e-6, 1.0))},
-            "at (1.0, 0.0, 0.0), a vertex of boundary.stop too, u·n would have to be at least -2e-06 m",
+            "at (1, 0), a vertex of boundary.stop too, u·n would have to be at least -2e-06 m",
         ),
         (
             {"floor": ("bottom", {"gap": 0.0}), "stop": ("right", obstacle(-1e-6, -1.0))},
-            "at (1.0, 0.0, 0.0), a vertex of boundary.stop too, u·n would have to be at least 1e-06 m and at most 0 m",
+            "at (1, 0), a vertex of boundary.stop too, u·n would have to be at least 1e-06 m and at most 0 m",
         ),
     ],
 )

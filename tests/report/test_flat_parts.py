@@ -15,13 +15,13 @@ from hvi_fenicsx.typing import Array, Integers, Mask
 RADIUS, HEIGHT, AROUND = 0.5, 1.2, 24
 
 
-def shell(turn: float) -> tuple[Array, Integers]:
+def shell(turn: float, around: int = AROUND) -> tuple[Array, Integers]:
     """The inside of a bore about y over an angle: points (m, 3), and facets that look at the axis."""
     closed = turn > 6.28
-    angles = np.linspace(0.0, turn, AROUND + (not closed), endpoint=not closed)
+    angles = np.linspace(0.0, turn, around + (not closed), endpoint=not closed)
     low, high = (np.column_stack([RADIUS * np.cos(angles), np.full(len(angles), y), RADIUS * np.sin(angles)])
                  for y in (0.0, HEIGHT))  # fmt: skip
-    first = np.arange(AROUND)
+    first = np.arange(around)
     other, above = (first + 1) % len(angles), len(angles)
     facets = np.concatenate(
         [np.stack([first, other, first + above], 1), np.stack([other, other + above, first + above], 1)]
@@ -29,9 +29,9 @@ def shell(turn: float) -> tuple[Array, Integers]:
     return np.concatenate([low, high]), facets
 
 
-def bore(turn: float, idle: Mask | None = None) -> tuple[Any, Any]:
+def bore(turn: float, idle: Mask | None = None, around: int = AROUND) -> tuple[Any, Any]:
     """A part that is all of a body's surface, and the body."""
-    points, facets = shell(turn)
+    points, facets = shell(turn, around)
     none = np.zeros(len(points), dtype=bool)
     part = SimpleNamespace(points=points, idle=none if idle is None else idle)
     return SimpleNamespace(part=part, facets=facets, row=np.arange(len(points))), SimpleNamespace(points=points)
@@ -42,9 +42,10 @@ def areas(points: Array, triangles: Integers) -> Array:
     return np.asarray(0.5 * (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]))
 
 
-@pytest.mark.parametrize("turn", [2.0 * np.pi, 1.6 * np.pi])
-def test_an_unrolled_bore_has_the_area_of_its_shell(turn: float) -> None:
-    flat = laid_flat(*bore(turn))
+@pytest.mark.parametrize(("turn", "around"), [(2.0 * np.pi, AROUND), (2.0 * np.pi, 7), (1.6 * np.pi, AROUND)])
+def test_an_unrolled_bore_has_the_area_of_its_shell(turn: float, around: int) -> None:
+    """Also one of seven flat facets round, between two of which there is more than an eighth of a turn."""
+    flat = laid_flat(*bore(turn, around=around))
     each = areas(flat.points, flat.triangles)
     assert np.all(each < 0.0) or np.all(each > 0.0)
     assert np.prod(flat.ends[1] - flat.ends[0]) == pytest.approx(turn * RADIUS * HEIGHT, rel=1e-9)
@@ -56,11 +57,21 @@ def test_an_unrolled_bore_has_the_area_of_its_shell(turn: float) -> None:
     assert flat.how == "unrolled about y"
 
 
-def test_where_a_bore_touches_is_in_the_middle_of_its_map() -> None:
-    points, _ = shell(2.0 * np.pi)
-    flat = laid_flat(*bore(2.0 * np.pi, points[:, 0] > -0.8 * RADIUS))
+def test_an_axis_that_its_facets_miss_is_named() -> None:
+    """A vertex at one end lies nearer to the axis than the others."""
+    geometry, body = bore(2.0 * np.pi)
+    body.points[-1] *= [0.8, 1.0, 0.8]
+    flat = laid_flat(geometry, body)
+    assert flat.how == "unrolled about y"
+    assert np.allclose(flat.ways[:, 1], [0.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize("around", [AROUND, 8])
+def test_where_a_bore_touches_is_in_the_middle_of_its_map(around: int) -> None:
+    points, _ = shell(2.0 * np.pi, around)
+    flat = laid_flat(*bore(2.0 * np.pi, points[:, 0] > -0.8 * RADIUS, around))
     touching = flat.points[points[flat.rows, 0] <= -0.8 * RADIUS, 0]
-    ends = flat.points[:, 0].min(), flat.points[:, 0].max()
+    ends = flat.ends[:, 0]
     assert np.ptp(touching) < 0.25 * (ends[1] - ends[0])
     assert abs(touching.mean() - np.mean(ends)) < 0.05 * (ends[1] - ends[0])
 

@@ -43,7 +43,7 @@ TABLE: dict[str, tuple[str, str]] = {
     "contact excludes a support": ("boundary.wall.displacement=[0.0, -1e-5]", "violates the contact bound"),
     "bounds that contradict each other at one vertex": (
         "boundary.floor.contact={lower='2e-6*(x - 0.5)', upper='2e-6*(0.75 - x)'}",
-        "boundary.floor: at (0.75, 0.0, 0.0), u·n would have to be at least",
+        "boundary.floor: at (0.75, 0), u·n would have to be at least",
     ),
     "contact on a support": ("boundary.floor.displacement=[0.0, 0.0]", "prescribed"),
     "supports that differ where they meet": (

@@ -15,8 +15,8 @@ CLOSED = 0.5
 """A part whose normals add up to less than this share of its area may go round an axis."""
 ALONG = 0.05
 """So small a share of its area looks along that axis, and at least twice as much along any direction across."""
-OPEN = np.pi / 6
-"""A part that goes round leaves this angle open, or none."""
+STRAIGHT = np.cos(np.radians(2.0))
+"""An axis is along a coordinate axis from this cosine on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,13 +69,17 @@ def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
 
 
 def _axis(areas: Array) -> Array | None:
-    """The axis that a part goes round, its largest component positive; None where it goes round none."""
+    """The axis that a part goes round, its largest component positive; None where it goes round none.
+
+    Facets are not quite along the axis of a round bore: one that is nearly along a coordinate axis is along it.
+    """
     sizes = np.maximum(np.linalg.norm(areas, axis=1), 1e-300)
     shares, directions = np.linalg.eigh(areas.T @ (areas / sizes[:, None]) / float(sizes.sum()))
     if shares[0] > ALONG or shares[1] < 2.0 * ALONG:
         return None
     found = directions[:, 0]
-    return np.asarray(found * np.sign(found[np.argmax(np.abs(found))]))
+    largest = int(np.argmax(np.abs(found)))
+    return np.eye(3)[largest] if abs(found[largest]) > STRAIGHT else np.asarray(found * np.sign(found[largest]))
 
 
 def _projected(points: Array, triangles: Integers, total: Array, how: str) -> FlatPart:
@@ -100,12 +104,12 @@ def _unrolled(points: Array, triangles: Integers, axis: Array, touches: Mask) ->
     plane = _across(axis, towards)
     arms = points @ plane.T
     arms = arms - _centre(arms)
-    angles, (start, end) = _from_cut(np.arctan2(arms[:, 1], arms[:, 0]), touches)
+    angles, (start, end) = _from_cut(np.arctan2(arms[:, 1], arms[:, 0]), triangles, touches)
     rows, triangles, turns = _cut(angles, triangles)
     angles, radius = angles[rows], float(np.linalg.norm(arms, axis=1).mean())
     height = points @ axis
     onward = np.column_stack([-np.sin(angles), np.cos(angles)]) @ plane
-    named = "xyz"[int(np.argmax(axis))] if np.max(axis) > 1.0 - 1e-9 else ""
+    named = "xyz"[int(np.argmax(axis))] if np.max(axis) == 1.0 else ""
     return FlatPart(
         points=np.column_stack([radius * (angles + 2.0 * np.pi * turns), height[rows]]),
         rows=rows,
@@ -130,19 +134,29 @@ def _centre(points: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix, np.sum(points**2, axis=1))[0][:2])
 
 
-def _from_cut(angles: Array, touches: Mask) -> tuple[Array, tuple[float, float]]:
+def _from_cut(angles: Array, triangles: Integers, touches: Mask) -> tuple[Array, tuple[float, float]]:
     """Angles over one turn from a cut, and where the part begins and ends.
 
-    The cut is in the middle of what a part leaves open, else opposite to where it touches.
+    The cut is in the middle of what no facet covers, else opposite to where the part touches.
     """
     ordered = np.sort(angles)
     gaps = np.diff(np.append(ordered, ordered[0] + 2.0 * np.pi))
     widest = int(np.argmax(gaps))
-    opposite = float(np.angle(np.sum(np.exp(1j * angles[touches])))) - np.pi
-    is_open = bool(gaps[widest] > OPEN)
-    start = ordered[widest] + 0.5 * gaps[widest] - 2.0 * np.pi if is_open else opposite
-    found = np.asarray(start + np.mod(angles - start, 2.0 * np.pi))
-    return found, (float(found.min()), float(found.max())) if is_open else (start, start + 2.0 * np.pi)
+    found = _turned(angles, ordered[widest] + 0.5 * gaps[widest] - 2.0 * np.pi)
+    if not np.any(_across_cut(found[triangles])):
+        return found, (float(found.min()), float(found.max()))
+    start = float(np.angle(np.sum(np.exp(1j * angles[touches])))) - np.pi
+    return _turned(angles, start), (start, start + 2.0 * np.pi)
+
+
+def _turned(angles: Array, start: float) -> Array:
+    """Angles within one turn from a start."""
+    return np.asarray(start + np.mod(angles - start, 2.0 * np.pi))
+
+
+def _across_cut(corners: Array) -> Mask:
+    """Whether facets lie across the cut, from the angles of their corners, (k,)."""
+    return np.asarray(np.ptp(corners, axis=1) > np.pi)
 
 
 def _cut(angles: Array, triangles: Integers) -> tuple[Integers, Integers, Array]:
@@ -156,7 +170,7 @@ def _cut(angles: Array, triangles: Integers) -> tuple[Integers, Integers, Array]
         The rows of all vertices, the facets, and the whole turns that are added to the angles of the vertices.
     """
     corners = angles[triangles]
-    across = np.ptp(corners, axis=1) > np.pi
+    across = _across_cut(corners)
     early = corners < corners.max(axis=1, keepdims=True) - np.pi
     rows, turns, facets = [np.arange(len(angles))], [np.zeros(len(angles))], [triangles[~across]]
     for turn, moved in ((1.0, early[across]), (-1.0, ~early[across])):

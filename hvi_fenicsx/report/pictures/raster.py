@@ -1,4 +1,4 @@
-"""Linear values on triangles as an image: every pixel centre in a triangle takes its value there.
+"""Linear values on triangles as an image: every pixel centre in triangles takes the largest value there.
 
 matplotlib's own shading takes 3 s for half a million triangles; this takes a fraction of one, for many small triangles
 as for few large ones.
@@ -78,7 +78,7 @@ def _fill(image: Array, corners: Array, values: Array, low: Integers, box: tuple
     inside &= (columns < image.shape[1]) & (rows < image.shape[0])
     rise = values[:, 1:] - values[:, :1]
     value = values[:, :1] + second * rise[:, :1] + third * rise[:, 1:]
-    image[rows[inside], columns[inside]] = value[inside]
+    np.fmax.at(image.ravel(), rows[inside] * image.shape[1] + columns[inside], value[inside])
 
 
 def _barycentric(corners: Array) -> Iterator[Callable[[Array, Array], Array]]:

@@ -11,10 +11,11 @@ from ...typing import Array
 from .load_labels import reaches, strokes
 from .plane_canvas import SIDE, TALLEST
 from .reach import WAYS, Label, largest_scale
+from .seen import Seen, Surface, seen
 from .style import BLUE
 from .vtk_view import View
 
-PLACES = 15
+PLACES = 25
 """On a part, along each side of the rectangle around it."""
 AWAY = (0.3, 0.5, 0.8)
 """How far from the middle of a part a name beside it stands, inches."""
@@ -24,24 +25,25 @@ off its middle, and to stand beside it."""
 
 
 def names(
-    view: View, body: Array, parts: Sequence[tuple[str, Array]], arrows: Sequence[tuple[Array, Array]]
+    view: View, body: Surface, parts: Sequence[tuple[str, Surface]], arrows: Sequence[tuple[Array, Array]]
 ) -> list[Label]:
     """A label for each part.
 
     Args:
         view: from where the body is seen.
-        body: points of the body, m, (n, 3).
-        parts: the name of each part and its points where they are drawn, m, (m, 3).
+        body: its boundary.
+        parts: the name of each part, and the part where it is drawn.
         arrows: of each load, as :func:`.vtk_loads.arrows` gives them.
     """
-    everything = np.concatenate([body, *(points for _, points in parts)])
+    surfaces = [body, *(part for _, part in parts)]
+    everything = np.concatenate([surface.used for surface in surfaces])
     scale = largest_scale(reaches(view, everything, arrows), (SIDE, TALLEST))
     taken, found = strokes(view, arrows, scale), list[Label]()
-    hulls = [shapely.MultiPoint(view.project(points)).convex_hull for _, points in parts]
-    for place, (name, points) in enumerate(parts):
-        others = [*hulls[:place], *hulls[place + 1 :]]
-        on = _on(name, view.project(points), hulls[place], taken, scale)
-        found.append(min(on, _beside(name, hulls[place], [*taken, *others], scale), key=lambda best: best[0])[1])
+    _, *pieces = seen(view, surfaces)
+    for (name, _), piece in zip(parts, pieces, strict=True):
+        others = [other for other in pieces if other is not piece]
+        on, beside = _on(name, piece, taken, scale), _beside(name, piece, others, taken, scale)
+        found.append(min(on, beside, key=lambda best: best[0])[1])
         taken.append(found[-1].reach.hull(scale))
     return found
 
@@ -50,26 +52,30 @@ Priced = tuple[float, Label]
 """A label and what it costs."""
 
 
-def _on(name: str, points: Array, hull: shapely.Geometry, taken: Sequence[shapely.Geometry], scale: float) -> Priced:
+def _on(name: str, piece: Seen, taken: Sequence[shapely.Geometry], scale: float) -> Priced:
     """The best label on a part."""
-    middle = points.mean(axis=0)
-    sides = np.linspace(points.min(axis=0), points.max(axis=0), PLACES)
-    places = [middle, *(np.array([x, y]) for x in sides[:, 0] for y in sides[:, 1])]
+    sides = np.linspace(piece.middles.min(axis=0), piece.middles.max(axis=0), PLACES)
+    places = [piece.middle, *(np.array([x, y]) for x in sides[:, 0] for y in sides[:, 1])]
     labels = [Label(name, at, np.zeros(2), weight="normal", colour=BLUE) for at in places]
-    boxes = np.array([label.reach.hull(scale) for label in labels])
-    area, left = shapely.area(boxes), shapely.area(shapely.difference(boxes, hull))
-    away = np.linalg.norm(np.array(places) - middle, axis=1) / (float(np.hypot(*np.ptp(points, axis=0))) or 1.0)
-    hidden = (area - left) / (hull.area or 1.0)
-    return _cheapest(labels, LEAVES * left / area + HIDES * hidden + FAR * away + _spoilt(boxes, taken))
+    boxes = _boxes(labels, scale)
+    on, extent = piece.within(shapely.bounds(boxes)), float(np.hypot(*np.ptp(piece.middles, axis=0)))
+    away = np.linalg.norm(np.array(places) - piece.middle, axis=1) / (extent or 1.0)
+    left = np.maximum(1.0 - on / shapely.area(boxes), 0.0)
+    return _cheapest(labels, LEAVES * left + HIDES * on / piece.area + FAR * away + _spoilt(boxes, taken))
 
 
-def _beside(name: str, hull: shapely.Geometry, taken: Sequence[shapely.Geometry], scale: float) -> Priced:
+def _beside(name: str, piece: Seen, others: Sequence[Seen], taken: Sequence[shapely.Geometry], scale: float) -> Priced:
     """The best label beside a part, with a line to its middle."""
-    middle = np.array(hull.centroid.coords[0])
-    labels = [Label(name, middle, way, weight="normal", colour=BLUE, away=away) for away in AWAY for way in WAYS]
-    boxes = np.array([label.reach.hull(scale) for label in labels])
+    labels = [Label(name, piece.middle, way, weight="normal", colour=BLUE, away=away) for away in AWAY for way in WAYS]
+    boxes = _boxes(labels, scale)
     away = np.array([label.away for label in labels])
-    return _cheapest(labels, BESIDE + away + _spoilt(boxes, [*taken, hull]))
+    on = sum(one.within(shapely.bounds(boxes)) for one in (piece, *others)) / shapely.area(boxes)
+    return _cheapest(labels, BESIDE + away + SPOILS * on + _spoilt(boxes, taken))
+
+
+def _boxes(labels: Sequence[Label], scale: float) -> Array:
+    """What the letters take, m: shapely's rectangles, (k,)."""
+    return np.array([label.reach.hull(scale) for label in labels])
 
 
 def _spoilt(boxes: Array, taken: Sequence[shapely.Geometry]) -> Array:

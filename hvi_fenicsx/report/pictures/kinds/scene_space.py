@@ -25,6 +25,7 @@ from ..regions import Region, regions
 from ..regions import keys as region_keys
 from ..registry import picture
 from ..scene_legend import inside, say, touches
+from ..seen import Surface
 from ..space_canvas import space_canvas
 from ..space_names import names
 from ..style import INK, PALE, heading
@@ -72,9 +73,8 @@ def draw(result: Result) -> Figure:
     arrows = _arrows(rest, pulled, shown)
     reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
-    written = names(
-        view, body.points, [(s.side.part, points) for s, points in zip(shown, reached[1:], strict=True)], arrows
-    )
+    drawn = [(s.side.part, Surface(points=body.points + s.away, facets=s.side.facets)) for s in shown]
+    written = names(view, Surface(points=body.points, facets=body.boundary), drawn, arrows)
     values = labels(view, reached, pulled, arrows, [name.reach for name in written])
     words = [*written, *values]
     fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(one.reach for one in words)])
