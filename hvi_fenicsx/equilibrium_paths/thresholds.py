@@ -18,6 +18,8 @@ class ExactThresholds:
         near_end: a coordinate so near to an end of its segment is at it, relative to the sizes of coordinates.
         balanced: forces that balance may leave so much of the largest one.
         same_place: a difference of displacements that does not count, relative.
+        still: a variable that moves by so little of the fastest one of its kind stands, but for rounding.
+        neutral: the same where a body moves under one load: then the factor stands, and rounding is larger.
         standing: so many events at one place, and four for each unknown, lead nowhere.
         softest: relative accuracy of the direction in which a cell is softest.
     """
@@ -30,6 +32,8 @@ class ExactThresholds:
     near_end: float = 1e-9
     balanced: float = 1e-9
     same_place: float = 1e-7
+    still: float = 1e-11
+    neutral: float = 1e-10
     standing: int = 20
     softest: float = 1e-8
 

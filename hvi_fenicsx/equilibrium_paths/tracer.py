@@ -195,7 +195,8 @@ class Tracer:
         small = np.where(rates > 0.0, -self.small, self.small)
         distance, small = np.where(inward, 0.0, distance), np.where(inward, self._behind, small)
         steep = self._steepness()
-        moves = speed * steep > 1e-11 * self._fastest(speed)
+        rounding = self._thresholds.neutral if self.stands else self._thresholds.still
+        moves = speed * steep > rounding * self._fastest(speed)
         at = np.flatnonzero(moves & np.isfinite(distance))
         slack, beyond = np.maximum(distance[at], 0.0), np.maximum(-distance[at], 0.0)
         return at, slack, small[at], speed[at], np.maximum(1e-11 * (size / steep)[at] - beyond, 0.0)
@@ -262,7 +263,7 @@ class Tracer:
         cells, rates = self.cells, self.rates
         forces = _largest(np.where(cells.moving, cells.slope, cells.rise) * rates)
         size = self._stiffest * _largest(np.where(cells.moving, rates, 0.0)) + forces
-        return abs(self.factor_rate) * self._live < 1e-10 * size
+        return abs(self.factor_rate) * self._live < self._thresholds.neutral * size
 
     def at_end(self, aim: float) -> bool:
         """Whether another unknown is at the end of its segment already.

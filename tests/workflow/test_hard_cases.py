@@ -247,6 +247,17 @@ def test_a_path_that_found_no_step_short_enough_reaches_its_end(key: str) -> Non
     assert record["outcome"] == "certified", record
 
 
+def test_a_slender_body_that_slides_under_its_limit_load_meets_nothing_far_off() -> None:
+    """Rounding of its motion opened gaps after 1e10 of its slip; the path went there, and back to smaller loads."""
+    wide = Table.read(BENCHMARKS / "hard_wide.toml")
+    (case,) = (case for case in cases(wide) if case.key == "f90687491c")
+    prepared = hard_scenes.prepare(case, wide.data, "auto", MPI.COMM_SELF)
+    path = PathRun(prepared, PathTable()).follow(Control())
+    assert path.end == "escapes"
+    assert path.uncertified == 0
+    assert path.rows[-1].factor == pytest.approx(prepared.solvability.lambda_held, rel=1e-9)
+
+
 TALL = {
     "on a block": {"body": "stack", "support": "peak", "law": "quadratic_linear", "strength": 10.0, "margin": 0.01,
                    "side": "under", "modulus": 1e3},
