@@ -44,6 +44,7 @@ class CurveThresholds:
 
     Attributes:
         rounding: a coordinate this near to the end of its segment is there; a factor whose rate is this small stands.
+        left: what Newton's method leaves of a coordinate.
         standing: a site whose rate is this small beside the largest stands.
         undecided: a rate this small beside the largest may have the wrong sign where the curve bends: the step tells
             where it goes.
@@ -74,6 +75,7 @@ class CurveThresholds:
     """
 
     rounding: float = 1e-10
+    left: float = 1e-14
     standing: float = 1e-11
     undecided: float = 1e-7
     directions: int = 40

@@ -258,6 +258,16 @@ def test_a_slender_body_that_slides_under_its_limit_load_meets_nothing_far_off()
     assert path.rows[-1].factor == pytest.approx(prepared.solvability.lambda_held, rel=1e-9)
 
 
+def test_a_path_along_short_steep_pieces_reaches_its_end() -> None:
+    """Ends of pieces that are 1e-7 of the unit long were passed so early that forces jumped by a thousandth."""
+    wide = Table.read(BENCHMARKS / "hard_wide.toml")
+    (case,) = (case for case in cases(wide) if case.key == "6d6853fc81")
+    case = replace(case, values={**case.values, "cells": 4})
+    record = hard_run.attempt(case, wide.data, "auto", wide.data["limit"])
+    assert record["outcome"] == "certified", record
+    assert record["end"] == "reached"
+
+
 TALL = {
     "on a block": {"body": "stack", "support": "peak", "law": "quadratic_linear", "strength": 10.0, "margin": 0.01,
                    "side": "under", "modulus": 1e3},

@@ -219,7 +219,7 @@ class Crossing:
 
     def _approach(self) -> _Approach:
         sites, values, rates = self._sites, self._curve.here.values, self._rates()
-        allowed = self._limits.rounding * (1.0 + np.abs(values.s))
+        allowed = sites.allowances(values)
         low, high = values.s <= sites.low + allowed, values.s >= sites.high - allowed
         comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | sites.turning_back(values, rates)
         return _Approach(rates=rates, near=low | high, comes=comes)

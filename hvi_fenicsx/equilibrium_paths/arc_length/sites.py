@@ -113,6 +113,16 @@ class Sites(SiteGraphs):
         """
         return np.asarray(np.abs(values.lengths) <= self.thresholds.curve.rounding * self.length)
 
+    def allowances(self, values: Values) -> Array:
+        """How near to an end of its segment a site is there, (m,): on a steep segment a short way is a large force.
+
+        Args:
+            values: of the sites.
+        """
+        curve, size = self.thresholds.curve, 1.0 + np.abs(values.s)
+        steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
+        return np.asarray(np.maximum(curve.rounding / steep, curve.left) * size)
+
     def turning_back(self, values: Values, rates: Array) -> Mask:
         """Which bonds with memory go back, (m,); a vector that has not left 0 passes it instead.
 
