@@ -78,7 +78,7 @@ class Equilibria:
         Args:
             lowest: the lowest energy with a proof; else all.
             gap: what that proof may leave open, relative to the energy.
-            stop: asked before each box, by all ranks.
+            stop: asked before each box and inside long steps, by all ranks.
             report: told how far it is.
             saved: what an earlier search left.
             keep: keeps what is left while the search goes on.
@@ -151,6 +151,8 @@ class Equilibria:
         if start is None:
             return wanted
         for _ in range(limits.most_searches):
+            if stop():
+                break
             size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
             aim = limits.error_share * wanted.gap * size
             self.problem = scalar_problem(

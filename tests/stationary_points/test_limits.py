@@ -1,0 +1,47 @@
+"""A search that is told to stop does so within a long step, and what it then says holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_lengths import random_problem
+from test_stationary_points import FAST, problem_of
+
+from hvi_fenicsx.stationary_points import convex_programme
+from hvi_fenicsx.stationary_points.found import Found, Wanted
+from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
+from hvi_fenicsx.stationary_points.search import find
+from hvi_fenicsx.stationary_points.systematic import _descended
+
+LENGTHS = random_problem(0, 6, 3, opening=True)
+COMPONENTS = problem_of(FAST[0])[0]
+
+
+def stopped(problem: ScalarProblem, solves: int, *, lowest: bool, monkeypatch: pytest.MonkeyPatch) -> tuple[Found, int]:
+    """What is found by a search that is told to stop after some linear systems, and how many it solved after that."""
+    count, solve = [0], convex_programme._Programme._solved
+
+    def counted(programme: convex_programme._Programme, states: np.ndarray) -> object:
+        count[0] += 1
+        return solve(programme, states)
+
+    monkeypatch.setattr(convex_programme._Programme, "_solved", counted)
+    found = find(problem, Wanted(lowest=lowest), lambda: count[0] >= solves, lambda _: None)
+    return found, max(count[0] - solves, 0)
+
+
+@pytest.mark.parametrize("solves", [1, 3, 10, 30, 60, 100])
+@pytest.mark.parametrize(
+    ("problem", "lowest"),
+    [(LENGTHS, True), (LENGTHS, False), (COMPONENTS, True)],
+    ids=["lowest, lengths", "some, lengths", "lowest, components"],
+)
+def test_a_search_stops_within_a_few_linear_systems_and_its_bound_holds(
+    problem: ScalarProblem, lowest: bool, solves: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, further = stopped(problem, solves, lowest=lowest, monkeypatch=monkeypatch)
+    assert further <= 3
+    monkeypatch.undo()
+    starts = 2.0 * np.random.default_rng(0).normal(size=(3, problem.size))
+    least = min(problem.energy(_descended(problem, x, lambda: False)) for x in starts)
+    assert found.lower_bound is None or found.lower_bound <= least + 1e-9 * abs(least)
