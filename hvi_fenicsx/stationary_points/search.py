@@ -165,7 +165,7 @@ def _without_proof(task: Task) -> Found:
         return _none(cells)
     task.report("a search without a proof that nothing is missed")
     below = bounded(task, [])
-    known = [] if below is None else [below.x]
+    known = [*task.wanted.known, *([] if below is None else [below.x])]
     if (curved := task.wanted.curved) is None:
         points = tuple(systematic.near_stationary(problem, known, task.stop, task.wanted.exact))
     else:

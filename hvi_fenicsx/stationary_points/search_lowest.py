@@ -17,8 +17,6 @@ from .progress_words import Clock, counted, lowest_in_words
 from .scalar_problem import ScalarProblem
 from .search_task import Task
 
-FALLS = "no lowest energy: it falls without limit as the load moves a body away"
-"""What is told where this is known."""
 STOPPED = "stopped before a first bound of the energy was known"
 """What is told where there was no time for more."""
 
@@ -30,8 +28,8 @@ def lowest(task: Task) -> Found:
         task: the search.
     """
     problem, saved = task.problem, task.saved
-    if task.wanted.falls:
-        return _no_lowest(FALLS)
+    if task.wanted.no_lowest:
+        return _no_lowest(task.wanted.no_lowest)
     search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted), cut=task.stop)
     try:
         if saved is None:
@@ -149,7 +147,7 @@ def bounded(task: Task, points: list[Array]) -> LowestSearch | None:
         task: the search.
         points: that are known.
     """
-    if task.wanted.falls:
+    if task.wanted.no_lowest:
         return None
     search = LowestSearch(problem=task.problem, gap=task.wanted.gap, cut=task.stop)
     try:

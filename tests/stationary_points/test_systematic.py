@@ -72,7 +72,7 @@ def test_a_search_that_is_stopped_has_what_was_found_without_proof_and_a_gap() -
     least = oracle(FAST[0]).stationary()[0].energy / unit
     with pytest.MonkeyPatch.context() as patched:
         begun: list[int] = []
-        patched.setattr(systematic, "_starts", lambda *_: begun.append(1) or iter(()))
+        patched.setattr(systematic, "candidates", lambda *_: begun.append(1) or iter(()))
         one = find(problem, Wanted(), lambda: bool(begun), lambda _: None)
     assert (one.proven, one.complete) == (False, False)
     assert one.left
