@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
@@ -143,11 +144,15 @@ class TractionGraph:
             low: begin of the intervals, (m,).
             high: end of the intervals, (m,).
         """
-        first = np.searchsorted(self.breaks, low, side="left")[:, None]
-        last = np.searchsorted(self.breaks, high, side="right")[:, None]
+        first = np.searchsorted(self.breaks, low, side="left")
+        last = np.searchsorted(self.breaks, high, side="right")
+        least, most = np.sort([self.slopes[first], self.slopes[last]], axis=0)
+        several = np.flatnonzero(last - first > 1)
         pieces = np.arange(len(self.slopes))
-        met = (pieces >= first) & (pieces <= last)
-        return np.where(met, self.slopes, np.inf).min(axis=1), np.where(met, self.slopes, -np.inf).max(axis=1)
+        met = (pieces >= first[several, None]) & (pieces <= last[several, None])
+        least[several] = np.where(met, self.slopes, np.inf).min(axis=1)
+        most[several] = np.where(met, self.slopes, -np.inf).max(axis=1)
+        return least, most
 
     def primitive(self, x: Array) -> Array:
         """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""
@@ -161,10 +166,15 @@ class TractionGraph:
 
     def arcs(self) -> Iterator[Arc]:
         """The pieces of the primitive."""
+        yield from map(Arc._make, cast("list[list[float]]", self.table.tolist()))
+
+    @cached_property
+    def table(self) -> Array:
+        """The same as an array, (k+1, 6)."""
         ends = np.concatenate([[-np.inf], self.breaks, [np.inf]])
         anchors = self.breaks[self._anchor]
         columns = (ends[:-1], ends[1:], anchors, self.primitive(anchors), self._start, self.slopes)
-        yield from map(Arc._make, np.column_stack(columns).tolist())
+        return np.column_stack(columns)
 
     def split(self) -> tuple[TractionGraph, TractionGraph]:
         """H' and G': rising parts and upward jumps, and falling parts and downward jumps, turned round."""

@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from typing import cast
+
+import numpy as np
 
 from ..laws.arc import Arc
 from ..laws.traction_graph import TractionGraph
@@ -32,14 +35,11 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    arcs = [_bond(arc, weight, sign) for arc in graph.arcs()]
-    return tuple(arcs if sign > 0 else arcs[::-1])
-
-
-def _bond(arc: Arc, weight: float, sign: float) -> Arc:
-    low, high = sorted((arc.low / sign + 0.0, arc.high / sign + 0.0))
-    anchor, traction = arc.anchor / sign + 0.0, weight * sign * arc.traction
-    return Arc(low, high, anchor, weight * arc.value, traction, weight * sign * sign * arc.slope)
+    first, last, anchor, value, traction, slope = graph.table.T
+    ends = (first, last) if sign > 0 else (last, first)
+    low, high, middle = (place / sign + 0.0 for place in (*ends, anchor))
+    rows = np.column_stack([low, high, middle, weight * value, weight * sign * traction, weight * sign * sign * slope])
+    return tuple(arcs_of(rows if sign > 0 else rows[::-1]))
 
 
 def total(chains: Sequence[Chain]) -> Chain:
@@ -47,11 +47,11 @@ def total(chains: Sequence[Chain]) -> Chain:
     if len(chains) == 1:
         return chains[0]
     ends = sorted({end for c in chains for arc in c for end in (arc.low, arc.high)})
-    return tuple(_sum([_arc_over(c, lo, hi) for c in chains], lo, hi) for lo, hi in itertools.pairwise(ends))
-
-
-def _arc_over(arcs: Chain, lo: float, hi: float) -> Arc:
-    return next(arc for arc in arcs if arc.low <= lo and hi <= arc.high)
+    highs = [[arc.high for arc in c] for c in chains]
+    return tuple(
+        _sum([c[bisect_left(h, hi)] for c, h in zip(chains, highs, strict=True)], lo, hi)
+        for lo, hi in itertools.pairwise(ends)
+    )
 
 
 def _sum(arcs: Iterable[Arc], lo: float, hi: float) -> Arc:
@@ -81,7 +81,7 @@ def arcs_of(rows: Array) -> list[Arc]:
     Args:
         rows: (k, 6).
     """
-    return [Arc(*row) for row in cast("list[list[float]]", rows.tolist())]
+    return list(map(Arc._make, cast("list[list[float]]", rows.tolist())))
 
 
 def energy(arcs: Iterable[Arc], x: float) -> float:

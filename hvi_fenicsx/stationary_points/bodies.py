@@ -12,7 +12,7 @@ from ..errors import SolverError
 from ..preparation import Preparation
 from ..runtime.mpi import agree
 from ..solution import Solution
-from ..solvers import obstacle_force
+from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.result import SolveResult
 from ..system.condensation import Condensation
 from ..typing import Array
@@ -31,6 +31,13 @@ from .thresholds import DEFAULT, Thresholds
 
 NONE = Found(points=(), complete=True, lower_bound=None, proven=True, nodes=0, reason="no solution exists")
 """What is found where the load moves a body away."""
+FALLS = "no lowest energy: it falls without limit as the load moves a body away"
+"""What is told of a body that the load can move away from its equilibrium."""
+NO_POTENTIAL = (
+    "no lowest energy: an energy of separation depends on the mode (mixity), so the laws have no potential whose "
+    "equilibria could be compared; without --lowest some equilibria are looked for"
+)
+"""What is told of laws that are no derivatives of an energy."""
 
 
 class Equilibria:
@@ -78,7 +85,7 @@ class Equilibria:
         Args:
             lowest: the lowest energy with a proof; else all.
             gap: what that proof may leave open, relative to the energy.
-            stop: asked before each box, by all ranks.
+            stop: asked before each box and inside long steps, by all ranks.
             report: told how far it is.
             saved: what an earlier search left.
             keep: keeps what is left while the search goes on.
@@ -93,20 +100,27 @@ class Equilibria:
             lowest=lowest,
             gap=gap,
             bounded=self._prepared.solvability.state == "held",
-            falls=self._prepared.solvability.state == "metastable",
+            no_lowest=self._no_lowest,
+            known=() if lowest or not len(self.problem.lengths) or stop() else self._known(stop),
             exact=self._exact,
             energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
         )
         if not lowest and saved is None and (only := self._only()) is not None:
             return only
         with self._prepared.timer("solve"):
-            if self.problem.error and lowest and not wanted.falls:
+            if self.problem.error and lowest and not wanted.no_lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
             elif self.problem.error and not len(self.problem.lengths):
                 condensed = self._condensation.problem
                 near = scalar_problem(condensed, tractions=True, thresholds=self._thresholds)
                 wanted = replace(wanted, curved=CurvedLaws(near=near, problem=condensed))
             return find(self.problem, wanted, stop, report, saved, keep)
+
+    @property
+    def _no_lowest(self) -> str:
+        if not self._prepared.problem.has_potential:
+            return NO_POTENTIAL
+        return FALLS if self._prepared.solvability.state == "metastable" else ""
 
     def _only(self) -> Found | None:
         """The only equilibrium, where convexity proves that it is the only one; else None. Collective."""
@@ -121,6 +135,13 @@ class Equilibria:
         point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER, isolated=True)
         reason = f"the only equilibrium, proven: {only.why}"
         return Found(points=(point,), complete=True, lower_bound=energy, proven=True, nodes=0, reason=reason)
+
+    def _known(self, stop: Callable[[], bool]) -> tuple[Array, ...]:
+        """The equilibrium that a run finds, if it finds one, (n,). Collective."""
+        found = finish(self._prepared, interrupted=stop, estimating=False)
+        if not found.converged or found.solve_result is None:
+            return ()
+        return (self._condensation.restricted(found.solve_result.u),)
 
     def _exact(self, x: Array) -> StationaryPoint | None:
         """The equilibrium near a point, where laws are polylines or act on lengths. Collective.
@@ -139,7 +160,7 @@ class Equilibria:
         if not known.converged or known.solve_result is None or known.examination is None:
             return None
         found = self._condensation.restricted(known.solve_result.u)
-        kind = kind_of(problem, found)
+        kind = kind_of(problem, found) if self._prepared.problem.has_potential else Kind.UNDECIDED
         return StationaryPoint(x=found, energy=known.examination.energy, kind=kind, isolated=True)
 
     def _refined(
@@ -151,6 +172,8 @@ class Equilibria:
         if start is None:
             return wanted
         for _ in range(limits.most_searches):
+            if stop():
+                break
             size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
             aim = limits.error_share * wanted.gap * size
             self.problem = scalar_problem(
@@ -182,6 +205,7 @@ class Equilibria:
         """
         self._check_same(point.x)
         u = self._condensation.displacement(point.x)
+        frozen_mixity.freeze(self._prepared.problem, u)
         found = SolveResult(u=u, method="stationary points of the condensed problem", converged=True, reason=point.kind)
         known = certified(self._prepared, found)
         if known.converged or self.problem is None or not (self.problem.error or len(self.problem.lengths)):

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ def scalar_problem(
     within: Array | None = None,
     thresholds: Thresholds = DEFAULT,
 ) -> ScalarProblem:
-    """The problem at a load factor.
+    """The problem at a load factor. Of energies that depend on the mode one nearby, as these have no potential.
 
     Args:
         problem: the condensed problem.
@@ -41,7 +41,7 @@ def scalar_problem(
         thresholds: the numbers that tune the search.
 
     Raises:
-        InputError: a law has no potential, or acts on the length of a vector whose components have other laws.
+        InputError: a law acts on the length of a vector whose components have other laws.
     """
     polylines = thresholds.polylines
     far = np.full(problem.size, _far(problem.bonds, polylines.far)) if within is None else within
@@ -122,8 +122,7 @@ class _Laws:
         """Gather the laws; the constant is that without them, errors of forces are widened for rounding."""
         found: dict[_Argument, list[Chain]] = {}
         error, force_error = 0.0, np.zeros(problem.size)
-        for bonds, law in zip(problem.bonds, graphs, strict=True):
-            _refuse_mixity(bonds)
+        for bonds, law in zip(map(_frozen, problem.bonds), graphs, strict=True):
             area = float(bonds.weights.sum())
             constant, error = constant + area * law.offset, error + area * law.error
             for argument, sign, weight in _arguments(bonds):
@@ -182,12 +181,11 @@ def _far(laws: Sequence[Bonds], far: float) -> float:
     return far * max([1.0, *map(float, sizes)])
 
 
-def _refuse_mixity(bonds: Bonds) -> None:
-    if bonds.mixity is not None:
-        raise InputError(
-            f"boundary.{bonds.part}: the energy of separation depends on the mode; such a law has no potential, and "
-            "its equilibria are not searched"
-        )
+def _frozen(bonds: Bonds) -> Bonds:
+    """Bonds whose energy depends on the mode as bonds of half of each: equilibria are looked for near theirs."""
+    if bonds.mixity is None:
+        return bonds
+    return replace(bonds, weights=bonds.weights * bonds.mixity.energy(np.array([0.5])))
 
 
 def _refuse_overlap(problem: CondensedProblem, found: Iterable[_Argument]) -> None:

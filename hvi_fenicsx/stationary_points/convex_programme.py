@@ -7,7 +7,7 @@ the states go round in circles, a proximal term is added, and taken away step by
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,8 +140,18 @@ class _Iterate:
     done: bool
 
 
+def never() -> bool:
+    """A search goes on: nothing is to be cut short."""
+    return False
+
+
 def minimise(
-    a: Array, b: Array, chains: Chains, start: Array, thresholds: ProgrammeThresholds = DEFAULT.programmes
+    a: Array,
+    b: Array,
+    chains: Chains,
+    start: Array,
+    thresholds: ProgrammeThresholds = DEFAULT.programmes,
+    cut: Callable[[], bool] = never,
 ) -> Optimum:
     """Minimise ½ xᵀAx - bᵀx + Σ φᵢ(xᵢ).
 
@@ -151,10 +161,11 @@ def minimise(
         chains: φ.
         start: x (n,) to begin at.
         thresholds: how many steps, and what is rounding.
+        cut: whether to end with the point that is there, since the search stops.
     """
-    programme = _Programme(a, b, chains, thresholds)
+    programme = _Programme(a, b, chains, thresholds, cut)
     found = programme.active_set(np.clip(start, chains.low, chains.high))
-    if not found.done:
+    if not found.done and not cut():
         found = programme.proximal(found)
     return programme.bounded(found)
 
@@ -162,8 +173,10 @@ def minimise(
 class _Programme:
     """One programme."""
 
-    def __init__(self, a: Array, b: Array, chains: Chains, thresholds: ProgrammeThresholds) -> None:
-        self._a, self._b, self._chains, self._thresholds = a, b, chains, thresholds
+    def __init__(
+        self, a: Array, b: Array, chains: Chains, thresholds: ProgrammeThresholds, cut: Callable[[], bool]
+    ) -> None:
+        self._a, self._b, self._chains, self._thresholds, self._cut = a, b, chains, thresholds, cut
         diagonal = np.diag(a)
         self._scale = np.maximum(diagonal, 1e-3 * float(np.max(diagonal)) or 1.0)
         self._rows = np.arange(len(b))
@@ -182,7 +195,7 @@ class _Programme:
             x = np.clip(y, chains.low, chains.high)
             if np.array_equal(following, states) or self._stationary(x):
                 return _Iterate(x=x, done=True)
-            if following.tobytes() in seen:
+            if following.tobytes() in seen or self._cut():
                 break
             seen.add(following.tobytes())
             states = following
@@ -213,15 +226,16 @@ class _Programme:
         best, least, weight = found, self._objective(found.x), 1.0
         for _ in range(self._thresholds.most_proximal):
             added = weight * self._scale
-            near = _Programme(self._a + np.diag(added), self._b + added * best.x, self._chains, self._thresholds)
+            matrix, force = self._a + np.diag(added), self._b + added * best.x
+            near = _Programme(matrix, force, self._chains, self._thresholds, self._cut)
             trial = near.active_set(best.x)
             value = self._objective(trial.x)
             if value <= least:
                 best, least = trial, value
             weight = weight * 0.3 if trial.done else weight * 10.0
             last = self.active_set(best.x)
-            if last.done:
-                return last
+            if last.done or self._cut():
+                return last if last.done else best
         return best
 
     def _objective(self, x: Array) -> float:

@@ -3,42 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from ..laws.arc import Arc
 from ..typing import Array
-from .arcs import Chain, on_interval
-from .convex_programme import Chains, minimise
+from .convex_programme import Chains, minimise, never
 from .length_newton import LengthNewton
 from .length_programme import LengthProgramme
+from .majorants import majorants
 from .scalar_problem import ScalarProblem
 
 
-def majorant(arcs: Chain, low: float, high: float, x: float) -> Sequence[Arc]:
-    """A convex chain that is nowhere below the given one and equal to it at x: falls are linearised there.
-
-    Args:
-        arcs: a chain over the whole line.
-        low: begin of the interval.
-        high: end of the interval.
-        x: where they are equal.
-    """
-    part = on_interval(arcs, low, high)
-    k = next(i for i, a in enumerate(part) if x <= a.high)
-    here = part[k]
-    result = [Arc(here.low, here.high, x, here.at(x), here.rate(x), max(here.slope, 0.0))]
-    for before, a in zip(part[k:], part[k + 1 :], strict=False):
-        end, jump = result[-1], max(a.rate(a.low) - before.rate(a.low), 0.0)
-        result.append(Arc(a.low, a.high, a.low, end.at(a.low), end.rate(a.low) + jump, max(a.slope, 0.0)))
-    for after, a in zip(part[k:0:-1], part[k - 1 :: -1] if k else (), strict=False):
-        end, jump = result[0], max(after.rate(a.high) - a.rate(a.high), 0.0)
-        result.insert(0, Arc(a.low, a.high, a.high, end.at(a.high), end.rate(a.high) - jump, max(a.slope, 0.0)))
-    return result
-
-
-def descend(problem: ScalarProblem, low: Array, high: Array, x: Array, goal: float = math.inf) -> tuple[Array, float]:
+def descend(
+    problem: ScalarProblem,
+    low: Array,
+    high: Array,
+    x: Array,
+    goal: float = math.inf,
+    cut: Callable[[], bool] = never,
+) -> tuple[Array, float]:
     """A point of a box at which no convex step lowers the energy, and its energy.
 
     Args:
@@ -47,13 +31,15 @@ def descend(problem: ScalarProblem, low: Array, high: Array, x: Array, goal: flo
         high: of the box, (n + m,), finite.
         x: where to begin, (n,).
         goal: a descent that comes down too slowly to reach this energy is given up.
+        cut: whether to end where it is, since the search stops.
     """
     energy, limits = problem.energy(x), problem.thresholds.descent
     for _ in range(limits.most_steps):
+        if cut():
+            break
         at = problem.arguments(x)
-        ends = zip(low, np.maximum(high, at), at, strict=True)
-        chains = [majorant(c, *e) for c, e in zip(problem.chains, ends, strict=True)]
-        found = _minimiser(problem, chains, x)
+        chains = majorants(problem.arcs, np.minimum(low, at), np.maximum(high, at), at)
+        found = _minimiser(problem, chains, x, cut)
         after = problem.energy(found)
         fall, size = energy - after, problem.energy_size(x)
         if not fall > limits.rounding * size:
@@ -64,22 +50,30 @@ def descend(problem: ScalarProblem, low: Array, high: Array, x: Array, goal: flo
     return np.asarray(x), energy
 
 
-def _minimiser(problem: ScalarProblem, chains: list[Sequence[Arc]], x: Array) -> Array:
+def _minimiser(problem: ScalarProblem, chains: list[Array], x: Array, cut: Callable[[], bool]) -> Array:
     """The minimiser of a majorant. Of a law of a length ψ, the part that would fall is linearised along the vector."""
     lengths, n = problem.lengths, problem.size
     if not len(lengths):
-        return minimise(problem.stiffness, problem.force, Chains.of(chains), x, problem.thresholds.programmes).x
-    slopes = np.array([max(-c[0].rate(c[0].low), 0.0) for c in chains[n:]])
+        limits = problem.thresholds.programmes
+        return minimise(problem.stiffness, problem.force, Chains.of(chains), x, limits, cut).x
+    slopes = np.array([max(-_first_rate(c), 0.0) for c in chains[n:]])
     size = lengths.of(x)
     felt = lengths.felt(lengths.vectors(x)) * lengths.factors
     pull = np.divide(slopes, size, out=np.zeros_like(size), where=size > 0.0)[:, None] * felt
     force = problem.force.copy()
     force[lengths.members] += pull[lengths.there]
-    risen = [[_steeper(a, slope) for a in c] for c, slope in zip(chains[n:], slopes, strict=True)]
+    risen = [_steeper(c, slope) for c, slope in zip(chains[n:], slopes, strict=True)]
     programme = LengthProgramme.of(problem, problem.stiffness, force, [*chains[:n], *risen], np.zeros(len(lengths)))
-    return LengthNewton(programme).minimiser(x)
+    return LengthNewton(programme, cut).minimiser(x)
 
 
-def _steeper(arc: Arc, slope: float) -> Arc:
-    """The arc with a line through zero added."""
-    return arc._replace(value=arc.value + slope * arc.anchor, traction=arc.traction + slope)
+def _first_rate(chain: Array) -> float:
+    """The traction at the begin of a chain (k, 6)."""
+    low, _, anchor, _, traction, slope = chain[0]
+    return float(traction + slope * (low - anchor))
+
+
+def _steeper(chain: Array, slope: float) -> Array:
+    """A chain (k, 6) with a line through zero added."""
+    low, high, anchor, value, traction, curvature = chain.T
+    return np.column_stack([low, high, anchor, value + slope * anchor, traction + slope, curvature])

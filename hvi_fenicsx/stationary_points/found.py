@@ -28,12 +28,14 @@ class Start:
         energy: there.
         low: of a box that holds all points of lower energy, (n + m,).
         high: of that box, (n + m,).
+        bound: no point has a lower energy of the laws themselves.
     """
 
     x: Array
     energy: float
     low: Array
     high: Array
+    bound: float
 
     @property
     def reach(self) -> Array:
@@ -49,8 +51,9 @@ class Wanted:
         lowest: the lowest energy with a proof; else all equilibria.
         gap: relative gap that the proof of the lowest may leave.
         bounded: whether the energy is known to be bounded from below.
-        falls: whether it is known to fall without limit, as a body moves away.
+        no_lowest: why there is no lowest energy; empty where there may be one.
         start: where the lowest is, as far as that is known.
+        known: points near which equilibria are known to be, (n,) each.
         energies: the unit of energies in reports.
         curved: the curved laws, by which cells are decided and points are made exact; None where no law is curved, one
             acts on a length, or the lowest is wanted.
@@ -60,8 +63,9 @@ class Wanted:
     lowest: bool = False
     gap: float = 1e-8
     bounded: bool = True
-    falls: bool = False
+    no_lowest: str = ""
     start: Start | None = None
+    known: tuple[Array, ...] = ()
     energies: Unit = field(default_factory=Unit)
     curved: CurvedLaws | None = None
     exact: Callable[[Array], StationaryPoint | None] | None = None

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..laws.arc import Arc
 from ..typing import Array
 from .convex_programme import Chains, minimise
 from .length_frames import left_out
@@ -49,11 +48,11 @@ def _forces(programme: LengthProgramme, x: Array) -> Array:
     return result
 
 
-def _without_lengths(programme: LengthProgramme, x: Array) -> list[list[Arc]]:
+def _without_lengths(programme: LengthProgramme, x: Array) -> list[Array]:
     """The laws of the unknowns; of the vectors' ones their bounds."""
-    chains = [list(c) for c in programme.chains[: len(x)]]
+    chains = list(programme.chains[: len(x)])
     end = programme.thresholds.beyond * float(np.abs(x).max()) + 1.0
     for i in programme.lengths.members:
         low, high = max(float(programme.lower[i]), -end), min(float(programme.upper[i]), end)
-        chains[i] = [Arc(low, high, 0.0, 0.0, 0.0, 0.0)]
+        chains[i] = np.array([[low, high, 0.0, 0.0, 0.0, 0.0]])
     return chains

@@ -21,8 +21,8 @@ from ..laws.traction_graph import TractionGraph
 from ..typing import Array
 from .thresholds import DEFAULT, PolylineThresholds
 
-Difference = Callable[[Superpotential, Array, Array, int], Array]
-"""Bounds of what a law and its polyline differ by on intervals: law, begins, ends, samples."""
+Difference = Callable[[Superpotential, Array, Array, int], tuple[Array, Array]]
+"""What a law and its polyline differ by on intervals, at least and at most: of law, begins, ends, samples."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +83,7 @@ def near_graph(
     if (graph := exact_graph(law)) is not None:
         return LawGraph(graph=graph, offset=float(law.value(np.zeros(1))[0]), error=0.0)
     nodes, traction_error = _nodes(law, far, tolerance, _traction_errors, thresholds)
-    error = float(_errors(law, nodes[:-1], nodes[1:], thresholds.samples).max())
+    error = float(_errors(law, nodes[:-1], nodes[1:], thresholds.samples)[1].max())
     offset = float(law.value(np.zeros(1))[0])
     return LawGraph(graph=_joined(law, nodes), offset=offset, error=error, traction_error=traction_error)
 
@@ -96,8 +96,10 @@ def _nodes(
     begin, end = first[:-1], first[1:]
     kept, worst = [first[-1:]], 0.0
     while begin.size:
-        errors = differences(law, begin, end, thresholds.samples)
         full = sum(map(len, kept)) + 2 * begin.size > thresholds.most_nodes
+        least, errors = differences(law, begin, end, thresholds.few_samples)
+        close = np.flatnonzero((errors > tolerance) & (full | (least <= tolerance)))
+        errors[close] = differences(law, begin[close], end[close], thresholds.samples)[1]
         fine = (errors <= tolerance) | full
         worst = float(np.max(errors[fine], initial=worst))  # not a number stays so
         kept.append(begin[fine])
@@ -141,7 +143,7 @@ def _rises(law: Superpotential, x: Array) -> Array:
     """By how much the tractions of the law's convex parts rise from sample to sample, together, (n, k - 1)."""
     ends = x[:, 1:].ravel(), x[:, :-1].ravel()
     rises = sum(part.left(ends[0]) - part.right(ends[1]) for part in (law.convex, law.concave))
-    return np.asarray(rises).reshape(len(x), -1)
+    return np.asarray(rises).reshape(len(x), x.shape[1] - 1)
 
 
 def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
@@ -154,8 +156,8 @@ def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
     return np.asarray(np.maximum(slope - below, above - slope) + rounding)
 
 
-def _traction_errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Array:
-    """Bounds of the difference of the tractions on intervals, (n,)."""
+def _traction_errors(law: Superpotential, begin: Array, end: Array, samples: int) -> tuple[Array, Array]:
+    """The difference of the tractions on intervals at samples, and bounds of it, (n,) each."""
     share, x = _samples(begin, end, samples)
     traction = _polyline(law, begin, end, share)[1]
     after, before = (side(x.ravel()).reshape(x.shape) for side in (law.right, law.left))
@@ -163,11 +165,11 @@ def _traction_errors(law: Superpotential, begin: Array, end: Array, samples: int
     between = 0.5 * np.diff(x, axis=1) * _slopes_apart(law, x, traction)
     most = at_samples + np.minimum(between, _rises(law, x) + np.abs(np.diff(traction, axis=1)))
     rounding = 4.0 * np.finfo(float).eps * np.abs(after).max(axis=1)
-    return np.asarray(most.max(axis=1) + rounding)
+    return np.asarray(at_samples.max(axis=1) - rounding), np.asarray(most.max(axis=1) + rounding)
 
 
-def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Array:
-    """Bounds of the difference of the energies on intervals, (n,)."""
+def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> tuple[Array, Array]:
+    """The difference of the energies on intervals at samples, and bounds of it, (n,) each."""
     share, x = _samples(begin, end, samples)
     energy, traction = _polyline(law, begin, end, share)
     value = law.value(x.ravel()).reshape(x.shape)
@@ -177,7 +179,7 @@ def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Arra
     between = step * np.minimum(0.25 * span, 0.125 * step * _slopes_apart(law, x, traction))
     most = np.maximum(difference[:, 1:], difference[:, :-1]) + between
     rounding = np.finfo(float).eps * np.abs(value).max(axis=1)
-    return np.asarray(most.max(axis=1) + rounding)
+    return np.asarray(difference.max(axis=1) - rounding), np.asarray(most.max(axis=1) + rounding)
 
 
 def _polyline(law: Superpotential, begin: Array, end: Array, share: Array) -> tuple[Array, Array]:

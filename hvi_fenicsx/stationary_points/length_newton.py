@@ -6,15 +6,14 @@ energy, unless the point is the minimiser.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ..laws.arc import Arc
 from ..typing import Array, Mask
-from .convex_programme import Chains, minimise
+from .convex_programme import Chains, minimise, never
 from .length_frames import Frames, left_out, parts, unknowns_of
 from .length_programme import LengthProgramme
 
@@ -47,10 +46,12 @@ class LengthNewton:
 
     Args:
         programme: the programme.
+        cut: whether to end with the point that is there, since the search stops.
     """
 
-    def __init__(self, programme: LengthProgramme) -> None:
+    def __init__(self, programme: LengthProgramme, cut: Callable[[], bool] = never) -> None:
         self._programme, self._lengths, self._limits = programme, programme.lengths, programme.thresholds
+        self._cut = cut
         self._a, self._b = programme.a, programme.b
 
     def minimiser(self, start: Array) -> Array:
@@ -66,7 +67,7 @@ class LengthNewton:
             if found is None:
                 break
             x, value, last = found
-            if last:
+            if last or self._cut():
                 break
         return x
 
@@ -143,7 +144,8 @@ class LengthNewton:
         """The solution of the programme in the frames, as unknowns."""
         frames, lengths = here.frames, self._lengths
         chains = Chains.of(self._local(here))
-        found = minimise(frames.matrix(self._a), frames.forces(self._b), chains, frames.into(x), self._limits)
+        matrix, force = frames.matrix(self._a), frames.forces(self._b)
+        found = minimise(matrix, force, chains, frames.into(x), self._limits, self._cut)
         y = parts(lengths, found.x)
         vectors = frames.turned(y)
         rows = np.arange(len(y))
@@ -154,28 +156,28 @@ class LengthNewton:
         share = np.divide(ahead, size, out=np.ones_like(size), where=at_joint & (size > 0.0))
         return unknowns_of(lengths, found.x, vectors * share[:, None])
 
-    def _local(self, here: Tangent) -> list[Sequence[Arc]]:
+    def _local(self, here: Tangent) -> list[Array]:
         """The laws in the frames, one of each component."""
-        result: list[Sequence[Arc]] = list(self._programme.chains[: len(self._b)])
+        result = list(self._programme.chains[: len(self._b)])
         for v, k in zip(*np.nonzero(self._lengths.there), strict=True):
             result[self._lengths.unknowns[v, k]] = self._component(here, int(v), int(k))
         return result
 
-    def _component(self, here: Tangent, v: int, k: int) -> Sequence[Arc]:
+    def _component(self, here: Tangent, v: int, k: int) -> Array:
         low, high = float(here.ends[0][v, k]), float(here.ends[1][v, k])
         if here.out[v, k]:
             return self._left_out(here, v, k)
         if here.held[v]:
-            return [_parabola(0.0, 0.0)]
+            return _parabola(0.0, 0.0)
         if k == here.frames.axis[v]:
             return self._mirrored[v]
         if not here.moving[v] and here.start[v] > 0.0:
-            return [_parabola(0.0, 0.0)]
+            return _parabola(0.0, 0.0)
         kept = here.frames.turns[v, k, k] == 1.0
         far = 2.0 * float(self._programme.radius[v])
-        return [_parabola(low if kept else -far, high if kept else far, float(here.across[v]))]
+        return _parabola(low if kept else -far, high if kept else far, float(here.across[v]))
 
-    def _left_out(self, here: Tangent, v: int, k: int) -> Sequence[Arc]:
+    def _left_out(self, here: Tangent, v: int, k: int) -> Array:
         """The law of a component that does not count at the point: behind zero it does."""
         low, high = float(here.ends[0][v, k]), float(here.ends[1][v, k])
         start = 0.0 if here.moving[v] else float(here.start[v])
@@ -184,11 +186,11 @@ class LengthNewton:
         shut = float(self._programme.shut[v]) if opens else across
         below = [_parabola(low, 0.0, shut, 0.0 if opens else -start)] if low < 0.0 else []
         above = [_parabola(0.0, high, across, start)] if high > 0.0 else []
-        return [*below, *above] or [_parabola(0.0, 0.0)]
+        return np.concatenate([*below, *above] or [_parabola(0.0, 0.0)])
 
     @cached_property
-    def _mirrored(self) -> list[list[Arc]]:
-        return [[*(_negative(a) for a in reversed(c)), *c] for c in self._programme.chains[len(self._b) :]]
+    def _mirrored(self) -> list[Array]:
+        return [np.concatenate([_negative(c), c]) for c in self._programme.chains[len(self._b) :]]
 
     def _ends(self, vectors: Array) -> tuple[Array, Array]:
         """Bounds of the vectors' components, far from a point where there are none, (m, 3) each."""
@@ -206,9 +208,12 @@ class LengthNewton:
         return np.maximum(each.max(axis=1), 1e-3 * float(np.max(each, initial=0.0)) or 1.0)
 
 
-def _parabola(low: float, high: float, slope: float = 0.0, traction: float = 0.0) -> Arc:
-    return Arc(low, high, 0.0, 0.0, traction, slope)
+def _parabola(low: float, high: float, slope: float = 0.0, traction: float = 0.0) -> Array:
+    """A chain of one arc."""
+    return np.array([[low, high, 0.0, 0.0, traction, slope]])
 
 
-def _negative(arc: Arc) -> Arc:
-    return Arc(-arc.high, -arc.low, -arc.anchor, arc.value, -arc.traction, arc.slope)
+def _negative(chain: Array) -> Array:
+    """A chain on a line that is turned round."""
+    low, high, anchor, value, traction, slope = chain[::-1].T
+    return np.column_stack([-high, -low, -anchor, value, -traction, slope])

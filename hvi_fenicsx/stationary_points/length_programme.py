@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..laws.arc import Arc
 from ..typing import Array, Mask
 from .convex_programme import Chains
 from .length_frames import unknowns_of
@@ -27,7 +26,7 @@ class LengthProgramme:
     Attributes:
         a: A (n, n), symmetric, positive semidefinite.
         b: (n,).
-        chains: ψ, n of the unknowns and m of the lengths, these from zero on.
+        chains: ψ as arcs (k, 6), n of the unknowns and m of the lengths, these from zero on.
         lengths: of the vectors.
         lower: bounds of the vectors' unknowns, (n,).
         upper: bounds of them, (n,).
@@ -37,7 +36,7 @@ class LengthProgramme:
 
     a: Array
     b: Array
-    chains: Sequence[Sequence[Arc]]
+    chains: Sequence[Array]
     lengths: Lengths
     lower: Array
     upper: Array
@@ -45,9 +44,7 @@ class LengthProgramme:
     thresholds: ProgrammeThresholds
 
     @classmethod
-    def of(
-        cls, problem: ScalarProblem, a: Array, b: Array, chains: Sequence[Sequence[Arc]], shut: Array
-    ) -> LengthProgramme:
+    def of(cls, problem: ScalarProblem, a: Array, b: Array, chains: Sequence[Array], shut: Array) -> LengthProgramme:
         """A programme on the vectors and bounds of a problem.
 
         Args:

@@ -6,6 +6,7 @@ bounded by the dual: c·x ≤ (E - min over x of (relaxation - τ c·x))/τ for 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,13 @@ from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 
 
-def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: float) -> tuple[Array, Array]:
+class Cut(Exception):
+    """The search stops before there is a first box."""
+
+
+def level_set(
+    problem: ScalarProblem, box: Box, curvature: Curvature, level: float, cut: Callable[[], bool]
+) -> tuple[Array, Array]:
     """The ends of a box (n + m,) with all points of at most an energy.
 
     Args:
@@ -26,9 +33,11 @@ def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: flo
         box: the relaxation's solution on a box that is far larger.
         curvature: of that relaxation.
         level: the energy.
+        cut: whether to give up, since the search stops.
 
     Raises:
         SolverError: no finite box was found.
+        Cut: the search stops.
     """
     energy = level + problem.thresholds.bounds.slack * problem.energy_size(box.x)
     root = np.sqrt(2.0 * max(energy - box.value, 0.0))
@@ -37,7 +46,7 @@ def level_set(problem: ScalarProblem, box: Box, curvature: Curvature, level: flo
     free = np.flatnonzero(~np.isfinite(curvature.radii[:n]))
     if free.size:
         motions = _apart(problem, kernel(problem))
-        spread = np.abs(motions[free]) @ _reach(problem, box, motions, energy)
+        spread = np.abs(motions[free]) @ _reach(problem, box, motions, energy, cut)
         around = root * curvature.range_radii[free] + spread
         low[free], high[free] = box.x[free] - around, box.x[free] + around
     return problem.with_lengths(np.maximum(low, box.low[:n]), np.minimum(high, box.high[:n]))
@@ -52,20 +61,23 @@ def _apart(problem: ScalarProblem, motions: Array) -> Array:
     return np.asarray(motions @ turn.T)
 
 
-def _reach(problem: ScalarProblem, box: Box, motions: Array, energy: float) -> Array:
+def _reach(problem: ScalarProblem, box: Box, motions: Array, energy: float, cut: Callable[[], bool]) -> Array:
     """How far the share of each rigid motion can be from that of x, (k,)."""
     result = []
     for c in motions.T:
         here = float(c @ box.x)
-        result.append(max(_farthest(problem, box, sign * c, energy) - sign * here for sign in (1.0, -1.0)))
+        result.append(max(_farthest(problem, box, sign * c, energy, cut) - sign * here for sign in (1.0, -1.0)))
     return np.array(result)
 
 
-def _farthest(problem: ScalarProblem, box: Box, c: Array, energy: float) -> float:
+def _farthest(problem: ScalarProblem, box: Box, c: Array, energy: float, cut: Callable[[], bool]) -> float:
     """A bound of c·x from above."""
     best, tau = np.inf, float(np.max(np.abs(problem.force), initial=1e-300))
     for _ in range(problem.thresholds.bounds.most_forces):
-        found, _ = Relaxation(replace(problem, force=problem.force + tau * c)).solve(replace(box, bound=-np.inf), 0.9)
+        pulled = Relaxation(problem.under(problem.force + tau * c), cut)
+        found, _ = pulled.solve(replace(box, bound=-np.inf), 0.9)
+        if cut():
+            raise Cut
         if not np.any(
             (found.x <= box.low[: problem.size]) & np.isneginf(problem.lower)
             | (found.x >= box.high[: problem.size]) & np.isposinf(problem.upper)

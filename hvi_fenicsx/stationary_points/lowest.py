@@ -18,13 +18,17 @@ import numpy as np
 from ..errors import SolverError
 from ..typing import Array
 from .boxes import Box, clipped, fresh_box
+from .convex_programme import never
 from .curvature import Curvature
 from .descent import descend
 from .division import halves
-from .level_set import level_set
+from .level_set import Cut, level_set
 from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
 from .tightening import ForceIntervals
+
+OpenBox = tuple[Array, Array, Array, float]
+"""Low and high of a box, with those of rigid motions' shares, weights, and a bound of the laws' own energy in it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +59,7 @@ class LowestSearch:
     Attributes:
         problem: the problem.
         gap: relative gap that is allowed.
+        cut: whether what is begun is to be cut short, since the search stops.
         x: the lowest point found.
         upper: its energy.
         boxes: bounded so far.
@@ -63,6 +68,7 @@ class LowestSearch:
 
     problem: ScalarProblem
     gap: float = 1e-8
+    cut: Callable[[], bool] = never
     x: Array = field(init=False)
     upper: float = math.inf
     boxes: int = 0
@@ -71,7 +77,7 @@ class LowestSearch:
 
     def __post_init__(self) -> None:
         self._thresholds = self.problem.thresholds.lowest
-        self._relaxation = Relaxation(self.problem)
+        self._relaxation = Relaxation(self.problem, self.cut)
         self._forces = ForceIntervals(self.problem)
         self._in_vain = self._next_descent = 0
 
@@ -83,6 +89,7 @@ class LowestSearch:
 
         Raises:
             SolverError: the energy is not bounded from below, or this cannot be shown.
+            Cut: the search stops before this is known.
         """
         problem = self.problem
         far = problem.far
@@ -91,7 +98,7 @@ class LowestSearch:
         self.x = self._inside(np.zeros(problem.size))
         for x in (self.x, *points):
             self._try(self._inside(x))
-        first, curvature = self._relaxation.solve(fresh_box(low, high, self.x), self._thresholds.parts[0])
+        first, curvature = self._first_relaxation()
         if self._far(first.x):
             raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
         self._enter_level_set(first, curvature)
@@ -106,15 +113,24 @@ class LowestSearch:
 
         Raises:
             SolverError: no smaller box was found.
+            Cut: the search stops before one is found.
         """
         self._low, self._high = low, high
         self._try(self._inside(point))
-        self._enter_level_set(*self._relaxation.solve(fresh_box(low, high, self.x), self._thresholds.parts[0]))
+        self._enter_level_set(*self._first_relaxation())
+
+    def _first_relaxation(self) -> tuple[Box, Curvature]:
+        """The relaxation on the region."""
+        first = self._relaxation.solve(fresh_box(self._low, self._high, self.x), self._thresholds.parts[0])
+        if self.cut():
+            raise Cut
+        return first
 
     def _enter_level_set(self, first: Box, curvature: Curvature) -> None:
         """Enter what a relaxation leaves of its box."""
         self._try(first.x)
-        low, high = level_set(self.problem, first, curvature, self.upper + 2.0 * self.problem.error)
+        level = self.upper + 2.0 * self.problem.error
+        low, high = level_set(self.problem, first, curvature, level, self.cut)
         self._low, self._high = low, high
         self._enter(self._moving(replace(fresh_box(low, high, first.x), bound=first.bound)))
 
@@ -123,8 +139,8 @@ class LowestSearch:
         low, high = self._relaxation.share_span(box.low, box.high)
         return replace(box, motion_low=low, motion_high=high)
 
-    def resume(self, boxes: Iterable[tuple[Array, Array, Array]], point: Array) -> None:
-        """Go on from open boxes, each low, high and weights, and the lowest point.
+    def resume(self, boxes: Iterable[OpenBox], point: Array) -> None:
+        """Go on from open boxes and the lowest point.
 
         Args:
             boxes: from :meth:`open_boxes`.
@@ -136,8 +152,9 @@ class LowestSearch:
         self._low = np.min([b[0][:size] for b in listed], axis=0, initial=np.inf)
         self._high = np.max([b[1][:size] for b in listed], axis=0, initial=-np.inf)
         self._try(point)
-        for low, high, weights in listed:
+        for low, high, weights, bound in listed:
             box = replace(fresh_box(low[:size], high[:size], point), weights=weights, share=1.0 / len(listed))
+            box = replace(box, bound=bound - self.problem.error)
             with_shares = replace(box, motion_low=low[size:], motion_high=high[size:])
             self._enter(with_shares if len(low) > size else self._moving(box))
 
@@ -146,11 +163,11 @@ class LowestSearch:
         """The ends of a box with all points that are lower than the lowest found, also of the laws themselves."""
         return self._low, self._high
 
-    def open_boxes(self) -> Iterator[tuple[Array, Array, Array]]:
-        """Low, high and weights of the boxes that wait; low and high with those of rigid motions' shares."""
+    def open_boxes(self) -> Iterator[OpenBox]:
+        """The boxes that wait."""
         for _, _, box in self.waiting:
             low, high = ((box.low, box.motion_low), (box.high, box.motion_high))
-            yield np.concatenate(low), np.concatenate(high), box.weights
+            yield np.concatenate(low), np.concatenate(high), box.weights, box.bound - self.problem.error
 
     def progress(self) -> Progress:
         """How far the search is."""
@@ -217,6 +234,8 @@ class LowestSearch:
         for round_ in range(self._thresholds.most_rounds):
             before = box.bound
             for part in self._thresholds.parts:
+                if self.cut():
+                    return box
                 smaller = self._forces.tightened(box.low, box.high)
                 if smaller is None:
                     return None
@@ -271,7 +290,7 @@ class LowestSearch:
 
     def _try(self, x: Array) -> None:
         """Descend from a point."""
-        found, energy = descend(self.problem, self._low, self._high, x, self.upper)
+        found, energy = descend(self.problem, self._low, self._high, x, self.upper, self.cut)
         if energy < self.upper:
             self.x, self.upper = found, energy
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from ..laws.arc import Arc
 from ..typing import Array, Integers, Mask
 from . import envelopes as convex
 from . import motions
-from .arcs import arcs_of
 from .boxes import Box
-from .convex_programme import Chains, minimise
+from .convex_programme import Chains, minimise, never
 from .curvature import Curvature, CurvatureShare
 from .dual_bound import DualBound
 from .held_forces import with_held_forces
@@ -33,19 +32,28 @@ def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> 
         added: d, (n + m,).
     """
     chains = convex.envelopes(problem.arcs, low, high, added)
-    return [*chains[: problem.size], *(np.array(_risen(arcs_of(c))) for c in chains[problem.size :])]
+    return [*chains[: problem.size], *(_risen(c) for c in chains[problem.size :])]
 
 
-def _risen(arcs: list[Arc]) -> list[Arc]:
-    """The largest convex chain from zero on that does not fall and is nowhere above the given one."""
-    rising = [a for a in arcs if a.rate(a.high) > 0.0 or (a.slope > 0.0 and a.rate(a.low) >= 0.0)]
-    if not rising:
-        end = arcs[-1]
-        return [Arc(0.0, end.high, end.high, end.at(end.high), 0.0, 0.0)]
-    first = rising[0]
-    turn = max(first.low, first.toucher(0.0)) if first.rate(first.low) < 0.0 else first.low
-    flat = [Arc(0.0, turn, turn, first.at(turn), 0.0, 0.0)] if turn > 0.0 else []
-    return [*flat, first._replace(low=turn), *rising[1:]]
+def _risen(chain: Array) -> Array:
+    """The largest convex chain from zero on that does not fall and is nowhere above the given one, (k, 6)."""
+    low, high, anchor, _, traction, slope = chain.T
+    begin, end = traction + slope * (low - anchor), traction + slope * (high - anchor)
+    rising = np.flatnonzero((end > 0.0) | ((slope > 0.0) & (begin >= 0.0)))
+    if not rising.size:
+        return np.array([_flat(chain[-1], float(high[-1]))])
+    rest = chain[rising[0] :].copy()
+    if begin[rising[0]] < 0.0:
+        rest[0, 0] = np.clip(anchor[rising[0]] - traction[rising[0]] / slope[rising[0]], *rest[0, :2])
+    turn = float(rest[0, 0])
+    return np.vstack([_flat(rest[0], turn), rest]) if turn > 0.0 else rest
+
+
+def _flat(arc: Array, end: float) -> list[float]:
+    """A constant arc from zero on that ends on a given one."""
+    anchor, value, traction, slope = map(float, arc[2:])
+    away = end - anchor
+    return [0.0, end, end, value + (traction + 0.5 * slope * away) * away, 0.0, 0.0]
 
 
 class Relaxation:
@@ -53,10 +61,11 @@ class Relaxation:
 
     Args:
         problem: the problem.
+        cut: whether convex programmes are to be cut short, since the search stops; the bounds hold for any point.
     """
 
-    def __init__(self, problem: ScalarProblem) -> None:
-        self.problem, self._thresholds = problem, problem.thresholds.bounds
+    def __init__(self, problem: ScalarProblem, cut: Callable[[], bool] = never) -> None:
+        self.problem, self._thresholds, self._cut = problem, problem.thresholds.bounds, cut
         self._share = CurvatureShare(problem)
 
     def undecided(self, low: Array, high: Array) -> Integers:
@@ -163,11 +172,11 @@ class Relaxation:
         a = problem.stiffness - np.diag(problem.diagonal(curvature.added)) + lent.matrix
         b = problem.force + lent.force
         if not len(problem.lengths):
-            found = minimise(a, b, stack, box.x, problem.thresholds.programmes)
+            found = minimise(a, b, stack, box.x, problem.thresholds.programmes, self._cut)
             bound = found.bound + lent.constant
             return found.x, bound, bound
-        programme = LengthProgramme.of(problem, a, b, list(map(arcs_of, chains)), curvature.added[problem.size :])
-        newton = LengthNewton(programme)
+        programme = LengthProgramme.of(problem, a, b, chains, curvature.added[problem.size :])
+        newton = LengthNewton(programme, self._cut)
         x = newton.minimiser(box.x)
         dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
         multipliers = newton.multipliers(x)

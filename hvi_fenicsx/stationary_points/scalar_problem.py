@@ -6,7 +6,7 @@ An argument is an unknown, or the length of a vector of unknowns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -101,6 +101,16 @@ class ScalarProblem:
         """All chains as arrays."""
         return ArcTable.of(self.chains)
 
+    def under(self, force: Array) -> ScalarProblem:
+        """The same laws, of which no array is made again, under another load.
+
+        Args:
+            force: f, (n,).
+        """
+        other = replace(self, force=force)
+        vars(other)["arcs"] = self.arcs
+        return other
+
     def energy(self, x: Array) -> float:
         """The energy at x."""
         laws = self.arcs.energy(self.arguments(x)).sum()
@@ -139,8 +149,9 @@ class ArcTable:
     @classmethod
     def of(cls, chains: Sequence[Chain]) -> ArcTable:
         """Stack chains."""
-        m = max(len(c) for c in chains)
-        table = np.array([[*c, *[Arc(INF, INF, 0.0, 0.0, 0.0, 0.0)] * (m - len(c))] for c in chains], dtype=float)
+        table = np.full((len(chains), max(len(c) for c in chains), 6), Arc(INF, INF, 0.0, 0.0, 0.0, 0.0))
+        for rows, arcs in zip(table, chains, strict=True):
+            rows[: len(arcs)] = arcs
         low, high, anchors, values, tractions, slopes = np.moveaxis(table, 2, 0)
         end, begin = np.where(np.isfinite(high), high, anchors), np.where(np.isfinite(low), low, anchors)
         return cls(

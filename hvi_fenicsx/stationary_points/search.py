@@ -20,7 +20,7 @@ from .point_list import PointList, StationaryPoint
 from .progress_words import Clock, all_in_words, counted
 from .scalar_problem import ScalarProblem
 from .search_lowest import bounded, lowest
-from .search_task import Task, stacked
+from .search_task import Task
 from .stationarity import Kind
 
 NO_POINT = "no equilibrium, proven"
@@ -39,7 +39,7 @@ def find(
     Args:
         problem: the problem.
         wanted: what is asked for.
-        stop: asked before each box.
+        stop: asked before each box, and inside long steps.
         report: told how far it is, in words.
         saved: what an earlier search of the same problem left.
         keep: keeps what is left while the search goes on.
@@ -76,10 +76,11 @@ def _only(problem: ScalarProblem) -> Found:
 
 
 def _left_of_all(search: Enumeration) -> Saved:
-    listed = [(c.low, c.high, c.weights) for c in (*search.undecided, *search.waiting)]
+    cells = [*search.undecided, *search.waiting]
+    boxes = {name: np.array([getattr(cell, name) for cell in cells]) for name in ("low", "high", "weights")}
     points = [p.x for p in sorted(search.points, key=lambda p: p.energy)]
     found = np.array(points) if points else np.empty((0, search.problem.size))
-    return {"lowest": np.array(False), "x": found, **stacked(listed)}
+    return {"lowest": np.array(False), "x": found, **boxes}
 
 
 def _fresh(task: Task) -> Enumeration:
@@ -99,12 +100,11 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
     return search
 
 
-def _started(task: Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> None:
-    """A few cells, which often are all; else what is found without a proof."""
-    search.start()
-    if not search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell) and not task.stop():
-        for x in systematic.candidates(search.problem, search.points.listed, _patience(task, search.points)):
-            search.enter(x)
+def _enter_candidates(task: Task, search: Enumeration) -> None:
+    """Keep what is found without a proof."""
+    over = _patience(task, search.points)
+    for x in systematic.candidates(search.problem, search.points.listed, over, task.stop):
+        search.enter(x)
 
 
 def _patience(task: Task, known: PointList) -> Callable[[], bool]:
@@ -128,15 +128,19 @@ def _all(task: Task) -> Found:
         task.report(all_in_words(now, clock))
         task.keep(lambda: _left_of_all(search))
 
+    few = False  # a few cells often are all
     if task.saved is None:
-        _started(task, search, tell)
-    complete = search.run(task.stop, tell) and not search.undecided
-    below = None if complete else bounded(task, [p.x for p in search.points])
+        search.start()
+        few = search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell)
+    below = None if few else bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)
+    if task.saved is None and not few:
+        _enter_candidates(task, search)
+    complete = search.run(task.stop, tell) and not search.undecided
     points = tuple(sorted(search.points, key=lambda p: p.energy))
     bound = points[0].energy if complete and points and task.wanted.bounded else None
-    bound = bound if below is None else below.progress().lower
+    bound = bound if complete or below is None else below.progress().lower
     return Found(
         points=points,
         complete=complete,
@@ -161,7 +165,7 @@ def _without_proof(task: Task) -> Found:
         return _none(cells)
     task.report("a search without a proof that nothing is missed")
     below = bounded(task, [])
-    known = [] if below is None else [below.x]
+    known = [*task.wanted.known, *([] if below is None else [below.x])]
     if (curved := task.wanted.curved) is None:
         points = tuple(systematic.near_stationary(problem, known, task.stop, task.wanted.exact))
     else:

@@ -10,14 +10,15 @@ from ..errors import SolverError
 from ..typing import Array
 from .found import Found, Saved, Start, Wanted
 from .length_kinds import kind_of
+from .level_set import Cut
 from .lowest import LowestSearch, Progress
 from .point_list import StationaryPoint
 from .progress_words import Clock, counted, lowest_in_words
 from .scalar_problem import ScalarProblem
-from .search_task import Task, stacked
+from .search_task import Task
 
-FALLS = "no lowest energy: it falls without limit as the load moves a body away"
-"""What is told where this is known."""
+STOPPED = "stopped before a first bound of the energy was known"
+"""What is told where there was no time for more."""
 
 
 def lowest(task: Task) -> Found:
@@ -27,16 +28,19 @@ def lowest(task: Task) -> Found:
         task: the search.
     """
     problem, saved = task.problem, task.saved
-    if task.wanted.falls:
-        return _no_lowest(FALLS)
-    search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted))
+    if task.wanted.no_lowest:
+        return _no_lowest(task.wanted.no_lowest)
+    search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted), cut=task.stop)
     try:
         if saved is None:
             _begin(search, task.wanted.start)
         else:
-            search.resume(zip(saved["low"], saved["high"], saved["weights"], strict=True), saved["x"][0])
+            boxes = (saved[name] for name in ("low", "high", "weights", "bound"))
+            search.resume(zip(*boxes, strict=True), saved["x"][0])
     except SolverError as error:
         return _no_lowest(str(error), search.boxes)
+    except Cut:
+        return _no_lowest(STOPPED)
 
     clock = Clock()
 
@@ -65,7 +69,7 @@ def _begin(search: LowestSearch, known: Start | None) -> None:
     if known is None:
         search.start()
     else:
-        search.resume([(known.low, known.high, np.zeros(len(search.problem.chains)))], known.x)
+        search.resume([(known.low, known.high, np.zeros(len(search.problem.chains)), known.bound)], known.x)
 
 
 def begun(
@@ -75,23 +79,23 @@ def begun(
     report: Callable[[str], None],
     known: Start | None = None,
 ) -> Start | None:
-    """A first search; None where there is no lowest energy.
+    """A first search; None where there is no lowest energy, or no time for a first bound.
 
     Args:
         problem: of polylines near the laws.
         gap: relative gap that the search may leave.
-        stop: asked before each box.
+        stop: asked before each box, and inside long steps.
         report: told how far it is, in words.
         known: where the lowest is, from polylines that were less near.
     """
-    search = LowestSearch(problem=problem, gap=gap)
+    search = LowestSearch(problem=problem, gap=gap, cut=stop)
     try:
         search.start() if known is None else search.start_within(known.low, known.high, known.x)
-    except SolverError:
+    except (SolverError, Cut):
         return None
     search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {counted(now.boxes, 'box', 'boxes')}"))
     low, high = search.region
-    return Start(x=search.x, energy=search.upper, low=low, high=high)
+    return Start(x=search.x, energy=search.upper, low=low, high=high, bound=search.progress().lower - problem.error)
 
 
 def _proof(search: LowestSearch, wanted: Wanted) -> Found:
@@ -124,7 +128,9 @@ def _lowest_point(search: LowestSearch, wanted: Wanted) -> StationaryPoint:
 
 
 def _left_of_lowest(search: LowestSearch) -> Saved:
-    return {"lowest": np.array(True), "x": search.x[None], **stacked(list(search.open_boxes()))}
+    low, high, weights, bound = (np.array(part) for part in zip(*search.open_boxes(), strict=True))
+    boxes = {"low": low, "high": high, "weights": weights, "bound": bound}
+    return {"lowest": np.array(True), "x": search.x[None], **boxes}
 
 
 def _open_in_words(gap: float, boxes: int) -> str:
@@ -141,12 +147,12 @@ def bounded(task: Task, points: list[Array]) -> LowestSearch | None:
         task: the search.
         points: that are known.
     """
-    if task.wanted.falls:
+    if task.wanted.no_lowest:
         return None
-    search = LowestSearch(problem=task.problem, gap=task.wanted.gap)
+    search = LowestSearch(problem=task.problem, gap=task.wanted.gap, cut=task.stop)
     try:
         search.start(points)
-    except SolverError:
+    except (SolverError, Cut):
         return None
     search.run(lambda: search.boxes > task.most_boxes or task.stop(), lambda _: None)
     return search

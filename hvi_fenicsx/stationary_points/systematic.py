@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -25,19 +24,25 @@ Exact = Callable[[Array], StationaryPoint | None]
 """The stationary point near a given one, (n,); None where there is none."""
 
 
-def candidates(problem: ScalarProblem, known: Sequence[StationaryPoint], stop: Callable[[], bool]) -> Iterator[Array]:
+def candidates(
+    problem: ScalarProblem, known: Sequence[StationaryPoint], stop: Callable[[], bool], cut: Callable[[], bool]
+) -> Iterator[Array]:
     """Points that may be stationary, one after the other.
 
     Args:
         problem: the problem.
         known: the points found, to which the caller adds those that are.
         stop: asked before each attempt.
+        cut: whether an attempt is to be cut short.
     """
     newton = None if len(problem.lengths) else DeflatedNewton(problem)
-    for start in _starts(problem):
+    for start in _starts(problem, cut):
         if stop():
             return
-        yield _descended(problem, start)
+        x = _descended(problem, start, cut)
+        if cut():
+            return
+        yield x
         if newton is not None:
             yield from _deflated(newton, start, known, stop)
     tried = 0
@@ -69,12 +74,12 @@ def near_stationary(
     Args:
         problem: the problem.
         known: points of low energy, each (n,).
-        stop: asked before each attempt.
+        stop: asked before each attempt, and inside long ones.
         exact: makes points near stationary ones exact, such as those of polylines near curved laws; None: they are
             taken as they are.
     """
     points, near, same = list[StationaryPoint](), list[Array](), problem.thresholds.systematic.same
-    for x in itertools.chain(known, candidates(problem, points, stop)):
+    for x in itertools.chain(known, candidates(problem, points, stop, stop)):
         if _far(problem, x) or any(_same(y, x, same) for y in near):
             continue
         near.append(x)
@@ -92,20 +97,20 @@ def _same(one: Array, other: Array, same: float) -> bool:
     return bool(np.max(np.abs(one - other)) < same * (1.0 + np.max(np.abs(other), initial=0.0)))
 
 
-def _starts(problem: ScalarProblem) -> Iterator[Array]:
+def _starts(problem: ScalarProblem, cut: Callable[[], bool]) -> Iterator[Array]:
     limits = problem.thresholds.systematic
-    first = _loaded(problem, limits.programmes[0])
+    first = _loaded(problem, limits.programmes[0], cut)
     yield first
-    yield from (_loaded(problem, programme) for programme in limits.programmes[1:])
+    yield from (_loaded(problem, programme, cut) for programme in limits.programmes[1:])
     yield from (factor * first for factor in limits.multiples)
     yield from _on_pieces(problem, first)
 
 
-def _loaded(problem: ScalarProblem, programme: Sequence[float]) -> Array:
+def _loaded(problem: ScalarProblem, programme: Sequence[float], cut: Callable[[], bool]) -> Array:
     """The state that a programme of loads leads to from rest."""
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     for factor in programme:
-        x = _descended(replace(problem, force=factor * problem.force), x)
+        x = _descended(problem.under(factor * problem.force), x, cut)
     return x
 
 
@@ -138,11 +143,11 @@ def _balanced(problem: ScalarProblem, pieces: Array) -> Array | None:
     return np.clip(x, np.maximum(problem.lower, -problem.far), np.minimum(problem.upper, problem.far))
 
 
-def _descended(problem: ScalarProblem, x: Array) -> Array:
+def _descended(problem: ScalarProblem, x: Array, cut: Callable[[], bool]) -> Array:
     far = problem.far
     low, high = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
     n = problem.size
-    return descend(problem, low, high, np.clip(x, low[:n], high[:n]))[0]
+    return descend(problem, low, high, np.clip(x, low[:n], high[:n]), cut=cut)[0]
 
 
 def _far(problem: ScalarProblem, x: Array) -> bool:

@@ -22,6 +22,7 @@ class PolylineThresholds:
         near: error of the tractions of curved laws, relative to their scale, in the search for all equilibria.
         rounded: widening of this error by rounding.
         samples: intervals of an interval between two nodes on which the difference is bounded.
+        few_samples: the same where so few decide.
         most_nodes: nodes are not made denser beyond this number.
         one_place: places nearer than this share of their distance from zero are one.
         off_drops: how far a bound is moved off a drop, relative to the displacements.
@@ -33,6 +34,7 @@ class PolylineThresholds:
     near: float = 5e-4
     rounded: float = 1e-12
     samples: int = 512
+    few_samples: int = 32
     most_nodes: int = 2_000
     one_place: float = 1e-12
     off_drops: float = 1e-11

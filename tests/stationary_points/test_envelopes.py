@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from curved import LAWS
@@ -11,6 +13,7 @@ from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.arcs import Chain, arcs_of, chain, energy
 from hvi_fenicsx.stationary_points.envelopes import envelopes
 from hvi_fenicsx.stationary_points.law_graphs import near_graph
+from hvi_fenicsx.stationary_points.majorants import majorants
 from hvi_fenicsx.stationary_points.scalar_problem import ArcTable
 
 
@@ -62,3 +65,24 @@ def test_an_interval_that_is_a_point_has_the_energy_there() -> None:
         (arc,) = arcs_of(envelopes(ArcTable.of([one]), np.array([x]), np.array([x]), np.array([0.4]))[0])
         assert (arc.low, arc.high) == (x, x)
         assert arc.at(x) == pytest.approx(energy(one, x) + 0.2 * x * x, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_majorants_are_equal_at_their_place_and_rise_by_what_the_laws_rise_on_the_way(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    laws = [chain(random_graph(random), 1.0, sign) for sign in (1.0, -1.0, 1.0)]
+    low, high = np.sort(random.uniform(-4.0, 4.0, (2, 3)), axis=0)
+    places = [[a.high for a in law[:-1] if lo < a.high < hi] for law, lo, hi in zip(laws, low, high, strict=True)]
+    x = np.array([random.choice([*joints, *ends]) for joints, *ends in zip(places, low, high, strict=True)])
+    for law, rows, *ends, at in zip(laws, majorants(ArcTable.of(laws), low, high, x), low, high, x, strict=True):
+        assert (rows[0, 0], rows[-1, 1]) == tuple(ends)
+        begin = next(a for a in law if at <= a.high and a.high > ends[0]).rate(at)
+        for y in random.uniform(*ends, 40):
+            near, far = sorted((at, y))
+            slopes = sum(max(a.slope, 0.0) * max(min(a.high, far) - max(a.low, near), 0.0) for a in law)
+            joints = [(a.high, max(b.rate(b.low) - a.rate(a.high), 0.0)) for a, b in itertools.pairwise(law)]
+            jumps = sum(rise for place, rise in joints if (near <= place < far if y > at else near < place < far))
+            found = next(a for a in arcs_of(rows) if y <= a.high)
+            assert found.rate(y) == pytest.approx(begin + np.sign(y - at) * (slopes + jumps), abs=1e-12)
+            assert found.at(y) >= energy(law, y) - 1e-12
+        assert energy(arcs_of(rows), at) == pytest.approx(energy(law, at), abs=1e-13)

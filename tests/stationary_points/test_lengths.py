@@ -260,7 +260,7 @@ def test_a_search_with_divided_rigid_motions_goes_on_where_it_was_stopped() -> N
     part.start()
     assert not part.run(lambda: part.boxes > 3, lambda _: None)
     left = list(part.open_boxes())
-    assert all(len(low) == problem.size + 3 + 1 for low, _, _ in left)  # unknowns, lengths, one rigid motion
+    assert all(len(low) == problem.size + 3 + 1 for low, *_ in left)  # unknowns, lengths, one rigid motion
     rest.resume(left, part.x)
     assert rest.run(lambda: False, lambda _: None)
     assert part.boxes < whole.boxes

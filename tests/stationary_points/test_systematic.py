@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_stationary_points import FAST, Case, found, oracle, problem_of
 
-from hvi_fenicsx.stationary_points import stationarity
+from hvi_fenicsx.stationary_points import stationarity, systematic
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.deflation import DeflatedNewton, Graphs
 from hvi_fenicsx.stationary_points.found import Wanted
@@ -26,7 +26,7 @@ def test_it_finds_all_points_of_small_floors(case: Case) -> None:
     """Their number and energies are those of the independent enumeration."""
     problem, unit = problem_of(case)
     search = Enumeration(problem=problem)
-    for x in candidates(problem, search.points.listed, never):
+    for x in candidates(problem, search.points.listed, never, never):
         search.enter(x)
     wanted = oracle(case).stationary()
     energies = sorted(p.energy * unit for p in search.points)
@@ -65,9 +65,15 @@ def test_newton_keeps_away_from_what_is_known() -> None:
 
 
 def test_a_search_that_is_stopped_has_what_was_found_without_proof_and_a_gap() -> None:
+    """It stops when the first cells are looked at, the lowest energy is bounded and a first point is looked for."""
     problem, unit = problem_of(FAST[0])
+    few = dataclasses.replace(problem.thresholds, lowest=dataclasses.replace(problem.thresholds.lowest, most_boxes=1))
+    problem = dataclasses.replace(problem, thresholds=few)
     least = oracle(FAST[0]).stationary()[0].energy / unit
-    one = find(problem, Wanted(), lambda: True, lambda _: None)
+    with pytest.MonkeyPatch.context() as patched:
+        begun: list[int] = []
+        patched.setattr(systematic, "candidates", lambda *_: begun.append(1) or iter(()))
+        one = find(problem, Wanted(), lambda: bool(begun), lambda _: None)
     assert (one.proven, one.complete) == (False, False)
     assert one.left
     assert one.lower_bound is not None
