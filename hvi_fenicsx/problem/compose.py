@@ -172,6 +172,7 @@ def _problem(
         contributions=tuple(contributions),
         held=held,
         part_facets=context.part_facets,
+        pieces=model.parts,
         interfaces=found,
     )
 

@@ -17,6 +17,7 @@ from dolfinx import fem
 
 from ..effects import Contribution, Effect
 from ..mesh import nodes
+from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
 from ..rigid import AnyBody
 from ..runtime import forms
@@ -158,6 +159,7 @@ class Problem:
         contributions: what each effect contributed.
         held: the dofs of each condition, with its part.
         part_facets: the local facets of each boundary part.
+        pieces: the boundary parts as they are stated, whatever the mesh.
         interfaces: where two bodies meet; their relative displacements are unknowns.
     """
 
@@ -177,6 +179,7 @@ class Problem:
     contributions: tuple[PlacedContribution, ...]
     held: tuple[tuple[str, Entities], ...]
     part_facets: Mapping[str, Entities]
+    pieces: Mapping[str, BoundaryPart]
     interfaces: tuple[Interface, ...] = ()
 
     @functools.cached_property

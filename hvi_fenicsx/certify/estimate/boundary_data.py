@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -92,9 +93,21 @@ class FacetSamples:
             value: on the boundary.
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
-        functions = spaces.simplex_functions(self.facets.degree, self.barycentric if at is None else at)
-        points = np.einsum("qn,fni->fqi", functions, self.nodes)  # on the curve where the facet is curved
+        points = self.points if at is None else self.places(at)
         return value.at(points.reshape(-1, 3)).reshape(points.shape[:2])
+
+    @functools.cached_property
+    def points(self) -> Array:
+        """The sample points, m, (f, q, 3)."""
+        return self.places(self.barycentric)
+
+    def places(self, at: Array) -> Array:
+        """Points of the facets, on the curve where a facet is curved, m, (f, q, 3).
+
+        Args:
+            at: in barycentric coordinates, (q, d).
+        """
+        return np.asarray(np.einsum("qn,fni->fqi", spaces.simplex_functions(self.facets.degree, at), self.nodes))
 
     def beyond_nodes(self, value: SpatialValue, at: Array | None = None) -> Array:
         """What interpolation between the nodes leaves of a value at points, SI, (f, q).

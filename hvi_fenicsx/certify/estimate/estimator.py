@@ -19,7 +19,7 @@ from ...system.levels import Levels
 from ...system.system import System
 from ...typing import Array
 from ..certificate import Examination
-from . import bubble_constraints, coupled_errors, data_errors, defect, dual_norm, nearly_incompressible
+from . import bubble_constraints, coupled_errors, data_errors, defect, dual_norm, nearly_incompressible, part_ends
 from .bubble_stiffness import BubbleStiffness
 from .contact_errors import ratio
 from .law_traces import ErrorField, LawTraces
@@ -95,6 +95,7 @@ def estimate(
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
+    cells += part_ends.squares(problem, traces.bubbles, inverse, thresholds)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.left_tolerance)

@@ -15,6 +15,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from ....typing import Array, Mask
 from ...reader import ContactPart, Result
 from ...units import Unit, quantity, unit_for
+from ..along_curve import along_curve
 from ..registry import picture
 from ..style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, VERMILION, WIDTH, area, figure, heading
 
@@ -40,9 +41,11 @@ def draw(result: Result, part: ContactPart) -> Figure:
         result: the result.
         part: the part of Γc, in the plane.
     """
-    whole, part = part, _worth_seeing(part)
+    whole, part = part, along_curve(result, part)
+    way = "" if part is whole else " along s"
+    part = _worth_seeing(part)
     length = unit_for(float(np.max(part["s"])), "m")
-    panels = list(_panels(result, part, length))
+    panels = list(_panels(result, part, length, way))
     fig = figure(HEADING + len(panels) * (PANEL + GAP) + FOOT)
     heading(fig, result, f"on “{part.name}”")
     lifted = _lifted_spans(part)
@@ -70,16 +73,16 @@ def _worth_seeing(part: ContactPart) -> ContactPart:
     return replace(part, columns=columns, vertices=part.vertices[near])
 
 
-def _panels(result: Result, part: ContactPart, length: Unit) -> Iterator[Callable[[Axes], None]]:
+def _panels(result: Result, part: ContactPart, length: Unit, way: str) -> Iterator[Callable[[Axes], None]]:
     """From the top: slip and friction, what a normal law acts on, the pressure."""
 
     def displacement(values: Array, words: str, direction: str) -> Callable[[Axes], None]:
         drops = _drops(result, part, direction)
         return partial(_displacement, part=part, values=values, drops=drops, words=words, length=length)
 
-    yield displacement(part.slip, "slip $u_t$", "slip")
+    yield displacement(part.slip, f"slip $u_t${way}", "slip")
     if result.resists(part.name, "slip", "separation"):
-        yield partial(_friction, part=part, result=result, length=length)
+        yield partial(_friction, part=part, result=result, length=length, way=way)
     if result.resists(part.name, "opening", "separation"):
         yield displacement(-part["u_n"], "opening $-u_n$", "opening")
     if result.resists(part.name, "penetration"):
@@ -138,7 +141,7 @@ def _listed(kinks: Array) -> str:
     )
 
 
-def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) -> None:
+def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit, way: str) -> None:
     values = part.friction
     unit = unit_for(_largest(values), "Pa")
     law, note = result.law(part.name) if result.summary.get("smoothing") else None, ""
@@ -149,7 +152,7 @@ def _friction(axes: Axes, *, part: ContactPart, result: Result, length: Unit) ->
         for bound in (low, high) if np.any(high > low) else (low,):
             axes.plot(part["s"] / length.size, bound / unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
     _line(axes, part, values, length, unit, GREEN)
-    _title(axes, f"friction $-\\sigma_t$ in {unit.name}", note or _pieces(axes, part, length, unit))
+    _title(axes, f"friction $-\\sigma_t${way} in {unit.name}", note or _pieces(axes, part, length, unit))
 
 
 def _pieces(axes: Axes, part: ContactPart, length: Unit, unit: Unit) -> str:

@@ -19,13 +19,11 @@ from ...units import Unit, quantity, unit_for
 from ..deformed import part_geometries
 from ..flat_parts import FlatPart, laid_flat
 from ..legend import STEPS, ticks
+from ..map_layout import MapLayout, layout
 from ..raster import shade
 from ..registry import picture
 from ..style import BLUE, GREEN, GREY, HEADING, INK, WIDTH, area, figure, heading, pressure_scale, shades
 
-WIDEST, TALLEST = 5.8, 2.75
-"""Inches: a map."""
-LEFT, GAP, FOOT = 0.95, 0.62, 0.75
 ROOMY = 0.55
 """Part of the width at which a map ends that leaves room for words beside it."""
 ARROWS, SHAFT = 13, 0.016
@@ -48,18 +46,18 @@ def draw(result: Result, part: ContactPart) -> Figure:
     if result.resists(part.name, "slip", "separation"):
         rows.append(("friction", "Pa", part.friction, _vectors(part, flat, "friction_t"), shades(GREEN)))
     rows.append(("contact pressure", "Pa", part.pressure, None, None))
-    width, height = _map_size(flat)
-    fig = figure(HEADING + len(rows) * (height + GAP) + FOOT)
+    places = layout(flat.ends[1] - flat.ends[0], len(rows))
+    fig = figure(places.tall)
     heading(fig, result, f"on “{part.name}”")
-    for above, (words, name, values, arrows, colours) in enumerate(reversed(rows)):
-        axes = area(fig, LEFT, FOOT + above * (height + GAP), width, height)
+    for i, (words, name, values, arrows, colours) in enumerate(rows):
+        axes = area(fig, *places.corner(i), places.width, places.height)
         unit = unit_for(float(np.nanmax(np.abs(values), initial=0.0)), name)
         _map(fig, axes, flat, np.asarray(values / unit.size)[flat.rows], colours, _symbol(words, unit))
         _grey_where_lifted(axes, flat, part)
         if arrows is not None:
             _arrows(axes, flat, arrows)
-        _frame(axes, flat, last=above == 0)
-    _notes(fig, result, part, flat)
+        _frame(axes, flat, leftmost=places.leftmost(i), lowest=places.lowest(i))
+    _notes(fig, result, part, flat, places)
     fig.text(1 - 0.3 / WIDTH, 0.25 / fig.get_figheight(), flat.how, size=12, color=GREY, ha="right")
     return fig
 
@@ -74,12 +72,6 @@ def _vectors(part: ContactPart, flat: FlatPart, column: str) -> Array:
     """
     values = np.nan_to_num(np.column_stack([part[f"{column}1"], part[f"{column}2"]]))
     return flat.along(np.einsum("rk,rkd->rd", values, tangents(part.normals)))
-
-
-def _map_size(flat: FlatPart) -> tuple[float, float]:
-    wide, tall = np.maximum(flat.ends[1] - flat.ends[0], 1e-12)
-    scale = min(WIDEST / wide, TALLEST / tall)
-    return float(scale * wide), max(float(scale * tall), 0.6)
 
 
 def _symbol(words: str, unit: Unit) -> str:
@@ -146,7 +138,7 @@ def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     axes.quiver(*np.meshgrid(x, y), *ways, **style, units="inches", width=SHAFT, color=INK, alpha=0.85)
 
 
-def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
+def _frame(axes: Axes, flat: FlatPart, *, leftmost: bool, lowest: bool) -> None:
     left, right, bottom, top = _extent(flat)
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
@@ -155,9 +147,10 @@ def _frame(axes: Axes, flat: FlatPart, *, last: bool) -> None:
     for axis, intervals in ((axes.xaxis, _across(axes)), (axes.yaxis, _intervals(axes))):
         axis.set_major_locator(MaxNLocator(intervals, steps=STEPS))
         axis.set_major_formatter(lambda value, _: f"{value / unit.size:.4g}".replace("-", "−"))
-    axes.set_ylabel(f"{flat.names[1]} in {unit.name}")
-    axes.tick_params(labelbottom=last, bottom=last)
-    if last:
+    axes.tick_params(labelleft=leftmost, left=leftmost, labelbottom=lowest, bottom=lowest)
+    if leftmost:
+        axes.set_ylabel(f"{flat.names[1]} in {unit.name}")
+    if lowest:
         axes.set_xlabel(f"{flat.names[0]} in {unit.name}")
 
 
@@ -171,12 +164,12 @@ def _across(axes: Axes) -> int:
     return max(1, min(6, int(axes.get_window_extent().width / axes.figure.dpi / 0.7)))
 
 
-def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> None:
+def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart, places: MapLayout) -> None:
     """Where the law drops, as a line on the map of the slip, and what grey means; both said there."""
     law, multipliers, said = result.law(part.name), result.multipliers(part), []
     stretch = np.ones(len(part.slip)) if multipliers is None else multipliers[1]
     slip, constant = part.slip / stretch, np.ptp(stretch) == 0.0
-    axes = fig.axes[-2]  # the map on top, which was drawn last, before its bar
+    axes = fig.axes[0]  # the map of the slip
     kinks = law.concave.kinks if law is not None else np.empty(0)
     for kink in kinks[kinks > 0.0]:
         at = f"at {quantity(float(kink * stretch[0]), 'm')}" if constant else "at lengths that change"
@@ -188,15 +181,16 @@ def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart) -> No
             said.append(f"the law drops {at}, not reached")
     if part.idle.any():
         said.append(f"grey: lifted, up to {quantity(part.largest_gap, 'm')}")
-    _say(fig, axes, said[-2:])
+    _say(fig, axes, said[-2:], places.columns)
 
 
-def _say(fig: Figure, axes: Axes, said: list[str]) -> None:
-    """Beside the map and its bar if there is room, else above it."""
-    box = axes.get_position()
+def _say(fig: Figure, axes: Axes, said: list[str], columns: int) -> None:
+    """Below the heading of two columns; of one beside the map and its bar if there is room, else above it."""
+    box, tall = axes.get_position(), fig.get_figheight()
     style: dict[str, Any] = {"size": 12, "color": GREY}
-    if box.x1 < ROOMY:
+    if columns == 1 and box.x1 < ROOMY:
         lines = [line for words in said for line in textwrap.wrap(words, 24)]
         fig.text(box.x1 + 0.13, box.y1, "\n".join(lines), va="top", linespacing=1.4, **style)
     else:
-        fig.text(1 - 0.3 / WIDTH, box.y1 + 0.007, "; ".join(said), ha="right", va="bottom", **style)
+        above = box.y1 + 0.007 if columns == 1 else 1 - (HEADING + 0.15) / tall
+        fig.text(1 - 0.3 / WIDTH, above, "; ".join(said), ha="right", va="bottom", **style)
