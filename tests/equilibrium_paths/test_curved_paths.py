@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from condensed import bonds, chain, graph, problem
+from scipy.optimize import brentq
 from test_exact_paths import SOFTENING, bar, largest_imbalance, peeled, random_problem, spring
 
 from hvi_fenicsx.effects import Direction
@@ -504,6 +505,21 @@ def test_a_jump_lands_nowhere_from_where_passages_go_round(monkeypatch: pytest.M
     assert jump._landed(elsewhere) is not None
     monkeypatch.setattr(passage, "Crossing", GoingRound)
     assert jump._landed(elsewhere) is None
+
+
+@pytest.mark.parametrize("excess", [1e-2, 1e-3, 1e-6])
+def test_a_jump_that_is_shorter_than_a_step_is_seen(excess: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bond that falls a little faster than its spring k: k λ = k x + exp(-x) is 1 at rest, and again at 2 excess.
+
+    No motion in time is wanted, which would crawl: hardly any force drives it.
+    """
+    monkeypatch.setattr(Jump, "_released", lambda self: pytest.fail("a motion in time"))
+    spring = 1.0 / (1.0 + excess)
+    _, states = path(problem(spring, spring, bonds(Exponential(1.0, 0.0, 1.0), 0)), programme=(1.5,))
+    jump = next(state for state in states if state.event is Event.JUMP)
+    assert jump.factor == pytest.approx(1.0 + excess, rel=1e-12)
+    there = brentq(lambda x: spring * x + np.expm1(-x), excess, 10.0 * excess, xtol=1e-15)
+    assert jump.x[0] == pytest.approx(there, abs=1e-10)  # where the force changes by 1e-10 of the excess
 
 
 class TurningBack(GoingRound):

@@ -86,7 +86,7 @@ class Events(Equations):
             end = float((self.sites.high if high else self.sites.low)[site])
             guess = start.y + shares[site] * (y - start.y)
             return self._moved(Outcome.END, site, self.correct(guess, self.at_end(site, end)))
-        return self._turning(move)
+        return self._returning(move, aim) or self._turning(move)
 
     def _shares(self, move: Move) -> Array:
         """The part of the step after which each site passed an end; 1 where it did not, (m,)."""
@@ -134,6 +134,12 @@ class Events(Equations):
         middle_up = after.values.s[k] - self.sites.low[k] > self.sites.high[k] - after.values.s[k]
         return bool(rate > 0.0) == bool(middle_up)
 
+    def _returning(self, move: Move, aim: float) -> Move | None:
+        """The step up to where the factor is back at its aim, from which it set out; None: it is not."""
+        began = self.here.y[-1] == aim / self.unit and move.outcome is not Outcome.FACTOR
+        back = (move.after.y[-1] - self.here.y[-1]) * self.here.tangent[-1] < 0.0
+        return self._up_to(move, Outcome.FACTOR, None) if began and back else None
+
     def _turning(self, move: Move) -> Move | None:
         """The step up to where the factor, or a bond with memory, turned on the way; None: none did."""
         if not self.sites.bent or move.outcome in (Outcome.FOLD, Outcome.TURNED):
@@ -142,7 +148,7 @@ class Events(Equations):
         return None if turned is None else self._up_to(move, *turned)
 
     def _up_to(self, move: Move, outcome: Outcome, site: int | None) -> Move | None:
-        """The step up to where a rate, of the factor or of a site, is zero; None: it is too short."""
+        """The step up to where a rate of the factor, now or in the mean, or of a site is 0; None: it is too short."""
         whole = float(self.here.tangent @ (move.after.y - self.here.y))
         if whole <= self.limits.shortest:
             return None
@@ -171,9 +177,16 @@ class Events(Equations):
         return (Outcome.TURNED, int(back[0])) if back.size else None
 
     def _rate_of(self, outcome: Outcome, site: int | None) -> Callable[[Place], float]:
+        if outcome is Outcome.FACTOR:
+            return self._mean_rate
         if outcome is Outcome.FOLD or site is None:
             return lambda place: float(place.tangent[-1])
         return lambda place: float(self.sites.rates(place.y[:-1], place.tangent[:-1])[site])
+
+    def _mean_rate(self, place: Place) -> float:
+        """How the factor changes on the way from here to a place of the same step."""
+        way = float(self.here.tangent @ (place.y - self.here.y))
+        return float((place.y[-1] - self.here.y[-1]) / way if way > 0.0 else self.here.tangent[-1])
 
     def _at(self, way: float, known: Mapping[float, Place]) -> Place:
         """The point of the curve in the plane across the present tangent at a distance, between those known."""
