@@ -97,7 +97,7 @@ class Curve(Events):
         rates = self.sites.rates(self.here.y[:-1], self.here.tangent[:-1])
         largest = float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, sites.high, sites.low)
-        there = np.abs(ends - s) <= sites.allowances(self.here.values)
+        there = np.abs(ends - s) <= sites.allowances(self.here.values, rates / largest)
         moves = np.abs(rates) > np.where(there & sites.bent, self.limits.undecided, self.limits.standing) * largest
         found = np.full(len(sites), np.inf)
         found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)
@@ -166,9 +166,6 @@ class Curve(Events):
     def _settle_at(self, y: Array) -> None:
         self.here = self._at_place(y, self.here.tangent, self.sites.values(y[:-1]))
 
-    def _moved_by(self, move: Move) -> float:
-        return float(np.max(np.abs(move.after.y - move.before.y)))
-
     def _checked(self, move: Move, way: float) -> Move:
         """The step, if it did not leave the curve."""
         if not self.sites.bent:
@@ -180,7 +177,7 @@ class Curve(Events):
         if not short and disagreement > 1.0:
             self.length *= max(0.3, 1.6 * disagreement**-0.2)  # halved as well where it is refused
             raise Refused
-        agreed = self._moved_by(move) * 0.8 * max(disagreement, 1e-4) ** -0.2
+        agreed = move.size * 0.8 * max(disagreement, 1e-4) ** -0.2
         if move.outcome is not Outcome.STEP:  # an event that is near says nothing of the next step's length
             agreed = max(agreed, self.length)
         self.length = min(self._next, agreed)
