@@ -97,7 +97,7 @@ class Curve(Events):
         rates = self.sites.rates(self.here.y[:-1], self.here.tangent[:-1])
         largest = float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, sites.high, sites.low)
-        there = np.abs(ends - s) <= sites.allowances(self.here.values, rates / largest)
+        there = np.abs(ends - s) <= sites.allowances(self.here.values, rates, largest)
         moves = np.abs(rates) > np.where(there & sites.bent, self.limits.undecided, self.limits.standing) * largest
         found = np.full(len(sites), np.inf)
         found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)

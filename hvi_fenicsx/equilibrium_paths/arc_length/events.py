@@ -97,7 +97,7 @@ class Events(Equations):
         """The part of the step after which each site passed an end; 1 where it did not, (m,)."""
         sites, s0, s1 = self.sites, move.before.values.s, move.after.values.s
         found, way = np.ones(len(sites)), np.where(s1 != s0, s1 - s0, 1.0)
-        allowed = sites.allowances(move.after.values, (s1 - s0) / (move.size or 1.0))
+        allowed = sites.allowances(move.after.values, s1 - s0, move.size)
         above, below = s1 > np.maximum(sites.high + allowed, s0), s1 < np.minimum(sites.low - allowed, s0)
         for ends, beyond in ((sites.high, above), (sites.low, below)):
             found[beyond] = np.clip((ends[beyond] - s0[beyond]) / way[beyond], 0.0, 1.0 - 1e-12)

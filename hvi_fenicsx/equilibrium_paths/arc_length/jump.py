@@ -212,7 +212,9 @@ def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) 
 def _into_cell(sites: Sites, here: Place, motion: Array) -> float:
     """How far a motion takes the sites at ends of their segments into these; 0 where there are none."""
     s, moves = here.values.s, here.values.moves > 0.0
-    allowed = sites.allowances(here.values, sites.rates(here.y[:-1], here.tangent[:-1]) / np.max(np.abs(here.tangent)))
+    allowed = sites.allowances(
+        here.values, sites.rates(here.y[:-1], here.tangent[:-1]), float(np.max(np.abs(here.tangent)))
+    )
     low, high = moves & (s <= sites.low + allowed), moves & (s >= sites.high - allowed)
     return float((low * 1.0 - high) @ sites.along(here.values, motion))
 

@@ -219,7 +219,7 @@ class Crossing:
 
     def _approach(self) -> _Approach:
         sites, values, rates = self._sites, self._curve.here.values, self._rates()
-        allowed = sites.allowances(values, rates / np.max(np.abs(self._curve.here.tangent)))
+        allowed = sites.allowances(values, rates, float(np.max(np.abs(self._curve.here.tangent))))
         low, high = values.s <= sites.low + allowed, values.s >= sites.high - allowed
         comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | sites.turning_back(values, rates)
         return _Approach(rates=rates, near=low | high, comes=comes)

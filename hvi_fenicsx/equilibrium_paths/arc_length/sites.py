@@ -113,18 +113,19 @@ class Sites(SiteGraphs):
         """
         return np.asarray(np.abs(values.lengths) <= self.thresholds.curve.rounding * self.length)
 
-    def allowances(self, values: Values, rates: Array) -> Array:
+    def allowances(self, values: Values, rates: Array, fastest: float) -> Array:
         """How near to an end of its segment a site is there, (m,): on a steep segment a short way is a large force.
 
         Of a site that stands but for rounding the way says nothing.
 
         Args:
             values: of the sites.
-            rates: how fast s changes beside the fastest coordinate, (m,).
+            rates: how fast s changes, (m,).
+            fastest: how fast the fastest coordinate does.
         """
         curve, size = self.thresholds.curve, 1.0 + np.abs(values.s)
         steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
-        steep[np.abs(rates) <= curve.undecided] = 1.0
+        steep[np.abs(rates) <= curve.undecided * fastest] = 1.0
         return np.asarray(np.maximum(curve.rounding / steep, curve.left) * size)
 
     def turning_back(self, values: Values, rates: Array) -> Mask:
