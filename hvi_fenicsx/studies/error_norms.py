@@ -177,10 +177,7 @@ def _resultant(
     for name, part in reference.fields.parts.items():
         values, others, true = (s.parts[name][column] for s in (found, other, reference.own))
         away = values - others
-        if away.ndim == 1:
-            difference = difference + part.weights @ (away[:, None] * part.normals)
-        else:  # tangents may turn along a part: of -σ_t the components along them are added
-            difference = difference + np.pad(part.weights @ away, (0, 1))
+        difference = difference + part.weights @ (away[:, None] * part.normals if away.ndim == 1 else away)
         size += float(part.weights @ _length(true))
     return _ratio(float(np.linalg.norm(difference)), size)
 

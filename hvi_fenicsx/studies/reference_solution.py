@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from ..geometry import tangents
 from ..typing import Array, Mask
 from . import interpolation
 from .interpolation import SurfaceTransfer
@@ -102,7 +103,11 @@ def _width(part: PartFields) -> float:
 
 def _jumps(part: PartFields) -> Array:
     """The middles of the facets on which the slip passes a drop of the law; (k, d)."""
-    slip = part.slip[:, 0] if part.slip.shape[1] == 1 else np.linalg.norm(part.slip, axis=1)
-    beyond = (slip[:, None] - part.drops)[part.facets]
+    along = tangents(part.normals)[:, 0]
+    size = np.linalg.norm(part.slip, axis=1)
+    signed = np.sum(part.slip * along, axis=1) if part.slip.shape[1] == 2 else size
+    turned = np.sum(along[part.facets[:, 0]] * along[part.facets[:, -1]], axis=1) < 0.0
+    slip = np.where(turned[:, None], size[part.facets], signed[part.facets])
+    beyond = slip[:, :, None] - part.drops[part.facets]
     passed = np.any((beyond.min(axis=1) <= 0.0) & (beyond.max(axis=1) >= 0.0), axis=1)
     return np.asarray(part.points[part.facets[passed]].mean(axis=1))

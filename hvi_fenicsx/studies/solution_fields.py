@@ -9,6 +9,7 @@ from pathlib import Path
 import basix
 import numpy as np
 
+from ..geometry import tangents
 from ..mesh import nodes
 from ..report import solution_arrays
 from ..report.solution_arrays import PartArrays, SolutionArrays
@@ -25,8 +26,8 @@ class PartFields:
         points: the nodes, m, (m, d).
         weights: lumped lengths or areas, m or m², (m,).
         normals: outward unit normals, (m, d).
-        slip: u_t, m, (m, d-1).
-        friction: -σ_t, N/m², (m, d-1); zero where no law acts along the part, since the residual there is rounding.
+        slip: u_t, m, as vectors, (m, d): tangents may turn their sign from node to node of a curved part.
+        friction: -σ_t, N/m², likewise; zero where no law acts along the part, since the residual there is rounding.
         pressure: σ_n, negative in compression, N/m², (m,); zero where neither contact nor a law acts across the part.
         contact: 1 where the part is closed, (m,).
         drops: the slips at which the friction law drops at each node, m, (m, j).
@@ -100,15 +101,16 @@ def _part(part: PartArrays, points: Array, ends: Integers) -> PartFields:
     order = np.argsort(part.vertices)
     facets, quadratic = _in_order(part.facets, ends)
     columns = {name: values[order] for name, values in part.columns.items()}
-    bounded, slip = "contact" in columns, _tangential(columns, "u_t")
+    normals, bounded = part.normals[order], "contact" in columns
+    slip = _tangential(columns, "u_t", normals)
     return PartFields(
         facets=np.searchsorted(part.vertices[order], facets),
         quadratic=np.searchsorted(part.vertices[order], quadratic),
         points=points[part.vertices[order]],
         weights=part.weights[order],
-        normals=part.normals[order],
+        normals=normals,
         slip=slip,
-        friction=_tangential(columns, "friction_t") if "friction_t1" in columns else np.zeros_like(slip),
+        friction=_tangential(columns, "friction_t", normals) if "friction_t1" in columns else np.zeros_like(slip),
         pressure=columns["sigma_n"] * (bounded or "branch_n" in columns),
         contact=columns["contact"] if bounded else np.zeros(len(order)),
         drops=part.drops[order],
@@ -158,8 +160,9 @@ def _keys(facets: Integers, count: int) -> Integers:
     return np.asarray(np.sort(facets, axis=1) @ count ** np.arange(facets.shape[1]))
 
 
-def _tangential(columns: Mapping[str, Array], name: str) -> Array:
-    return np.column_stack([columns[f"{name}{i}"] for i in (1, 2) if f"{name}{i}" in columns])
+def _tangential(columns: Mapping[str, Array], name: str, normals: Array) -> Array:
+    components = np.column_stack([columns[f"{name}{i}"] for i in (1, 2) if f"{name}{i}" in columns])
+    return np.asarray(np.einsum("mk,mkd->md", components, tangents(normals)))
 
 
 def width(points: Array, cells: Integers) -> float:

@@ -174,14 +174,43 @@ def test_the_energy_norm_is_that_of_the_closed_form() -> None:
 
 def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out(reference: ReferenceSolution) -> None:
     here, (name, part) = reference.fields, next(iter(reference.fields.parts.items()))
-    slips = np.where(part.points[:, 0] < 0.5, 1.0, 3.0)[:, None]
+    slips = np.where(part.points[:, 0] < 0.5, 1.0, 3.0)[:, None] * [1.0, 0.0]
     dropped = ReferenceSolution(
-        replace(here, parts={name: replace(part, slip=slips, drops=np.array([2.0]))}), reference.stiffness
+        replace(here, parts={name: replace(part, slip=slips, drops=np.full((len(slips), 1), 2.0))}), reference.stiffness
     )
     near = dropped.near_jump(name, dropped.own)
     jump = 0.5 - 1 / 16  # the slip passes the drop between the vertices at 3/8 and 1/2
     np.testing.assert_array_equal(near, np.abs(part.points[:, 0] - jump) <= 2 / 8)
     assert dropped.left_out(dropped.own) == pytest.approx(float(part.weights[near].sum()))
+
+
+def turning_disk(size: float) -> Scene:
+    """A disk that a torque turns against springs all round: the slip is the same everywhere."""
+    spring = {"law": "linear_spring", "stiffness": 1e9}
+    return Scene.model_validate(
+        {
+            "domain": {"shape": "disk", "radius": 1.0, "mesh_size": size},
+            "material": {"model": "plane_strain", "youngs_modulus": 1e9, "poisson_ratio": 0.3},
+            "body": {"force": ["-1e3*(y - 1)", "1e3*x"]},
+            "boundary": {
+                "rim": {"on": ["lower_arc", "upper_arc"], "contact": {"lower": 0.0, "upper": 0.0}, "friction": spring}
+            },
+        }
+    )
+
+
+def test_slips_of_a_curved_part_are_compared_as_vectors() -> None:
+    """Its tangents turn their sign four times: between two such nodes a slip along them passes zero."""
+    fine = solve(turning_disk(0.1), MPI.COMM_SELF)
+    matrix, known = stiffness(fine), taken(fine)
+    assert matrix is not None
+    exact = ReferenceSolution(known, matrix)
+    found = errors(exact, exact.transfer(taken(turning_disk(0.23))))
+    for name in ("u_t_l2", "u_t_max", "friction_l1", "friction_l2", "friction_max"):
+        error = found[name]
+        assert error is not None
+        assert error < 0.03, name
+    assert exact.left_out(exact.own) == 0.0
 
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 1.6])

@@ -43,7 +43,7 @@ class MapLayout:
 
     @property
     def tall(self) -> float:
-        """Of the picture, inches."""
+        """The height of the picture, inches."""
         return HEADING + self.rows * (self.height + GAP) + FOOT
 
     def corner(self, i: int) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,12 +41,19 @@ def regions(result: Result) -> list[Region]:
     for i, cells in enumerate(named.values()):
         member[cells, i] = True
     kinds, of_cell = np.unique(member, axis=0, return_inverse=True) if len(named) else (member[:0], np.empty(0))
-    names = [" and ".join(name for name, here in zip(named, kind, strict=True) if here) for kind in kinds]
+    names = [_told([name for name, here in zip(named, kind, strict=True) if here], named) for kind in kinds]
     order = sorted(range(len(kinds)), key=lambda k: names[k])
     return [
         Region(names[k], np.flatnonzero(of_cell.ravel() == k), TINTS[place % len(TINTS)])
         for place, k in enumerate(order)
     ]
+
+
+def _told(names: Sequence[str], cells: Mapping[str, Integers]) -> str:
+    """Regions that share cells, in words: of a body `upper` and its `upper.core` the smaller one, or the body."""
+    pairs = [(body, name) for name in names if (body := name.rpartition(".")[0]) in names]
+    left_out = {name if len(cells[name]) == len(cells[body]) else body for body, name in pairs}
+    return " and ".join(name for name in names if name not in left_out)
 
 
 def keys(found: list[Region]) -> list[Artist]:

@@ -86,7 +86,7 @@ def draw(result: Result) -> Figure:
     for one in words:
         one.draw(axes)
     say(fig, body)
-    legend(fig, [*keys(shown), *_apart(shown), *region_keys(areas), *inside(result)])
+    legend(fig, [*keys(shown), *region_keys(areas), *_apart(shown), *inside(result)])
     return fig
 
 
