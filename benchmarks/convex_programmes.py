@@ -37,10 +37,11 @@ def write(path: Path) -> None:
 
     ours, rows = relaxation.minimise, []
 
-    def recorded(a: Any, b: Any, chains: Any, start: Any) -> Any:
+    def recorded(a: Any, b: Any, chains: Any, start: Any, *further: Any) -> Any:
         begin = time.process_time()
-        found = ours(a, b, chains, start)
-        rows.append((a, b, chains, found.value, time.process_time() - begin))
+        found = ours(a, b, chains, start, *further)
+        seconds, x = time.process_time() - begin, found.x
+        rows.append((a, b, chains, 0.5 * x @ a @ x - b @ x + chains.energy(x).sum(), seconds))
         return found
 
     relaxation.minimise = recorded
