@@ -212,19 +212,26 @@ class LengthCells:
         return is_positive(problem.stiffness[np.ix_(free, free)] + np.diag(total[free]), problem)
 
     def _point_in(self, ranges: Ranges, cell: Box, known: PointList) -> StationaryPoint | None:
-        """A stationary point in a cell: one that is known, or that a descent finds."""
-        inside = [p for p in known if self._is_in(ranges, p.x)]
-        if inside:
-            return inside[0]
+        """A stationary point in a cell: one that is known, or that a descent finds; none at a drop of a law."""
         problem = self._problem
-        low, high = (np.concatenate([ranges.x[k], problem.lengths.within(*ranges.x)[k]]) for k in (0, 1))
-        point = self.point(descend(problem, low, high, np.clip(cell.x, *ranges.x))[0])
-        return point if point is not None and self._is_in(ranges, point.x) else None
+        for point in known:
+            if self._is_alone(ranges, point.x):
+                return point
+        ends = problem.with_lengths(*ranges.x)
+        point = self.point(descend(problem, *ends, np.clip(cell.x, *ranges.x))[0])
+        return point if point is not None and self._is_alone(ranges, point.x) else None
 
-    def _is_in(self, ranges: Ranges, x: Array) -> bool:
-        near = self._problem.thresholds.points.same * (1.0 + float(np.max(np.abs(x), initial=0.0)))
-        places, ends = self._problem.arguments(x), np.concatenate([ranges.x, ranges.r], axis=1)
-        return bool(np.all((places >= ends[0] - near) & (places <= ends[1] + near)))
+    def _is_alone(self, ranges: Ranges, x: Array) -> bool:
+        """Whether a point is in a cell, and there is one at most in the cell and what is very near the point."""
+        near = self._problem.thresholds.points.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+        about = list[Array]()
+        for ends, place in ((ranges.x, x), (ranges.r, self._problem.lengths.of(x))):
+            if np.any((place < ends[0] - near) | (place > ends[1] + near)):
+                return False
+            wide = np.where(ends[0] < ends[1], near, 0.0)
+            about.append(ends + np.array([[-1.0], [1.0]]) * wide)
+        r = np.where(ranges.r <= near, ranges.r, about[1])  # none is below zero
+        return self._has_one_at_most(replace(ranges, x=about[0], r=r))
 
 
 def _of_components(ranges: Ranges, cell: Box) -> Box:
