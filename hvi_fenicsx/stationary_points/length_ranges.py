@@ -107,7 +107,7 @@ class Ranges:
     @cached_property
     def secants(self) -> Array:
         """κ = g/r, (2, m)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             wide = np.stack([self.g[0] / self.r[1], self.g[1] / self.r[0]])
             k = self.arc_secants
         wide = np.where(np.isnan(wide), np.array([[0.0], [INF]]), wide)
@@ -121,7 +121,7 @@ class Ranges:
         meets = arcs.meets(low, high) | ((low == high)[:, None] & (begin <= end))
         offset = arcs.tractions - arcs.slopes * arcs.anchors
         offset = np.where(np.abs(offset) <= arcs.rounding[:, None], 0.0, offset)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             ends = np.stack([arcs.slopes + np.where(offset == 0.0, 0.0, offset / at) for at in (begin, end)])
         least = np.where(meets, ends.min(axis=0), INF).min(axis=1)
         return np.stack([least, np.where(meets, ends.max(axis=0), -INF).max(axis=1)])
@@ -129,7 +129,7 @@ class Ranges:
     @cached_property
     def tractions(self) -> Array:
         """The components of the tractions, (2, m, 3)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             low, high = self.felt
             short, far = self.r[0][:, None], self.r[1][:, None]
             first = np.where(low < 0.0, low / short, low / far)

@@ -160,13 +160,14 @@ class SmoothSystem:
         before = np.inf
         for _ in range(limits.newton_steps):
             rest, error = self._rest(u)
+            derivative = self._derivative(np.stack([u, u]))[0]
+            if not np.all(np.isfinite(derivative)):
+                return None
             try:
-                step = np.linalg.solve(self._derivative(np.stack([u, u]))[0], -rest)
+                step = np.linalg.solve(derivative, -rest)
             except np.linalg.LinAlgError:
                 return None
             size = float(np.max(np.abs(step), initial=0.0))
-            if not np.isfinite(size):
-                return None
             if np.all(np.abs(rest) <= error) and size >= 0.5 * before:
                 return u
             u, before = u + step, size
@@ -217,7 +218,7 @@ class SmoothSystem:
 
     def _secants(self, own: Array) -> Array:
         """κ, (..., l), of r or κ."""
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(np.where(self.drops, own, self.b + self.a / own))
 
     def _parts(self, x: Array) -> tuple[Array, Array]:
@@ -236,7 +237,7 @@ class SmoothSystem:
         sizes = np.abs(self.slopes * x) + np.abs(self.offsets) + np.abs(problem.stiffness) @ np.abs(x)
         places = lengths.unknowns[self.curved][self.seen]
         laws[places] += (kappa[:, None] * weighed)[self.seen]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             parts = np.where(self.drops, np.abs(kappa), np.abs(self.b) + np.abs(self.a / own))
         sizes[places] += (parts[:, None] * np.abs(weighed))[self.seen]
         r = np.where(self.drops, self.r, own)
@@ -252,7 +253,7 @@ class SmoothSystem:
         x = np.stack([self.x(end) for end in ends])
         own = ends[:, k:]
         kappa = np.sort(self._secants(own), axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             bent = np.where(self.drops, 1.0, np.sort(-self.a / own**2, axis=0))
         weighed = np.sort(self._parts(x)[1], axis=0)
         whole = np.zeros((2, n + len(self.curved), n + len(self.curved)))
@@ -273,9 +274,9 @@ class SmoothSystem:
         if np.any(self.ends[0, len(self.free) :][~self.drops] <= 0.0):
             return None
         low, high = self._derivative(self.ends)
-        middle = 0.5 * (low + high)
-        if not np.all(np.isfinite(middle)):
+        if not np.all(np.isfinite([low, high])):
             return None
+        middle = 0.5 * (low + high)
         half = np.maximum(high - middle, middle - low) + 4.0 * EPSILON * np.abs(middle)
         try:
             inverse = np.linalg.inv(middle)
@@ -325,7 +326,7 @@ def is_positive(matrix: Array, problem: ScalarProblem) -> bool:
         problem: with the share.
     """
     try:
-        pivots = np.diag(cholesky(matrix, lower=True))
+        pivots = np.diag(cholesky(matrix, lower=True)) if np.all(np.isfinite(matrix)) else np.array([-1.0])
     except LinAlgError:
         return False
     return bool(pivots.min(initial=np.inf) > problem.thresholds.cells.regular * pivots.max(initial=0.0))
