@@ -32,8 +32,19 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    arcs = [_bond(arc, weight, sign) for arc in graph.arcs()]
-    return tuple(arcs if sign > 0 else arcs[::-1])
+    return scaled(tuple(graph.arcs()), weight, sign)
+
+
+def scaled(arcs: Chain, weight: float, sign: float) -> Chain:
+    """The energy weight * φ(sign * x) of a chain φ.
+
+    Args:
+        arcs: the chain.
+        weight: a factor.
+        sign: +1 or -1 (or a factor of the argument).
+    """
+    bonds = [_bond(arc, weight, sign) for arc in arcs]
+    return tuple(bonds if sign > 0 else bonds[::-1])
 
 
 def _bond(arc: Arc, weight: float, sign: float) -> Arc:

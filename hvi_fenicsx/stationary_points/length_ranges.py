@@ -15,7 +15,7 @@ import numpy as np
 
 from ..laws.arc import Arc
 from ..typing import Array, Mask
-from .arcs import INF, Chain
+from .arcs import FREE, INF, Chain, scaled
 from .boxes import Box
 from .lengths import Lengths
 from .scalar_problem import ArcTable, ScalarProblem
@@ -145,6 +145,12 @@ class Ranges:
         return np.where(self.at_zero[:, None], by_size, meet(by_size, by_secant))
 
     @cached_property
+    def alone(self) -> Mask:
+        """Components beside which all others of their vector are zero: the law is one of this component, (m, 3)."""
+        zero = (self.felt[0] == 0.0) & (self.felt[1] == 0.0)
+        return np.asarray(~zero & ((~zero).sum(axis=1) == 1)[:, None])
+
+    @cached_property
     def mixed(self) -> Mask:
         """Where an opening may be positive or negative, (m,)."""
         low, high = self.vectors[:, :, 0]
@@ -167,6 +173,7 @@ class Ranges:
             off = np.where(self.at_zero[:, None], self.tractions, off)
             middle = np.where(opens, 0.0, 0.5 * (off[0] + off[1]))
             error = np.where(shut, 0.0, np.maximum(np.abs(off[1] - middle), np.abs(off[0] - middle)))
+            error = np.where(self.alone, 0.0, error)
             better = error < best[2]
             for old, new in zip(best, (np.where(shut, 0.0, middle), np.where(shut, 0.0, slope), error), strict=True):
                 old[better] = np.broadcast_to(new, error.shape)[better]
@@ -180,12 +187,21 @@ class Ranges:
         errors = np.zeros(problem.size) + problem.force_error
         for v, k in zip(*np.nonzero(lengths.there), strict=True):
             factor, i = float(lengths.factors[v, k]), int(lengths.unknowns[v, k])
+            if self.alone[v, k]:
+                law = problem.chains[problem.size + v]
+                chains[i] = scaled(_one_sided(law) if k == 0 and lengths.opens[v] else law, 1.0, factor)
+                continue
             halved = bool(k == 0 and self.mixed[v])
             opening = factor if halved else 0.0
             chains[i] = _spring(factor * float(constant[v, k]), factor**2 * float(slope[v, k]), opening)
             size = abs(constant[v, k]) + abs(slope[v, k]) * float(np.abs(self.vectors[:, v, k]).max())
             errors[i] += abs(factor) * (error[v, k] + problem.thresholds.cells.widened * size)
         return replace(problem, chains=tuple(chains), lengths=Lengths.none(), force_error=errors)
+
+
+def _one_sided(law: Chain) -> Chain:
+    """The law of an opening, which bears nothing on the negative side."""
+    return (FREE[0]._replace(high=0.0), *(a._replace(low=max(a.low, 0.0)) for a in law if a.high > 0.0))
 
 
 def _spring(constant: float, slope: float, opening: float) -> Chain:
