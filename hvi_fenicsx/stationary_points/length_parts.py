@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..typing import Array, Integers
 from .arcs import on_interval
 from .balance_programme import Guide
 from .boxes import Box, fresh_box
-from .cell_parts import at_bounds, parts
+from .cell_parts import at_bounds, off_bound, parts
 from .length_ranges import Ranges
 from .scalar_problem import ScalarProblem
 
@@ -23,29 +23,56 @@ LEAST = float(np.nextafter(0.0, 1.0))
 def length_parts(ranges: Ranges, cell: Box, pivots: Integers, guide: Guide | None) -> list[Box]:
     """The parts of a cell, the one to look at first last; none where it is too small to be divided.
 
+    Joints of the laws of lengths come first, then bounds of the vectors: where a bound holds an opening, the law is one
+    of the slip alone. Then what takes off most energy, a length or what the guide tells.
+
     Args:
         ranges: the intervals of the cell.
         cell: the cell.
         pivots: unknowns that fix the rigid motions.
         guide: where means are far from the graphs of laws of one component and bounds.
     """
-    free = ranges.x[0] < ranges.x[1]
-    wide = np.where(free, ranges.x[1] - ranges.x[0], 0.0)[ranges.lengths.unknowns] * np.abs(ranges.lengths.factors)
-    losses = (ranges.springs[2] * wide).sum(axis=1)
-    others = 0.0 if guide is None else max(float(guide.law.max(initial=0.0)), float(guide.bound.max(initial=0.0)))
-    springs = ranges.as_springs()
+    springs, losses = ranges.as_springs(), _losses(ranges)
     box = replace(fresh_box(ranges.x[0], ranges.x[1], cell.x), share=cell.share)
+    guides = [] if guide is None else [guide]
+    if not np.any((losses > 0.0) & (ranges.laws.meets(*ranges.r).sum(axis=1) > 1)):
+        bound = _bound_of_vector(ranges, springs, box, guides)
+        if bound is not None:
+            return _as_cells(ranges, cell, off_bound(springs, box, bound))
+    others = max((float(max(g.law.max(initial=0.0), g.bound.max(initial=0.0))) for g in guides), default=0.0)
     divisible = _is_divisible(springs, box)
     for v in np.argsort(-losses, kind="stable"):
-        if losses[v] <= others and divisible:
+        if losses[v] <= 0.0 or (losses[v] <= others and divisible):
             break
-        found = [] if losses[v] <= 0.0 else list(_of_vector(ranges, int(v), cell))
+        found = list(_of_vector(ranges, int(v), cell))
         if found:
             return [replace(part.cell(cell), share=cell.share / len(found)) for part in found]
-    if not divisible:
-        return []
-    smaller = parts(springs, pivots, box, [] if guide is None else [guide])
-    return [replace(ranges, x=np.stack([p.low, p.high])).cell(replace(cell, share=p.share)) for p in smaller]
+    return _as_cells(ranges, cell, parts(springs, pivots, box, guides)) if divisible else []
+
+
+def _losses(ranges: Ranges) -> Array:
+    """What the errors of the springs take off, as energies, (m,)."""
+    wide = (ranges.x[1] - ranges.x[0])[ranges.lengths.unknowns] * np.abs(ranges.lengths.factors)
+    return np.asarray((ranges.springs[2] * wide).sum(axis=1))
+
+
+def _bound_of_vector(ranges: Ranges, springs: ScalarProblem, box: Box, guides: Sequence[Guide]) -> int | None:
+    """An unknown of a vector that a bound can push, where that takes off most energy; None if there is none."""
+    members = ranges.lengths.members
+    pushed = members[at_bounds(springs, box)[members]]
+    if not pushed.size:
+        return None
+    return int(pushed[np.argmax(guides[0].bound[pushed])] if guides else pushed[0])
+
+
+def _as_cells(ranges: Ranges, cell: Box, boxes: Iterable[Box]) -> list[Box]:
+    """Parts of the unknowns' intervals as cells, with their shares of the search."""
+    found = list(boxes)
+    share = sum(part.share for part in found) / cell.share
+    return [
+        replace(ranges, x=np.stack([part.low, part.high])).cell(replace(cell, share=part.share / share))
+        for part in found
+    ]
 
 
 def _is_divisible(springs: ScalarProblem, box: Box) -> bool:

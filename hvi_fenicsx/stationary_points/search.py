@@ -57,7 +57,7 @@ def find(
     if wanted.lowest:
         return lowest(task)
     curved = wanted.curved
-    provable = curved.bounded if curved is not None else not (len(problem.lengths) or problem.error)
+    provable = curved.bounded if curved is not None else not problem.error
     return _all(task) if provable else _without_proof(task)
 
 
@@ -94,7 +94,8 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
     for x in saved["x"]:
         search.enter(x)
     low, high = saved["low"], saved["high"]
-    cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
+    middles = 0.5 * (low + high)[:, : search.problem.size]
+    cells = [fresh_box(*ends) for ends in zip(low, high, middles, strict=True)]
     search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
     return search
 
@@ -137,6 +138,7 @@ def _all(task: Task) -> Found:
     points = tuple(sorted(search.points, key=lambda p: p.energy))
     bound = points[0].energy if complete and points and task.wanted.bounded else None
     bound = bound if below is None else below.progress().lower
+    landscape = _landscape(task)
     return Found(
         points=points,
         complete=complete,
@@ -145,12 +147,15 @@ def _all(task: Task) -> Found:
         nodes=search.cells,
         reason=_in_words(points) if complete else _open_in_words(search),
         left={} if complete else _left_of_all(search),
-        passes=passes(_landscape(task), points) if complete else (),
+        passes=passes(landscape, points) if complete and landscape is not None else (),
     )
 
 
-def _landscape(task: Task) -> Landscape:
+def _landscape(task: Task) -> Landscape | None:
+    """The energy, where descents from saddles know it: not with laws of lengths."""
     curved = task.wanted.curved
+    if len(task.problem.lengths):
+        return None
     return PolylineLandscape(task.problem) if curved is None else CurvedLandscape(curved)
 
 
