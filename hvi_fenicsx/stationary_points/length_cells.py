@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..typing import Array
+from .balance_test import Look
 from .boxes import Box, fresh_box
 from .cell_tests import CellTests
 from .descent import descend
@@ -23,7 +24,6 @@ from .length_ranges import Ranges, meet
 from .linear_points import is_singular
 from .point_list import PointList, StationaryPoint
 from .polyline_cells import PolylineCells
-from .balance_test import Look
 from .rigid_balance import RigidBalance
 from .scalar_problem import ScalarProblem
 from .settled import settled
@@ -49,7 +49,7 @@ class LengthCells:
         """A cell that is far larger than the problem's displacements; None if no stationary point is in it."""
         whole = self._whole
         ends = [np.concatenate([whole.x[k], whole.r[k], whole.g[k]]) for k in (0, 1)]
-        return self._tightened(fresh_box(*ends, np.zeros(self._problem.size)))
+        return self.tightened(fresh_box(*ends, np.zeros(self._problem.size)))
 
     def divided(self, cell: Box, known: PointList, cut: Callable[[], bool]) -> Divided:
         """Test a cell, and divide what is left.
@@ -103,7 +103,7 @@ class LengthCells:
         """The cell made smaller, and where to divide it; None if no stationary point is in it."""
         look, limits = None, self._limits
         for _ in range(limits.most_looks):
-            if (tight := self._tightened(cell)) is None:
+            if (tight := self.tightened(cell)) is None:
                 return None
             ranges = Ranges.of(self._problem, tight)
             look = self._tests(ranges).weighed(_of_components(ranges, tight), cut)
@@ -115,8 +115,12 @@ class LengthCells:
                 break
         return look
 
-    def _tightened(self, cell: Box) -> Box | None:
-        """The cell made smaller; None if no stationary point is in it."""
+    def tightened(self, cell: Box) -> Box | None:
+        """The cell made smaller; None if no stationary point is in it.
+
+        Args:
+            cell: the cell.
+        """
         for _ in range(self._limits.most_rounds):
             smaller = self._tightened_once(cell)
             if smaller is None:
@@ -157,10 +161,7 @@ class LengthCells:
         """What is known of a cell; what is left of it where this is not all."""
         ranges = Ranges.of(self._problem, cell)
         if self._is_straight(ranges):
-            verdict = PolylineCells(ranges.as_springs(), self._problem).verdict(_of_components(ranges, cell), known)
-            if verdict.left is None:
-                return Divided(points=verdict.points)
-            return cell
+            return self._straight(ranges, cell, known)
         if (system := SmoothSystem.of(self._problem, cell)) is not None:
             return self._smooth(system, cell)
         if self._has_one_at_most(ranges) and (point := self._point_in(ranges, cell, known)) is not None:
@@ -168,16 +169,22 @@ class LengthCells:
         return cell
 
     def _is_straight(self, ranges: Ranges) -> bool:
-        """Whether in the cell all laws are of one component each, and have one solution at most on each of their arcs."""
-        problem, (low, high) = self._problem, ranges.x
-        free = low < high
-        errors = np.where(problem.lengths.there & free[problem.lengths.unknowns], ranges.springs[2], 0.0)
-        if np.any(errors > ranges.laws.rounding[:, None]):
-            return False
-        chosen = np.flatnonzero(free)
-        slopes = ranges.as_springs().arcs.least_slope(low, high)
-        matrix = problem.stiffness[np.ix_(chosen, chosen)] + np.diag(slopes[chosen])
-        return not chosen.size or not is_singular(matrix, self._limits.condition)
+        """Whether in the cell all laws are of one component each."""
+        lengths, free = self._problem.lengths, ranges.x[0] < ranges.x[1]
+        errors = np.where(lengths.there & free[lengths.unknowns], ranges.springs[2], 0.0)
+        return not np.any(errors > ranges.laws.rounding[:, None])
+
+    def _straight(self, ranges: Ranges, cell: Box, known: PointList) -> Divided | Box:
+        """What is known of such a cell; of a continuum one point is told, if it has the cell's lengths."""
+        springs, (low, high) = ranges.as_springs(), ranges.x
+        verdict = PolylineCells(springs, self._problem).verdict(_of_components(ranges, cell), known)
+        if verdict.left is not None:
+            return cell
+        free = np.flatnonzero(low < high)
+        matrix = springs.stiffness[np.ix_(free, free)] + np.diag(springs.arcs.least_slope(low, high)[free])
+        if verdict.points or not free.size or not is_singular(matrix, self._limits.condition):
+            return Divided(points=verdict.points)
+        return cell
 
     def _smooth(self, system: SmoothSystem, cell: Box) -> Divided | Box:
         """What is known of a cell in which all laws are smooth."""

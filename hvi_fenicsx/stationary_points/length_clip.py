@@ -96,7 +96,7 @@ class LengthClip:
         """κ = t/z for each component that is not zero, (2, m)."""
         low, high = ranges.felt
         signed = ((low > 0.0) | (high < 0.0)) & ~ranges.at_zero[:, None]
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             inverse = np.where(signed, 1.0 / np.stack([high, low]), np.array([0.0, INF])[:, None, None])
             ways = times(t, inverse)
         sizes = self._widened * np.where(np.isfinite(ways), np.abs(ways), 0.0).max(axis=0)
@@ -106,8 +106,8 @@ class LengthClip:
     def _along(self, ranges: Ranges, t: Array, secants: Array) -> Ranges | None:
         """The lengths r = g/κ and the components z = t/κ."""
         wide = np.array([1.0 - self._widened, 1.0 + self._widened])
-        known = ~ranges.at_zero & (secants[0] >= 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        known = ~ranges.at_zero & (secants[0] > 0.0)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             soft = np.where(known, 1.0 / secants[::-1], np.array([[0.0], [INF]]))
         r = np.where(known, meet(ranges.r, wide[:, None] * times(ranges.g, soft)), ranges.r)
         g = np.where(known, meet(ranges.g, wide[:, None] * times(ranges.r, secants)), ranges.g)

@@ -100,12 +100,24 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
     return search
 
 
-def _started(task: Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> None:
-    """A few cells, which often are all; else what is found without a proof."""
+def _started(task: Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> list[StationaryPoint]:
+    """A few cells, which often are all; else what is found without a proof, of which the solver's points are told.
+
+    Of laws of lengths the solver makes each point exact, which takes longer than many cells.
+    """
+    lengths = len(task.problem.lengths) > 0
+    first = task.problem.thresholds.cells.first_of_lengths if lengths else task.most_boxes
     search.start()
-    if not search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell) and not task.stop():
+    if search.run(lambda: search.cells >= first or task.stop(), tell) or task.stop():
+        return []
+    if not lengths:
         for x in systematic.candidates(search.problem, search.points.listed, _patience(task, search.points)):
             search.enter(x)
+        return []
+    solved = systematic.near_stationary(task.problem, [], task.stop, task.wanted.exact)
+    for point in solved:
+        search.enter(point.x)
+    return solved
 
 
 def _patience(task: Task, known: PointList) -> Callable[[], bool]:
@@ -129,13 +141,13 @@ def _all(task: Task) -> Found:
         task.report(all_in_words(now, clock))
         task.keep(lambda: _left_of_all(search))
 
-    if task.saved is None:
-        _started(task, search, tell)
+    solved = [] if task.saved is not None else _started(task, search, tell)
     complete = search.run(task.stop, tell) and not search.undecided
     below = None if complete else bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)
-    points = tuple(sorted(search.points, key=lambda p: p.energy))
+    others = [] if complete else [p for p in solved if not search.points.has(p.x)]
+    points = tuple(sorted([*search.points, *others], key=lambda p: p.energy))
     bound = points[0].energy if complete and points and task.wanted.bounded else None
     bound = bound if below is None else below.progress().lower
     landscape = _landscape(task)
