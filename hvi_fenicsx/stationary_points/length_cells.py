@@ -170,9 +170,12 @@ class LengthCells:
 
     def _is_straight(self, ranges: Ranges) -> bool:
         """Whether in the cell all laws are of one component each."""
-        lengths, free = self._problem.lengths, ranges.x[0] < ranges.x[1]
-        errors = np.where(lengths.there & free[lengths.unknowns], ranges.springs[2], 0.0)
-        return not np.any(errors > ranges.laws.rounding[:, None])
+        lengths = self._problem.lengths
+        free = lengths.there & (ranges.x[0] < ranges.x[1])[lengths.unknowns]
+        errors = np.where(free, ranges.springs[2], 0.0)
+        least, most = ranges.arc_secants
+        constant = (least == most) | np.any(ranges.alone, axis=1) | ~np.any(free, axis=1)
+        return bool(np.all(constant) and np.all(errors <= ranges.laws.rounding[:, None]))
 
     def _straight(self, ranges: Ranges, cell: Box, known: PointList) -> Divided | Box:
         """What is known of such a cell; of a continuum one point is told, if it has the cell's lengths."""

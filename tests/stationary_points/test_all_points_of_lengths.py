@@ -160,7 +160,7 @@ def long(*cases: tuple[int, int, int, float]) -> list[object]:
 @pytest.mark.parametrize(
     ("seed", "m", "k", "share"),
     [
-        *((seed, 1, 2, 0.3) for seed in (7, 10, 14, 18, 30, 41)),
+        *((seed, 1, 2, 0.3) for seed in (7, 14, 18, 41)),
         *long(*((seed, 1, 2, share) for seed in range(60) for share in (0.3, 1.0))),
         *long(*((seed, 2, 2, 0.5) for seed in range(30)), *((seed, 1, 3, 0.3) for seed in range(30))),
     ],
@@ -177,7 +177,7 @@ def test_all_points_are_those_of_each_choice_of_pieces(seed: int, m: int, k: int
             assert (fall > 1e-14) == (point.kind is Kind.SADDLE)
 
 
-@pytest.mark.parametrize("seed", [3, 18])
+@pytest.mark.parametrize("seed", [18, pytest.param(3, marks=pytest.mark.long)])
 def test_cells_made_smaller_keep_their_points(seed: int) -> None:
     problem = softer(seed, 1 + seed % 2, 2, 0.4)
     random, cells = np.random.default_rng(seed), LengthCells(problem)
@@ -197,7 +197,7 @@ def test_cells_made_smaller_keep_their_points(seed: int) -> None:
 
 def test_a_ring_of_equilibria_is_no_proof_that_all_were_found() -> None:
     """Without springs a vector rests at each length at which its law bears nothing."""
-    search = searched(one_vector(1e-3 * np.eye(2) - 1e-3 * np.eye(2), np.zeros(2), ((0, 0), (1, 1), (2, 0), (3, 1))), 500)
+    search = searched(one_vector(np.zeros((2, 2)), np.zeros(2), ((0, 0), (1, 1), (2, 0), (3, 1))), 500)
     assert search.open_cells > 0
 
 
