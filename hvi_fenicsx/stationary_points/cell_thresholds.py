@@ -44,7 +44,6 @@ class CellThresholds:
         image_steps: steps of Krawczyk's operator on a cell.
         shorter_image: the next step is made while some side shrinks to this share.
         roundings: rounding errors of forces, in machine epsilons for each unknown and each part of their sizes.
-        first_of_lengths: cells of laws of lengths that are looked at before points are looked for without a proof.
     """
 
     most_rounds: int = 6
@@ -79,7 +78,6 @@ class CellThresholds:
     image_steps: int = 10
     shorter_image: float = 0.7
     roundings: float = 8.0
-    first_of_lengths: int = 200
 
 
 @dataclass(frozen=True, kw_only=True)

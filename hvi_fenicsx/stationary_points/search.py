@@ -101,16 +101,11 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
 
 
 def _started(task: Task, search: Enumeration, tell: Callable[[Enumeration], None]) -> list[StationaryPoint]:
-    """A few cells, which often are all; else what is found without a proof, of which the solver's points are told.
-
-    Of laws of lengths the solver makes each point exact, which takes longer than many cells.
-    """
-    lengths = len(task.problem.lengths) > 0
-    first = task.problem.thresholds.cells.first_of_lengths if lengths else task.most_boxes
+    """A few cells, which often are all; else what is found without a proof. Told is what the solver made exact."""
     search.start()
-    if search.run(lambda: search.cells >= first or task.stop(), tell) or task.stop():
+    if search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell) or task.stop():
         return []
-    if not lengths:
+    if not len(task.problem.lengths):
         for x in systematic.candidates(search.problem, search.points.listed, _patience(task, search.points)):
             search.enter(x)
         return []

@@ -327,10 +327,11 @@ def test_the_lowest_equilibrium_of_a_scene_is_certified_and_a_run_is_not_below_i
     assert hvi.solve(scene).energy >= found.lower_bound
 
 
-def test_of_such_laws_equilibria_are_found_without_a_proof_that_these_are_all() -> None:
-    found = hvi.equilibria(hvi.Scene.model_validate(space(2)))
+@pytest.mark.long
+def test_a_search_of_such_laws_that_is_stopped_tells_what_it_found_and_what_is_open() -> None:
+    found = hvi.equilibria(hvi.Scene.model_validate(space(2)), limit=20.0)
     assert (found.complete, found.proven) == (False, False)
-    assert "act on a length" in found.reason
+    assert "open" in found.reason
     assert len(found.solutions) > 1
     assert all(s.converged for s in found.solutions)
     energies = [s.energy for s in found.solutions]
@@ -353,7 +354,7 @@ def test_a_block_that_sticks_and_could_slide_off_has_one_equilibrium_and_no_lowe
             },
         }
     )
-    found = hvi.equilibria(scene)
+    found = hvi.equilibria(scene, limit=6.0)
     assert found.reason.startswith("1 found")
     assert [s.energy for s in found.solutions] == pytest.approx([hvi.solve(scene).energy], rel=1e-9)
     assert (found.kinds, found.lower_bound) == (("minimiser",), None)

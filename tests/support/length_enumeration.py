@@ -63,7 +63,7 @@ def stationary(problem: ScalarProblem, starts: int, seed: int = 0) -> list[Array
 def _solutions(
     problem: ScalarProblem, sides: Sequence[int], chosen: Sequence[Piece], random: np.random.Generator, starts: int
 ) -> Iterator[Array]:
-    n, lengths = problem.size, problem.lengths
+    lengths = problem.lengths
     fixed = np.where(np.array(sides) < 0, problem.lower, np.where(np.array(sides) > 0, problem.upper, np.nan))
     for v, piece in enumerate(chosen):
         if piece.arc is None and piece.at == 0.0:
@@ -152,9 +152,8 @@ def _holds(
                 if away:  # the bound bears it all
                     push[i] = 0.0
                     continue
-                if c == 0 and lengths.opens[v]:
-                    if force < -NEAR:
-                        return False
+                if c == 0 and lengths.opens[v] and force < -NEAR:
+                    return False
                 ball.append(force)
                 push[i] = 0.0
             if np.linalg.norm(ball) > p.most + NEAR:
