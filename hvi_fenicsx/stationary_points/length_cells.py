@@ -153,9 +153,9 @@ class LengthCells:
         sizes = np.abs(problem.force) + np.abs(problem.stiffness) @ np.maximum(np.abs(low), np.abs(high))
         wide = self._limits.widened * sizes
         both = meet(forces, np.stack([problem.force - pull[1] - wide, problem.force - pull[0] + wide]))
-        return np.stack([
-            np.where(high >= problem.upper, -np.inf, both[0]), np.where(low <= problem.lower, np.inf, both[1])
-        ])
+        return np.stack(
+            [np.where(high >= problem.upper, -np.inf, both[0]), np.where(low <= problem.lower, np.inf, both[1])]
+        )
 
     def _decided(self, cell: Box, known: PointList) -> Divided | Box:
         """What is known of a cell; what is left of it where this is not all."""

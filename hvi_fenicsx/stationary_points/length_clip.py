@@ -50,10 +50,12 @@ class LengthClip:
         felt, wide = ranges.felt, self._widened
         least = np.where((felt[0] <= 0.0) & (felt[1] >= 0.0), 0.0, np.abs(felt).min(axis=0)) ** 2
         most = np.abs(felt).max(axis=0) ** 2
-        r = np.stack([
-            np.maximum(ranges.r[0], np.sqrt(least.sum(axis=1)) * (1.0 - wide)),
-            np.minimum(ranges.r[1], np.sqrt(most.sum(axis=1)) * (1.0 + wide)),
-        ])
+        r = np.stack(
+            [
+                np.maximum(ranges.r[0], np.sqrt(least.sum(axis=1)) * (1.0 - wide)),
+                np.minimum(ranges.r[1], np.sqrt(most.sum(axis=1)) * (1.0 + wide)),
+            ]
+        )
         if np.any(r[0] > r[1]):
             return None
         squares = r[:, :, None] ** 2

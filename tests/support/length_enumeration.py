@@ -49,8 +49,10 @@ def pieces(problem: ScalarProblem, v: int) -> list[Piece]:
 def stationary(problem: ScalarProblem, starts: int, seed: int = 0) -> list[Array]:
     """All stationary points that are found."""
     random, found = np.random.default_rng(seed), list[Array]()
-    bounds = [[0, *([-1] if np.isfinite(a) else []), *([1] if np.isfinite(b) else [])]
-              for a, b in zip(problem.lower, problem.upper, strict=True)]
+    bounds = [
+        [0, *([-1] if np.isfinite(a) else []), *([1] if np.isfinite(b) else [])]
+        for a, b in zip(problem.lower, problem.upper, strict=True)
+    ]
     laws = [pieces(problem, v) for v in range(len(problem.lengths))]
     for sides in itertools.product(*bounds):
         for chosen in itertools.product(*laws):
