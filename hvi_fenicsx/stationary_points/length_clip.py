@@ -59,7 +59,7 @@ class LengthClip:
         if np.any(r[0] > r[1]):
             return None
         squares = r[:, :, None] ** 2
-        others = np.stack([part.sum(axis=1, keepdims=True) - part for part in (least, most)])
+        others = np.stack([part[:, [1, 0, 0]] + part[:, [2, 2, 1]] for part in (least, most)])
         reach = np.sqrt(np.maximum(squares[1] - others[0] + wide * (squares[1] + others[0]), 0.0))
         least = np.sqrt(np.maximum(squares[0] - others[1] - wide * (squares[0] + others[1]), 0.0))
         low, high = ranges.vectors
