@@ -48,8 +48,8 @@ class LengthCells:
     def first(self) -> Box | None:
         """A cell that is far larger than the problem's displacements; None if no stationary point is in it."""
         whole = self._whole
-        ends = [np.concatenate([whole.x[k], whole.r[k], whole.g[k]]) for k in (0, 1)]
-        return self.tightened(fresh_box(*ends, np.zeros(self._problem.size)))
+        low, high = (np.concatenate([whole.x[k], whole.r[k], whole.g[k]]) for k in (0, 1))
+        return self.tightened(fresh_box(low, high, np.zeros(self._problem.size)))
 
     def divided(self, cell: Box, known: PointList, cut: Callable[[], bool]) -> Divided:
         """Test a cell, and divide what is left.
@@ -224,9 +224,9 @@ class LengthCells:
     def _point_in(self, ranges: Ranges, cell: Box, known: PointList) -> StationaryPoint | None:
         """A stationary point in a cell: one that is known, or that a descent finds; none at a drop of a law."""
         problem = self._problem
-        for point in known:
-            if self._is_alone(ranges, point.x):
-                return point
+        for listed in known:
+            if self._is_alone(ranges, listed.x):
+                return listed
         ends = problem.with_lengths(*ranges.x)
         point = self.point(descend(problem, *ends, np.clip(cell.x, *ranges.x))[0])
         return point if point is not None and self._is_alone(ranges, point.x) else None

@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..typing import Array
+from .arcs import INF
 from .graph_clip import GraphClip
-from .length_ranges import INF, Ranges, meet, times
+from .length_ranges import Ranges, meet, times
 from .lengths import Lengths
 from .scalar_problem import ScalarProblem
 
@@ -143,7 +144,7 @@ class LengthClip:
         known = ~ranges.at_zero
         least, most = np.where(known, ranges.g, np.array([[-INF], [INF]]))
         sizes = self._widened * np.where(known, np.abs(ranges.g), 0.0).max(axis=0)
-        ends = self._graphs.clipped(*ranges.r, least - sizes, most + sizes)
+        ends = self._graphs.clipped(ranges.r[0], ranges.r[1], least - sizes, most + sizes)
         if ends is None:
             return None
         r = meet(ranges.r, np.stack(ends))

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -125,9 +126,10 @@ def _off_zero(ranges: Ranges, v: int) -> Iterator[Ranges]:
     yield held
 
 
-def _with(ranges: Ranges, name: str, i: int, low: float | None, high: float | None) -> Ranges:
-    ends: Array = getattr(ranges, name).copy()
+def _with(ranges: Ranges, name: Literal["x", "r", "g"], i: int, low: float | None, high: float | None) -> Ranges:
+    every = {"x": ranges.x, "r": ranges.r, "g": ranges.g}
+    every[name] = ends = every[name].copy()
     for k, end in enumerate((low, high)):
         if end is not None:
             ends[k, i] = end
-    return replace(ranges, **{name: ends})
+    return replace(ranges, x=every["x"], r=every["r"], g=every["g"])

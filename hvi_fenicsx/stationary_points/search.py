@@ -94,8 +94,8 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
     for x in saved["x"]:
         search.enter(x)
     low, high = saved["low"], saved["high"]
-    middles = 0.5 * (low + high)[:, : search.problem.size]
-    cells = [fresh_box(*ends) for ends in zip(low, high, middles, strict=True)]
+    n = search.problem.size
+    cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])[:n]) for i in range(len(low))]
     search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
     return search
 
