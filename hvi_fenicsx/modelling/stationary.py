@@ -69,7 +69,7 @@ def equilibria(
 
     Args:
         model: what to search; that all equilibria were found can be proven where the tractions of its laws are
-            polylines of one component each.
+            polylines, or curves of one component each.
         comm: the ranks of a scene; by default all. A model has those of its body.
         lowest: the lowest energy with a proof, instead of all equilibria.
         gap: what that proof may leave open, relative to the energy.

@@ -35,7 +35,22 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    first, last, anchor, value, traction, slope = graph.table.T
+    return _bonds(graph.table, weight, sign)
+
+
+def scaled(arcs: Chain, weight: float, sign: float) -> Chain:
+    """The energy weight * φ(sign * x) of a chain φ.
+
+    Args:
+        arcs: the chain.
+        weight: a factor.
+        sign: +1 or -1 (or a factor of the argument).
+    """
+    return _bonds(np.array(arcs), weight, sign)
+
+
+def _bonds(table: Array, weight: float, sign: float) -> Chain:
+    first, last, anchor, value, traction, slope = table.T
     ends = (first, last) if sign > 0 else (last, first)
     low, high, middle = (place / sign + 0.0 for place in (*ends, anchor))
     rows = np.column_stack([low, high, middle, weight * value, weight * sign * traction, weight * sign * sign * slope])

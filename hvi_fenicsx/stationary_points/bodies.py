@@ -100,6 +100,7 @@ class Equilibria:
             lowest=lowest,
             gap=gap,
             bounded=self._prepared.solvability.state == "held",
+            has_potential=self._prepared.problem.has_potential,
             no_lowest=self._no_lowest,
             known=() if lowest or not len(self.problem.lengths) or stop() else self._known(stop),
             exact=self._exact,

@@ -65,7 +65,7 @@ def _guided(problem: ScalarProblem, cell: Box, guide: Guide) -> list[Box]:
     i, j = int(np.argmax(law)), int(np.argmax(bound))
     if max(law[i], bound[j]) <= 0.0:
         return []
-    return list(_off_bound(problem, cell, j) if bound[j] >= law[i] else _near(problem, cell, i, float(guide.x[i])))
+    return list(off_bound(problem, cell, j) if bound[j] >= law[i] else _near(problem, cell, i, float(guide.x[i])))
 
 
 def _near(problem: ScalarProblem, cell: Box, i: int, x: float) -> Iterator[Box]:
@@ -91,7 +91,7 @@ def _any(problem: ScalarProblem, cell: Box) -> Iterator[Box]:
         i = int(np.argmax(joints))
         chosen = _joints(problem, cell, i)
         return _at_joint(problem, cell, i, *chosen[len(chosen) // 2])
-    return _off_bound(problem, cell, int(np.argmax(at_bounds(problem, cell))))
+    return off_bound(problem, cell, int(np.argmax(at_bounds(problem, cell))))
 
 
 def _joints(problem: ScalarProblem, cell: Box, i: int) -> list[tuple[float, float]]:
@@ -115,7 +115,14 @@ def _halves(cell: Box, i: int, at: float) -> Iterator[Box]:
     yield _with(cell, i, at, cell.high[i])
 
 
-def _off_bound(problem: ScalarProblem, cell: Box, i: int) -> Iterator[Box]:
+def off_bound(problem: ScalarProblem, cell: Box, i: int) -> Iterator[Box]:
+    """Two parts: an unknown off its bound, and on it.
+
+    Args:
+        problem: the problem.
+        cell: the cell, which reaches to a bound of the unknown.
+        i: the unknown.
+    """
     lower = cell.low[i] <= problem.lower[i]
     at = cell.low[i] if lower else cell.high[i]
     inner = np.nextafter(at, np.inf if lower else -np.inf)

@@ -51,6 +51,7 @@ class Wanted:
         lowest: the lowest energy with a proof; else all equilibria.
         gap: relative gap that the proof of the lowest may leave.
         bounded: whether the energy is known to be bounded from below.
+        has_potential: whether all laws are derivatives of an energy.
         no_lowest: why there is no lowest energy; empty where there may be one.
         start: where the lowest is, as far as that is known.
         known: points near which equilibria are known to be, (n,) each.
@@ -63,6 +64,7 @@ class Wanted:
     lowest: bool = False
     gap: float = 1e-8
     bounded: bool = True
+    has_potential: bool = True
     no_lowest: str = ""
     start: Start | None = None
     known: tuple[Array, ...] = ()

@@ -1,4 +1,4 @@
-"""Whether a stationary point of a problem with laws of lengths is a minimiser: by the same problem in its frames."""
+"""Points of a problem with laws of lengths, stationary or not, minimisers or not: by the same problem in its frames."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ..laws.arc import Arc
 from ..typing import Array
+from . import stationarity
 from .arcs import FREE, INF, Chain
 from .length_frames import Frames, left_out
 from .lengths import Lengths
@@ -22,14 +23,29 @@ def kind_of(problem: ScalarProblem, x: Array) -> Kind:
         problem: the problem.
         x: a stationary point, (n,).
     """
+    return kind(*_alike(problem, x))
+
+
+def imbalance(problem: ScalarProblem, x: Array) -> float:
+    """The largest force that neither law nor bound can bear, relative to the largest force.
+
+    Args:
+        problem: the problem.
+        x: the point, (n,).
+    """
+    return stationarity.imbalance(*_alike(problem, x))
+
+
+def _alike(problem: ScalarProblem, x: Array) -> tuple[ScalarProblem, Array]:
+    """A problem with laws of one component each that is the same at a point, and the point; small vectors are zero."""
     if not len(problem.lengths):
-        return kind(problem, x)
+        return problem, x
     near = problem.thresholds.points.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
     lengths = problem.lengths
     vectors = lengths.vectors(x)
     rounded = x.copy()
     rounded[lengths.members] = np.where(np.abs(vectors) <= near, 0.0, x[lengths.unknowns])[lengths.there]
-    return kind(*in_frames(problem, rounded))
+    return in_frames(problem, rounded)
 
 
 def in_frames(problem: ScalarProblem, x: Array) -> tuple[ScalarProblem, Array]:

@@ -57,6 +57,7 @@ class LinearTest:
         columns, right = self._columns(corners)
         n, m = self._problem.size, columns.shape[1]
         size = np.maximum(np.abs(columns[:n]).max(axis=1), np.abs(right[:n]))
+        size = np.where(size > 0.0, size, 1.0)
         columns[:n] /= size[:, None]
         right[:n] /= size
         slack = np.vstack([np.eye(n), np.zeros((n, n))])

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Integers
-from . import stationarity
+from . import length_kinds
 from .boxes import Box
 from .cell_parts import at_bounds
 from .cell_verdict import Verdict
@@ -22,10 +22,11 @@ class PolylineCells:
 
     Args:
         problem: the problem.
+        whole: the problem by which points are judged, where this one is the same in some cells only.
     """
 
-    def __init__(self, problem: ScalarProblem) -> None:
-        self._problem = problem
+    def __init__(self, problem: ScalarProblem, whole: ScalarProblem | None = None) -> None:
+        self._problem, self._whole = problem, problem if whole is None else whole
 
     def verdict(self, cell: Box, known: PointList) -> Verdict:
         """What is known of a cell.
@@ -56,11 +57,11 @@ class PolylineCells:
             x: the place, (n,).
             isolated: False where it is one of a continuum.
         """
-        problem = self._problem
+        problem = self._whole
         x = np.clip(x, problem.lower, problem.upper)
-        if stationarity.imbalance(problem, x) > problem.thresholds.points.accuracy:
+        if length_kinds.imbalance(problem, x) > problem.thresholds.points.accuracy:
             return None
-        kind = stationarity.kind(problem, x)
+        kind = length_kinds.kind_of(problem, x)
         return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
 
     def joined(self, x: Array, y: Array) -> bool:

@@ -12,6 +12,8 @@ beyond rounding counts, and so does what I - T_p - GS is off zero.
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 
 from ..typing import Array, Integers
@@ -56,6 +58,18 @@ class RigidBalance:
         self._rest = self._error()
         self.exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
         self.softness = np.diag(self._flexibility) + 2.0 * np.diag(self._rest @ np.abs(self._flexibility))
+
+    def with_laws_of(self, problem: ScalarProblem) -> RigidBalance:
+        """The same of a problem with other laws, which are polylines.
+
+        Args:
+            problem: the problem, of the same stiffness and motions.
+        """
+        other = copy.copy(self)
+        other._problem, other._laws = problem, None
+        other._arcs = ArcTable.of(problem.chains[: problem.size])
+        other._graphs = GraphClip(problem, np.zeros(problem.size), joints_at_ends=False)
+        return other
 
     def _error(self) -> Array:
         """How far G is off the inverse on elastic parts, for exact numbers, rounding included, (n, n)."""

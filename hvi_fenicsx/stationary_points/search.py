@@ -57,7 +57,7 @@ def find(
     if wanted.lowest:
         return lowest(task)
     curved = wanted.curved
-    provable = curved.bounded if curved is not None else not (len(problem.lengths) or problem.error)
+    provable = curved.bounded if curved is not None else wanted.has_potential and not problem.error
     return _all(task) if provable else _without_proof(task)
 
 
@@ -95,16 +95,23 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
     for x in saved["x"]:
         search.enter(x)
     low, high = saved["low"], saved["high"]
-    cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])) for i in range(len(low))]
+    n = search.problem.size
+    cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])[:n]) for i in range(len(low))]
     search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
     return search
 
 
-def _enter_candidates(task: Task, search: Enumeration) -> None:
-    """Keep what is found without a proof."""
+def _entered(task: Task, search: Enumeration) -> list[StationaryPoint]:
+    """Keep what is found without a proof. Told is what the solver made exact: points of laws of lengths."""
+    if len(task.problem.lengths):
+        solved = systematic.near_stationary(task.problem, [*task.wanted.known], task.stop, task.wanted.exact)
+        for point in solved:
+            search.enter(point.x)
+        return solved
     over = _patience(task, search.points)
     for x in systematic.candidates(search.problem, search.points.listed, over, task.stop):
         search.enter(x)
+    return []
 
 
 def _patience(task: Task, known: PointList) -> Callable[[], bool]:
@@ -135,12 +142,13 @@ def _all(task: Task) -> Found:
     below = None if few else bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)
-    if task.saved is None and not few:
-        _enter_candidates(task, search)
+    solved = _entered(task, search) if task.saved is None and not few else []
     complete = search.run(task.stop, tell) and not search.undecided
-    points = tuple(sorted(search.points, key=lambda p: p.energy))
+    others = [] if complete else [p for p in solved if not search.points.has(p.x)]
+    points = tuple(sorted([*search.points, *others], key=lambda p: p.energy))
     bound = points[0].energy if complete and points and task.wanted.bounded else None
     bound = bound if complete or below is None else below.progress().lower
+    landscape = _landscape(task)
     return Found(
         points=points,
         complete=complete,
@@ -149,17 +157,20 @@ def _all(task: Task) -> Found:
         nodes=search.cells,
         reason=_in_words(points) if complete else _open_in_words(search),
         left={} if complete else _left_of_all(search),
-        passes=passes(_landscape(task), points) if complete else (),
+        passes=passes(landscape, points) if complete and landscape is not None else (),
     )
 
 
-def _landscape(task: Task) -> Landscape:
+def _landscape(task: Task) -> Landscape | None:
+    """The energy, where descents from saddles know it: not with laws of lengths."""
     curved = task.wanted.curved
+    if len(task.problem.lengths):
+        return None
     return PolylineLandscape(task.problem) if curved is None else CurvedLandscape(curved)
 
 
 def _without_proof(task: Task) -> Found:
-    """What is found where it cannot be proven that these are all: laws of lengths, or of unknown slopes."""
+    """What is found where it cannot be proven that these are all."""
     problem = task.problem
     if cells := _cells_of_none(task, task.most_boxes):
         return _none(cells)
@@ -178,10 +189,18 @@ def _without_proof(task: Task) -> Found:
         lower_bound=None if below is None else below.progress().lower - problem.error,
         proven=False,
         nodes=0 if below is None else below.boxes,
-        reason=f"{len(points)} found, and there may be more: of laws that "
-        f"{'act on a length' if len(problem.lengths) else 'are curved, and do not bound their slopes,'} "
-        "it cannot be proven that these are all",
+        reason=f"{len(points)} found, and there may be more: of {_unproven(task)} it cannot be proven that these are "
+        "all",
     )
+
+
+def _unproven(task: Task) -> str:
+    """The laws of which nothing can be proven."""
+    if not task.wanted.has_potential:
+        return "laws whose energy of separation depends on the mode"
+    if len(task.problem.lengths):
+        return "smoothed or curved laws that act on a length"
+    return "laws that are curved, and do not bound their slopes,"
 
 
 def _none(cells: int) -> Found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,9 @@ from scipy.optimize import minimize
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.laws.traction_graph import TractionGraph
+from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.stationary_points.arcs import FREE, chain
+from hvi_fenicsx.stationary_points.bodies import Equilibria
 from hvi_fenicsx.stationary_points.boxes import fresh_box
 from hvi_fenicsx.stationary_points.length_kinds import kind_of
 from hvi_fenicsx.stationary_points.lengths import Lengths
@@ -327,10 +330,11 @@ def test_the_lowest_equilibrium_of_a_scene_is_certified_and_a_run_is_not_below_i
     assert hvi.solve(scene).energy >= found.lower_bound
 
 
-def test_of_such_laws_equilibria_are_found_without_a_proof_that_these_are_all() -> None:
-    found = hvi.equilibria(hvi.Scene.model_validate(space(2)))
+@pytest.mark.long
+def test_a_search_of_such_laws_that_is_stopped_tells_what_it_found_and_what_is_open() -> None:
+    found = hvi.equilibria(hvi.Scene.model_validate(space(2)), limit=20.0)
     assert (found.complete, found.proven) == (False, False)
-    assert "act on a length" in found.reason
+    assert "open" in found.reason
     assert len(found.solutions) > 1
     assert all(s.converged for s in found.solutions)
     energies = [s.energy for s in found.solutions]
@@ -340,8 +344,11 @@ def test_of_such_laws_equilibria_are_found_without_a_proof_that_these_are_all() 
     assert min(energies) == pytest.approx(lowest.solutions[0].energy, rel=1e-8)
 
 
-def test_a_block_that_sticks_and_could_slide_off_has_one_equilibrium_and_no_lowest_energy() -> None:
-    """Bonds that break without a rest, and a load that they still bear: most descents run off, and end anywhere."""
+def test_a_block_that_sticks_and_could_slide_off_has_one_minimiser_and_no_lowest_energy() -> None:
+    """Bonds that break without a rest, and a load that they still bear: most descents run off, and end anywhere.
+
+    The search for all has more cells than a test has time for; a saddle is among what it finds later.
+    """
     law = {"law": "graph", "points": [[0, 0], [0, 1.2e4], [4e-5, 0]]}
     scene = hvi.Scene.model_validate(
         {
@@ -353,10 +360,14 @@ def test_a_block_that_sticks_and_could_slide_off_has_one_equilibrium_and_no_lowe
             },
         }
     )
-    found = hvi.equilibria(scene)
-    assert found.reason.startswith("1 found")
-    assert [s.energy for s in found.solutions] == pytest.approx([hvi.solve(scene).energy], rel=1e-9)
-    assert (found.kinds, found.lower_bound) == (("minimiser",), None)
+    prepared, asked = prepare(scene), itertools.count()
+    searched = Equilibria(prepared)
+    found = searched.find(lowest=False, gap=1e-8, stop=lambda: next(asked) > 560, report=lambda _: None)
+    assert found.reason.startswith("1 found, and")
+    assert [p.energy * prepared.problem.scales.energy for p in found.points] == pytest.approx(
+        [hvi.solve(scene).energy], rel=1e-9
+    )
+    assert (found.points[0].kind, found.lower_bound) == (Kind.MINIMISER, None)
     lowest = hvi.equilibria(scene, lowest=True)
     assert (lowest.proven, lowest.lower_bound, len(lowest.solutions)) == (False, None, 0)
     assert "falls without limit" in lowest.reason

@@ -19,7 +19,7 @@ LENGTHS = random_problem(0, 6, 3, opening=True)
 COMPONENTS = problem_of(FAST[0])[0]
 
 
-def stopped(problem: ScalarProblem, solves: int, *, lowest: bool) -> tuple[Found, int]:
+def stopped(problem: ScalarProblem, solves: int, wanted: Wanted) -> tuple[Found, int]:
     """What is found by a search that is told to stop after some linear systems, and how many it solved after that."""
     count, solve = [0], convex_programme.cho_solve
 
@@ -29,20 +29,20 @@ def stopped(problem: ScalarProblem, solves: int, *, lowest: bool) -> tuple[Found
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(convex_programme, "cho_solve", counted)
-        found = find(problem, Wanted(lowest=lowest), lambda: count[0] >= solves, lambda _: None)
+        found = find(problem, wanted, lambda: count[0] >= solves, lambda _: None)
     return found, max(count[0] - solves, 0)
 
 
 @pytest.mark.parametrize("solves", [1, 3, 10, 30, 60, 100])
 @pytest.mark.parametrize(
-    ("problem", "lowest"),
-    [(LENGTHS, True), (LENGTHS, False), (COMPONENTS, True)],
+    ("problem", "wanted"),
+    [(LENGTHS, Wanted(lowest=True)), (LENGTHS, Wanted(has_potential=False)), (COMPONENTS, Wanted(lowest=True))],
     ids=["lowest, lengths", "some, lengths", "lowest, components"],
 )
 def test_a_search_stops_within_a_few_linear_systems_and_its_bound_holds(
-    problem: ScalarProblem, lowest: bool, solves: int
+    problem: ScalarProblem, wanted: Wanted, solves: int
 ) -> None:
-    found, further = stopped(problem, solves, lowest=lowest)
+    found, further = stopped(problem, solves, wanted)
     assert further <= 3
     ends = itertools.islice(candidates(problem, [], lambda: False, lambda: False), 3)
     least = min(map(problem.energy, ends))
