@@ -522,6 +522,38 @@ def test_a_jump_that_is_shorter_than_a_step_is_seen(excess: float, monkeypatch: 
     assert jump.x[0] == pytest.approx(there, abs=1e-10)  # where the force changes by 1e-10 of the excess
 
 
+def beam(nodes: int, delta: float) -> CondensedProblem:
+    """A beam on a floor, glued to it by bonds that soften exponentially, lifted at its first node."""
+    bending = np.diff(np.eye(nodes + 2), 2, axis=0)
+    stiffness, free = 10.0 * bending.T @ bending, np.arange(1, nodes)
+    glue = bonds(Exponential(1.0, 0.0, delta), np.arange(nodes - 1))
+    return problem(stiffness[np.ix_(free, free)], -stiffness[free, 0], glue, lower=0.0)
+
+
+@pytest.mark.long
+def test_a_motion_rests_where_all_bonds_are_on_their_graphs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Near a limit point the last correction may lead far: one bond of this beam was told 0.0075 below its floor."""
+    monkeypatch.setattr(Jump, "_held_back", lambda self, most: None)
+    given = beam(20, 0.03)
+    _, states = path(given, programme=(20.0,), remember=(0,))
+    assert min(float(np.min(state.x)) for state in states) > -1e-9
+    assert largest_distance(given, states, (0,)) < 1e-8
+
+
+def test_a_jump_goes_on_in_the_sense_in_which_the_energy_falls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A beam that is peeled off, with memory: many bonds are at ends, and the softest motion leads on out of the cell.
+
+    The other sense leads uphill, and a motion in time would take thousands of steps.
+    """
+    monkeypatch.setattr(Jump, "_released", lambda self: pytest.fail("a motion in time"))
+    given = beam(12, 0.1)
+    follower, states = path(given, programme=(20.0,), remember=(0,))
+    assert follower.end is End.REACHED
+    assert sum(state.event is Event.JUMP for state in states) > 5
+    assert min(state.released for state in states) > -1e-12
+    assert largest_distance(given, states, (0,)) < 1e-8
+
+
 class TurningBack(GoingRound):
     """Passages that leave all numbers as they are: each site turns back once, to a graph of its own."""
 

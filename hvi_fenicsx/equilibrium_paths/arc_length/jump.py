@@ -194,15 +194,21 @@ def _alone(unknowns: Integers, motion: Array) -> Array:
 
 
 def _motions(problem: CondensedProblem, sites: Sites, here: Place, path: Array) -> Iterator[Array]:
-    """Motions in which the energy falls, of size 1."""
+    """Motions in which the energy may fall, of size 1.
+
+    Where many sites are at ends of their segments, the lowest one may lead on in the sense that leaves the cell.
+    """
     drops = sites.on_drops()
-    found = [_after_drops(problem, sites, here, drops)] if drops else []
-    lowest = None if drops else _lowest(sites, here)
-    if lowest is not None:
-        found += [lowest * (np.sign(_into_cell(sites, here, lowest) or float(lowest @ path)) or 1.0)]
+    if drops:
+        found = [_after_drops(problem, sites, here, drops), path]
+    elif (lowest := _lowest(sites, here)) is not None:
+        lowest *= np.sign(_into_cell(sites, here, lowest) or float(lowest @ path)) or 1.0
+        found = [lowest, path, -lowest]
+    else:
+        found = [path]
     seen: list[Array] = []
     same = sites.thresholds.jump.same
-    for motion in (*found, path):
+    for motion in found:
         size = float(np.max(np.abs(motion), initial=0.0))
         if size and not any(np.allclose(motion / size, other, rtol=0.0, atol=same) for other in seen):
             seen.append(np.asarray(motion / size))

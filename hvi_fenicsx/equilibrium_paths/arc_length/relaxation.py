@@ -111,11 +111,16 @@ class Relaxation:
         return rests and self._sites.unstable_directions(values) == 0
 
     def _settled(self) -> bool:
-        """The equilibrium itself, from where the motion is slow; whether it is stable."""
+        """The equilibrium itself, from where the motion is slow; whether it is stable, and on the sites' segments."""
         self._sites.stiffness = self._problem.stiffness
         curve = Curve(self._load, np.zeros_like(self._load), self._sites, self.z, 0.0)
-        self.z = curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
-        return self._sites.unstable_directions(self._sites.values(self.z)) == 0
+        z = curve.correct(curve.here.y, curve.at_factor(0.0))[:-1]
+        values, low, high = self._sites.values(z), self._sites.low, self._sites.high
+        beyond = np.maximum(low - values.s, values.s - high) > curve.limits.rounding * (1.0 + np.abs(values.s))
+        if np.any(beyond) or self._sites.unstable_directions(values):
+            return False
+        self.z = z
+        return True
 
     def _stepped_or_back(self) -> _Went:
         """One step in time; where it led nowhere, nothing has changed."""
