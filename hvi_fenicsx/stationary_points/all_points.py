@@ -1,7 +1,7 @@
 """All stationary points: cells that no point satisfies are given up, the others divided until each has one at most.
 
 A cell gives each unknown an interval, or one joint of its law. It needs no division where its laws tell that it has one
-stationary point at most, and which (:mod:`.polyline_cells`, :mod:`.curved_cells`, :mod:`.smooth_system`). A drop is
+stationary point at most, and which (:mod:`.polyline_cells`, :mod:`.curved_cells`, :mod:`.smooth_proofs`). A drop is
 divided in three: before it, behind it, and on it, where the traction may have any value between. Of curved laws the
 tests that make cells smaller see polylines near the tractions, and allow for what these differ by. Where laws act on
 lengths, cells have intervals of these, too (:mod:`.length_cells`).

@@ -27,7 +27,8 @@ from .polyline_cells import PolylineCells
 from .rigid_balance import RigidBalance
 from .scalar_problem import ScalarProblem
 from .settled import settled
-from .smooth_system import SmoothSystem, is_positive
+from .smooth_proofs import image, is_only_one, is_positive
+from .smooth_system import SmoothSystem
 
 
 class LengthCells:
@@ -194,17 +195,17 @@ class LengthCells:
         starts: Sequence[Array] = (system.start, system.from_point(cell.x))
         for start in starts:
             u = system.solution(start)
-            if u is not None and system.about(u).regular and system.holds_one(u):
+            if u is not None and is_only_one(system, u):
                 point = self.point(system.x(u))
                 return Divided() if point is None else Divided(points=[point])
-        image = system.image()
-        if image is None:
+        found = image(system)
+        if found is None:
             return cell
-        ends = meet(system.ends, image)
+        ends = meet(system.ends, found)
         return Divided() if np.any(ends[0] > ends[1]) else system.smaller(cell, ends)
 
     def _has_one_at_most(self, ranges: Ranges) -> bool:
-        """Whether S plus the least slopes of laws is positive definite, and none drops (:mod:`.smooth_system`)."""
+        """Whether S plus the least slopes of laws is positive definite, and none drops (:mod:`.smooth_proofs`)."""
         problem, (low, high) = self._problem, ranges.x
         n, arcs, (short, far) = problem.size, problem.arcs, ranges.r
         ends = np.concatenate([low, short]), np.concatenate([high, far])

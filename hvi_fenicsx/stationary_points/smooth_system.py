@@ -1,4 +1,4 @@
-"""The balance of forces in a cell where all laws are smooth: equations, how many solutions they have, and which.
+"""The balance of forces in a cell where all laws are smooth: its equations, and a solution of them.
 
 The unknowns are u = (x, s): with Sx + κz - f = 0 goes ½(|z|² - r²) = 0 for each vector z whose secant κ is not constant
 in the cell. On an arc g = a + b r of its law s is r, and κ = b + a/r; on a drop r is fixed, and s is κ. All entries of
@@ -12,13 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Integers, Mask
 from .boxes import Box
 from .cell_parts import at_bounds
 from .length_ranges import Ranges, times
-from .scalar_problem import ScalarProblem
+from .scalar_problem import ArcTable, ScalarProblem
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -63,39 +62,25 @@ class SmoothSystem:
             problem: the problem.
             cell: with the unknowns, the lengths and their tractions, (n + 2m,).
         """
-        ranges, n = Ranges.of(problem, cell), problem.size
-        low, high = ranges.x
-        unfixed = low < high
-        own = problem.arcs.meets(*(np.concatenate([end, np.zeros(len(problem.lengths))]) for end in (low, high)))[:n]
-        several = unfixed & (own.sum(axis=1) > 1)
-        bound = at_bounds(problem, replace(cell, low=low, high=high))
-        if np.any(several | bound) or np.any(ranges.mixed) or np.any(ranges.at_zero & (ranges.r[1] > 0.0)):
+        ranges = Ranges.of(problem, cell)
+        unfixed = ranges.x[0] < ranges.x[1]
+        own, meets = _met(ranges)
+        seen, drops = _seen(ranges), (ranges.r[0] == ranges.r[1]) & (ranges.r[0] > 0.0)
+        acts = np.any(seen & unfixed[problem.lengths.unknowns], axis=1)
+        several = np.any(unfixed & (own.sum(axis=1) > 1)) or np.any(acts & ~drops & (meets.sum(axis=1) > 1))
+        if several or _is_cornered(ranges, cell):
             return None
-        k, rows = np.argmax(own, axis=1), np.arange(n)
-        arcs = problem.arcs
-        slopes = np.where(unfixed, arcs.slopes[rows, k], 0.0)
-        offsets = np.where(unfixed, arcs.tractions[rows, k] - slopes * arcs.anchors[rows, k], 0.0)
-        lengths = problem.lengths
-        seen = lengths.there & ~ranges.at_zero[:, None]
-        seen[:, 0] &= ~(lengths.opens & (ranges.vectors[1, :, 0] <= 0.0))
-        laws, (short, far) = ranges.laws, ranges.r
-        meets = laws.meets(short, far)
-        drops = (short == far) & (short > 0.0)
-        acts = np.any(seen & unfixed[lengths.unknowns], axis=1)
-        if np.any(acts & ~drops & (meets.sum(axis=1) > 1)):
-            return None
-        j, each = np.argmax(meets, axis=1), np.arange(len(lengths))
-        b = laws.slopes[each, j]
-        a = laws.tractions[each, j] - b * laws.anchors[each, j]
-        straight = ~drops & (np.abs(a) <= laws.rounding)
+        slopes, offsets = _lines(problem.arcs, own, unfixed)
+        b, a = _lines(ranges.laws, meets, np.ones(len(meets), dtype=np.bool_))
+        straight = ~drops & (np.abs(a) <= ranges.laws.rounding)
         for v, c in zip(*np.nonzero(seen & straight[:, None]), strict=True):
-            slopes[lengths.unknowns[v, c]] += lengths.factors[v, c] ** 2 * b[v]
+            slopes[problem.lengths.unknowns[v, c]] += problem.lengths.factors[v, c] ** 2 * b[v]
         curved = np.flatnonzero(acts & ~straight)
         own_ends = np.where(drops, ranges.secants, ranges.r)[:, curved]
         return cls(
             problem=problem,
             free=np.flatnonzero(unfixed),
-            fixed=np.where(unfixed, 0.0, low),
+            fixed=np.where(unfixed, 0.0, ranges.x[0]),
             slopes=slopes,
             offsets=offsets,
             curved=curved,
@@ -103,7 +88,7 @@ class SmoothSystem:
             a=np.where(drops, 0.0, a)[curved],
             b=np.where(drops, 0.0, b)[curved],
             drops=drops[curved],
-            r=short[curved],
+            r=ranges.r[0, curved],
             ends=np.concatenate([ranges.x[:, unfixed], own_ends], axis=1),
         )
 
@@ -159,8 +144,8 @@ class SmoothSystem:
         u, limits = start, self.problem.thresholds.points
         before = np.inf
         for _ in range(limits.newton_steps):
-            rest, error = self._rest(u)
-            derivative = self._derivative(np.stack([u, u]))[0]
+            rest, error = self.rest(u)
+            derivative = self.derivative(np.stack([u, u]))[0]
             if not np.all(np.isfinite(derivative)):
                 return None
             try:
@@ -171,53 +156,24 @@ class SmoothSystem:
             if np.all(np.abs(rest) <= error) and size >= 0.5 * before:
                 return u
             u, before = u + step, size
-        return u if np.all(np.abs(self._rest(u)[0]) <= 4.0 * self._rest(u)[1]) else None
+        return u if np.all(np.abs(self.rest(u)[0]) <= 4.0 * self.rest(u)[1]) else None
 
-    def about(self, u: Array) -> SmoothSystem:
-        """The equations of a cell that also holds a solution and what is very near it.
+    def near(self, u: Array) -> Array:
+        """How near to a computed solution all is the same point, (k + l,).
 
         Args:
             u: the solution, (k + l,).
         """
-        near = self._near(u)
-        return replace(self, ends=np.stack([np.minimum(self.ends[0], u - near), np.maximum(self.ends[1], u + near)]))
-
-    def holds_one(self, u: Array) -> bool:
-        """Whether a solution is very near a computed one: Krawczyk's image of what is near lies within.
-
-        Args:
-            u: the computed one, (k + l,).
-        """
-        near = self._near(u)
-        image = replace(self, ends=np.stack([u - near, u + near])).image()
-        return image is not None and bool(np.all((image[0] > u - near) & (image[1] < u + near)))
-
-    def image(self) -> Array | None:
-        """Intervals for all solutions in the cell (Krawczyk's operator), (2, k + l); None where it is not defined."""
-        derived = self._inverted()
-        if derived is None:
-            return None
-        inverse, off = derived
-        middle = self.start
-        rest, error = self._rest(middle)
-        half = np.maximum(self.ends[1] - middle, middle - self.ends[0]) * (1.0 + 4.0 * EPSILON)
-        moved = middle - inverse @ rest
-        reach = off @ half + np.abs(inverse) @ error
-        reach += 4.0 * EPSILON * (np.abs(moved) + len(moved) * (np.abs(inverse) @ np.abs(rest)))
-        return np.stack([moved - reach, moved + reach])
-
-    @property
-    def regular(self) -> bool:
-        """Whether there is one solution in the cell at most."""
-        return self._monotone() or self._contracts()
-
-    def _near(self, u: Array) -> Array:
         size = self.problem.thresholds.points.accuracy * (1.0 + float(np.max(np.abs(self.x(u)), initial=0.0)))
         own = u[len(self.free) :]
         return np.concatenate([np.full(len(self.free), size), np.where(self.drops, size * np.abs(own) + size, size)])
 
-    def _secants(self, own: Array) -> Array:
-        """κ, (..., l), of r or κ."""
+    def secants(self, own: Array) -> Array:
+        """κ, (..., l).
+
+        Args:
+            own: r, or κ on drops, (..., l).
+        """
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(np.where(self.drops, own, self.b + self.a / own))
 
@@ -228,10 +184,14 @@ class SmoothSystem:
         at = x[..., lengths.unknowns[v]]
         return factors * at, factors**2 * at
 
-    def _rest(self, u: Array) -> tuple[Array, Array]:
-        """What is missing in the equations, and its rounding error, (k + l,) each."""
+    def rest(self, u: Array) -> tuple[Array, Array]:
+        """What is missing in the equations, and its rounding error, (k + l,) each.
+
+        Args:
+            u: (k + l,).
+        """
         problem, x, own = self.problem, self.x(u), u[len(self.free) :]
-        kappa, lengths = self._secants(own), problem.lengths
+        kappa, lengths = self.secants(own), problem.lengths
         z, weighed = self._parts(x)
         laws = self.slopes * x + self.offsets
         sizes = np.abs(self.slopes * x) + np.abs(self.offsets) + np.abs(problem.stiffness) @ np.abs(x)
@@ -246,13 +206,17 @@ class SmoothSystem:
         sizes = np.concatenate([(sizes + np.abs(problem.force))[self.free], (z**2).sum(axis=1) + r**2])
         return rest, problem.thresholds.cells.roundings * len(x) * EPSILON * sizes
 
-    def _derivative(self, ends: Array) -> Array:
-        """The interval of the derivative on intervals of u, (2, k + l, k + l)."""
+    def derivative(self, ends: Array) -> Array:
+        """The interval of the derivative on intervals of u, (2, k + l, k + l).
+
+        Args:
+            ends: these intervals, (2, k + l).
+        """
         problem, k, n = self.problem, len(self.free), self.problem.size
         lengths = problem.lengths
         x = np.stack([self.x(end) for end in ends])
         own = ends[:, k:]
-        kappa = np.sort(self._secants(own), axis=0)
+        kappa = np.sort(self.secants(own), axis=0)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             bent = np.where(self.drops, 1.0, np.sort(-self.a / own**2, axis=0))
         weighed = np.sort(self._parts(x)[1], axis=0)
@@ -269,64 +233,31 @@ class SmoothSystem:
         kept = np.concatenate([self.free, n + np.arange(len(self.curved))])
         return whole[:, kept[:, None], kept]
 
-    def _inverted(self) -> tuple[Array, Array] | None:
-        """An inverse Y of the middle of the derivative J, and the largest |I - YJ|; None where there is none."""
-        if np.any(self.ends[0, len(self.free) :][~self.drops] <= 0.0):
-            return None
-        low, high = self._derivative(self.ends)
-        if not np.all(np.isfinite([low, high])):
-            return None
-        middle = 0.5 * (low + high)
-        half = np.maximum(high - middle, middle - low) + 4.0 * EPSILON * np.abs(middle)
-        try:
-            inverse = np.linalg.inv(middle)
-        except np.linalg.LinAlgError:
-            return None
-        size = len(middle)
-        off = np.abs(np.eye(size) - inverse @ middle) + np.abs(inverse) @ half
-        return inverse, off + 2.0 * size * EPSILON * (np.abs(inverse) @ np.abs(middle))
 
-    def _contracts(self) -> bool:
-        """Whether |I - YJ| w < w for some w > 0: J is regular then, and so are all means of it."""
-        derived = self._inverted()
-        if derived is None:
-            return False
-        off = derived[1]
-        try:
-            weights = np.linalg.solve(np.eye(len(off)) - off, np.ones(len(off)))
-        except np.linalg.LinAlgError:
-            return False
-        return bool(np.all(weights > 0.0) and np.all(off @ weights < (1.0 - 1e-9) * weights))
-
-    def _monotone(self) -> bool:
-        """Whether S plus the least of g' and κ is positive definite.
-
-        Two vectors y and z whose lengths are in an interval on which both are c at least have tractions with
-        (y - z)·(t - τ) ≥ c |y - z|²: it is linear in the cosine between them, and holds where that is 1 or -1. On a
-        drop it holds with c = κ.
-        """
-        own = self.ends[:, len(self.free) :]
-        if np.any(own[0] <= 0.0):
-            return False
-        kappa = self._secants(own).min(axis=0)
-        least = self.slopes.copy()
-        c = np.where(self.drops, kappa, np.minimum(self.b, kappa))
-        lengths = self.problem.lengths
-        added = c[:, None] * lengths.factors[self.curved] ** 2
-        least[lengths.unknowns[self.curved][self.seen]] += added[self.seen]
-        free = self.free
-        return is_positive(self.problem.stiffness[np.ix_(free, free)] + np.diag(least[free]), self.problem)
+def _met(ranges: Ranges) -> tuple[Mask, Mask]:
+    """Which arcs the laws of one component, and those of lengths, meet in a cell, (n, ...) and (m, ...)."""
+    rest = np.zeros(len(ranges.problem.lengths))
+    own = ranges.problem.arcs.meets(*(np.concatenate([end, rest]) for end in ranges.x))
+    return own[: ranges.problem.size], ranges.laws.meets(*ranges.r)
 
 
-def is_positive(matrix: Array, problem: ScalarProblem) -> bool:
-    """Whether a matrix is positive definite, its least pivot above a share of the largest.
+def _seen(ranges: Ranges) -> Mask:
+    """Which components of the vectors count in a cell, (m, 3)."""
+    lengths = ranges.problem.lengths
+    seen = lengths.there & ~ranges.at_zero[:, None]
+    seen[:, 0] &= ~(lengths.opens & (ranges.vectors[1, :, 0] <= 0.0))
+    return np.asarray(seen)
 
-    Args:
-        matrix: symmetric, (k, k).
-        problem: with the share.
-    """
-    try:
-        pivots = np.diag(cholesky(matrix, lower=True)) if np.all(np.isfinite(matrix)) else np.array([-1.0])
-    except LinAlgError:
-        return False
-    return bool(pivots.min(initial=np.inf) > problem.thresholds.cells.regular * pivots.max(initial=0.0))
+
+def _is_cornered(ranges: Ranges, cell: Box) -> bool:
+    """Whether a bound, an opening or a length of zero is within the cell, not at its end."""
+    box = replace(cell, low=ranges.x[0], high=ranges.x[1])
+    bound, zero = at_bounds(ranges.problem, box), ranges.at_zero & (ranges.r[1] > 0.0)
+    return bool(np.any((ranges.x[0] < ranges.x[1]) & bound) or np.any(ranges.mixed) or np.any(zero))
+
+
+def _lines(arcs: ArcTable, meets: Mask, there: Mask) -> tuple[Array, Array]:
+    """Slope and offset of the traction on the first arc that each law meets, zero where it is not there, (n,) each."""
+    k, rows = np.argmax(meets, axis=1), np.arange(len(meets))
+    slopes = np.where(there, arcs.slopes[rows, k], 0.0)
+    return slopes, np.where(there, arcs.tractions[rows, k] - slopes * arcs.anchors[rows, k], 0.0)
