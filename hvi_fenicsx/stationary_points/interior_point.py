@@ -88,11 +88,10 @@ def iterates(programme: Programme, thresholds: BalanceThresholds) -> Iterator[It
         if z @ s < thresholds.enough * len(z) and rest.largest < thresholds.balanced:
             return
         try:
-            newton = _Newton(programme, z, s, rest, thresholds)
+            with np.errstate(over="ignore", invalid="ignore"):
+                changes = _Newton(programme, z, s, rest, thresholds).step()
         except LinAlgError:
             return
-        with np.errstate(over="ignore", invalid="ignore"):
-            changes = newton.step()
         if not all(np.all(np.abs(change) < thresholds.largest) for change in changes):
             return
         dx, du, dz, ds = changes
