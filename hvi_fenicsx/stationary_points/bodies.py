@@ -95,6 +95,8 @@ class Equilibria:
         """
         if self.problem is None:
             return NONE
+        if not lowest and saved is None and (only := self._only()) is not None:
+            return only
         scales = self._prepared.problem.scales
         wanted = Wanted(
             lowest=lowest,
@@ -102,12 +104,10 @@ class Equilibria:
             bounded=self._prepared.solvability.state == "held",
             has_potential=self._prepared.problem.has_potential,
             no_lowest=self._no_lowest,
-            known=() if lowest or not len(self.problem.lengths) or stop() else self._known(stop),
+            known=() if lowest or saved is not None or stop() else self._known(stop),
             exact=self._exact,
             energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
         )
-        if not lowest and saved is None and (only := self._only()) is not None:
-            return only
         with self._prepared.timer("solve"):
             if self.problem.error and lowest and not wanted.no_lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)

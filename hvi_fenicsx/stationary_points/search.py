@@ -135,10 +135,12 @@ def _all(task: Task) -> Found:
         task.report(all_in_words(now, clock))
         task.keep(lambda: _left_of_all(search))
 
+    for x in task.wanted.known:
+        search.enter(x)
     few = False  # a few cells often are all
     if task.saved is None:
         search.start()
-        few = search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell)
+        few = search.run(lambda: search.cells >= task.first_cells or task.stop(), tell)
     below = None if few else bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)

@@ -24,3 +24,9 @@ class Task:
     def most_boxes(self) -> int:
         """Boxes that are bounded for the gap where what was asked for is not proven."""
         return self.problem.thresholds.lowest.most_boxes
+
+    @property
+    def first_cells(self) -> int:
+        """Cells for all points that are looked at first: of many vectors each takes long and tells little."""
+        few = self.problem.thresholds.systematic.vectors
+        return max(self.most_boxes * few // max(len(self.problem.lengths), few), 1)

@@ -146,6 +146,7 @@ class SystematicThresholds:
         most_points: points from which further ones are looked for, one after the other.
         failures: attempts without a new point after which a start is given up.
         same: where points are not exact, or were made so, those nearer than this share of the displacements are one.
+        vectors: up to so many a proof that no point is missed may come to its end soon.
         most_vain: attempts in a row to find a new point, where a proof goes on after them.
         newton_steps: Newton steps of one attempt.
         accuracy: residual of a root, relative to the largest force.
@@ -162,6 +163,7 @@ class SystematicThresholds:
     most_points: int = 100
     failures: int = 3
     same: float = 1e-4
+    vectors: int = 8
     most_vain: int = 100
     newton_steps: int = 40
     accuracy: float = 1e-11
