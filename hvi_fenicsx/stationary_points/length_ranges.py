@@ -25,14 +25,24 @@ SLOPES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def times(one: Array, other: Array) -> Array:
-    """The products of intervals (2, ...); zero times anything is zero."""
+    """The products of intervals, (2, ...); zero times anything is zero.
+
+    Args:
+        one: first and last ends, (2, ...).
+        other: the same.
+    """
     with np.errstate(invalid="ignore"):
         ends = np.stack([np.nan_to_num(a * b, nan=0.0, posinf=INF, neginf=-INF) for a in one for b in other])
     return np.stack([ends.min(axis=0), ends.max(axis=0)])
 
 
 def meet(one: Array, other: Array) -> Array:
-    """What intervals (2, ...) have in common; empty where the first end is above the second."""
+    """What intervals have in common, (2, ...); empty where the first end is above the second.
+
+    Args:
+        one: first and last ends, (2, ...).
+        other: the same.
+    """
     return np.stack([np.maximum(one[0], other[0]), np.minimum(one[1], other[1])])
 
 

@@ -31,7 +31,7 @@ from hvi_fenicsx.equilibrium_paths.graphs import Passed, remembering
 from hvi_fenicsx.equilibrium_paths.kinds import ArcLengthKind, ExactKind, kind_of
 from hvi_fenicsx.equilibrium_paths.programme import Follower
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
-from hvi_fenicsx.equilibrium_paths.thresholds import CurveThresholds
+from hvi_fenicsx.equilibrium_paths.thresholds import CurveThresholds, JumpThresholds, Thresholds
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
 from hvi_fenicsx.laws.smoothing import create
@@ -513,7 +513,7 @@ def test_a_jump_that_is_shorter_than_a_step_is_seen(excess: float, monkeypatch: 
 
     No motion in time is wanted, which would crawl: hardly any force drives it.
     """
-    monkeypatch.setattr(Jump, "_released", lambda self: pytest.fail("a motion in time"))
+    monkeypatch.setattr(Relaxation, "run", lambda *_: pytest.fail("a motion in time"))
     spring = 1.0 / (1.0 + excess)
     _, states = path(problem(spring, spring, bonds(Exponential(1.0, 0.0, 1.0), 0)), programme=(1.5,))
     jump = next(state for state in states if state.event is Event.JUMP)
@@ -531,11 +531,10 @@ def beam(nodes: int, delta: float) -> CondensedProblem:
 
 
 @pytest.mark.long
-def test_a_motion_rests_where_all_bonds_are_on_their_graphs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_motion_rests_where_all_bonds_are_on_their_graphs() -> None:
     """Near a limit point the last correction may lead far: one bond of this beam was told 0.0075 below its floor."""
-    monkeypatch.setattr(Jump, "_held_back", lambda self, most: None)
-    given = beam(20, 0.03)
-    _, states = path(given, programme=(20.0,), remember=(0,))
+    given, in_time = beam(20, 0.03), Thresholds(jump=JumpThresholds(steps=0, later_steps=0))
+    _, states = path(given, programme=(20.0,), remember=(0,), thresholds=in_time)
     assert min(float(np.min(state.x)) for state in states) > -1e-9
     assert largest_distance(given, states, (0,)) < 1e-8
 
@@ -545,7 +544,7 @@ def test_a_jump_goes_on_in_the_sense_in_which_the_energy_falls(monkeypatch: pyte
 
     The other sense leads uphill, and a motion in time would take thousands of steps.
     """
-    monkeypatch.setattr(Jump, "_released", lambda self: pytest.fail("a motion in time"))
+    monkeypatch.setattr(Relaxation, "run", lambda *_: pytest.fail("a motion in time"))
     given = beam(12, 0.1)
     follower, states = path(given, programme=(20.0,), remember=(0,))
     assert follower.end is End.REACHED
