@@ -164,8 +164,8 @@ def long(*cases: tuple[int, int, int, float]) -> list[object]:
     ("seed", "m", "k", "share"),
     [
         *((seed, 1, 2, 0.3) for seed in (7, 14, 18, 41)),
-        *long(*((seed, 1, 2, share) for seed in range(60) for share in (0.3, 1.0))),
-        *long(*((seed, 2, 2, 0.5) for seed in range(12)), *((seed, 1, 3, 0.3) for seed in range(30))),
+        *long(*((seed, 1, 2, share) for seed in range(20) for share in (0.3, 1.0))),
+        *long(*((seed, 2, 2, 0.5) for seed in range(6)), *((seed, 1, 3, 0.3) for seed in range(12))),
     ],
 )
 def test_all_points_are_those_of_each_choice_of_pieces(seed: int, m: int, k: int, share: float) -> None:
@@ -175,9 +175,10 @@ def test_all_points_are_those_of_each_choice_of_pieces(seed: int, m: int, k: int
     random = np.random.default_rng(seed)
     for point in found:
         ways = np.vstack([np.eye(problem.size), -np.eye(problem.size), random.normal(size=(2000, problem.size))])
-        fall = point.energy - min(problem.energy(np.maximum(point.x + 1e-5 * way, problem.lower)) for way in ways)
+        step, rounding = 1e-5 * (1.0 + np.max(np.abs(point.x))), 1e-14 * (1.0 + problem.energy_size(point.x))
+        fall = point.energy - min(problem.energy(np.maximum(point.x + step * way, problem.lower)) for way in ways)
         if point.kind is not Kind.UNDECIDED:
-            assert (fall > 1e-14) == (point.kind is Kind.SADDLE)
+            assert (fall > rounding) == (point.kind is Kind.SADDLE)
 
 
 @pytest.mark.parametrize("seed", [18, pytest.param(3, marks=pytest.mark.long)])
