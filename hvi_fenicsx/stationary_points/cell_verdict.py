@@ -29,16 +29,8 @@ class Verdict:
     undecided: bool = False
 
 
-class LawsOfCells(Protocol):
-    """Laws of some kind: what they allow in a cell, and at a point."""
-
-    def verdict(self, cell: Box, known: PointList) -> Verdict:
-        """What is known of a cell.
-
-        Args:
-            cell: the cell.
-            known: points that were found before.
-        """
+class Points(Protocol):
+    """What is known of places: which are stationary points, and which of these are one."""
 
     def point(self, x: Array) -> StationaryPoint | None:
         """The stationary point at a place, or very near it; None where there is none.
@@ -53,4 +45,16 @@ class LawsOfCells(Protocol):
         Args:
             x: a stationary point, (n,).
             y: another one, (n,).
+        """
+
+
+class LawsOfCells(Points, Protocol):
+    """Laws of some kind: what they allow in a cell, and at a point."""
+
+    def verdict(self, cell: Box, known: PointList) -> Verdict:
+        """What is known of a cell.
+
+        Args:
+            cell: the cell.
+            known: points that were found before.
         """

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..typing import Array
 from .boxes import Box
+from .cell_verdict import Points
 from .point_list import PointList, StationaryPoint
 
 
@@ -26,7 +26,7 @@ class Divided:
     undecided: Sequence[Box] = ()
 
 
-class Cells(Protocol):
+class Cells(Points, Protocol):
     """The cells of a problem."""
 
     def first(self) -> Box | None:
@@ -39,19 +39,4 @@ class Cells(Protocol):
             cell: the cell.
             known: points that were found before.
             cut: whether to be content with less of a proof.
-        """
-
-    def point(self, x: Array) -> StationaryPoint | None:
-        """The stationary point at a place, or very near it; None where there is none.
-
-        Args:
-            x: the place, (n,).
-        """
-
-    def joined(self, x: Array, y: Array) -> bool:
-        """Whether two points cannot be told apart, or are parts of one continuum: all between is in balance.
-
-        Args:
-            x: a stationary point, (n,).
-            y: another one, (n,).
         """
