@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import multiprocessing
 import os
 import signal
@@ -108,6 +109,7 @@ def draw_all(result: Result) -> list[HviError]:
         found = list(drawings(result))
         _ = result.body.pieces  # which pictures need, as they do the boundary: once, for all processes that draw
         server.wait()
+        gc.freeze()  # the processes share what is there; a collection in one of them would copy it
         shares = min(len(found), os.cpu_count() or 1)
         running = [_started(found[i::shares]) for i in range(shares)]
         return [failure for one in running for failure in _ended(one)]
