@@ -80,15 +80,15 @@ class BodyMesh:
     @cached_property
     def pieces(self) -> Integers:
         """The number of the piece that each cell is in, (c,): pieces share no vertex."""
-        if self.dimension == 2 and len(self.outline) == 1:
+        if self._has_one_surface():
             return np.zeros(len(self.cells), dtype=np.int64)
-        from scipy.sparse import coo_array  # a tenth of a second, which most plane bodies need not wait for
-        from scipy.sparse.csgraph import connected_components
+        return _joined(self.cells)[self.cells[:, 0]]
 
-        first, *others = self.cells.T
-        ends = np.tile(first, len(others)), np.concatenate(others)
-        graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(self.points),) * 2)
-        return np.asarray(connected_components(graph, directed=False)[1][first])
+    def _has_one_surface(self) -> bool:
+        """Whether all of the boundary hangs together; then so does the body, and nobody need ask its cells."""
+        if self.dimension == 2:
+            return len(self.outline) == 1
+        return len(np.unique(_joined(self.boundary)[self.outermost])) == 1
 
     @property
     def boundary(self) -> Integers:
@@ -147,6 +147,17 @@ def body_mesh(arrays: SolutionArrays) -> BodyMesh:
         escape_mode=None if arrays.escape_mode is None else _in_space(arrays.escape_mode),
         von_mises=None if arrays.von_mises is None else arrays.von_mises.astype(np.float64),
     )
+
+
+def _joined(simplices: Integers) -> Integers:
+    """The number of what each vertex hangs together with by edges, triangles or cells (k, 2|3|4), (n,)."""
+    from scipy.sparse import coo_array  # a tenth of a second, which most plane bodies need not wait for
+    from scipy.sparse.csgraph import connected_components
+
+    first, *others = simplices.T
+    ends = np.tile(first, len(others)), np.concatenate(others)
+    graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(int(simplices.max()) + 1,) * 2)
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _in_space(vectors: Array) -> Array:

@@ -508,14 +508,16 @@ def test_the_cells_fill_the_body(body: Callable[[], mesh.Mesh], size: float) -> 
     assert found.sum() == pytest.approx(size)
 
 
-def test_pieces_are_told_apart_by_their_vertices_whatever_their_holes() -> None:
-    """A ring of triangles has two outlines and is one piece; two squares have two and are two; of one there is one."""
-    whole = body_mesh(plain(square(6)))
-    off = np.abs(whole.points[whole.cells].mean(axis=1) - 0.5)[:, :2]
-    ring = replace(whole, cells=whole.cells[off.max(axis=1) > 0.2])
+@pytest.mark.parametrize("body", [square, box], ids=["plane", "space"])
+def test_pieces_are_told_apart_whatever_their_holes(body: Callable[[], mesh.Mesh]) -> None:
+    """A hole inside is a second surface of one piece; without its middle third a body is two pieces."""
+    whole = body_mesh(plain(body()))
+    lengths = np.where(whole.extents > 0.0, whole.extents, 1.0)
+    off = np.abs(whole.points[whole.cells].mean(axis=1) / lengths - 0.5)
+    hollow = replace(whole, cells=whole.cells[off[:, : whole.dimension].max(axis=1) > 0.2])
     halves = replace(whole, cells=whole.cells[off[:, 0] > 0.2])
-    found = [(len(body.outline), len(np.unique(body.pieces))) for body in (whole, ring, halves)]
-    assert found == [(1, 1), (2, 1), (2, 2)]
+    assert [len(np.unique(found.pieces)) for found in (whole, hollow, halves)] == [1, 1, 2]
+    assert len(hollow.boundary) > len(whole.boundary)
 
 
 @pytest.mark.parametrize("cells", [1, 7, 150])
