@@ -48,6 +48,7 @@ from hvi_fenicsx.report.pictures.kinds import (
     escape_plane,
     scene_plane,
     scene_space,
+    stress_plane,
 )
 from hvi_fenicsx.report.pictures.raster import shade, thinned
 from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
@@ -557,6 +558,23 @@ def test_a_thinned_image_has_no_holes_and_is_off_by_a_pixel_at_most_where_triang
     np.testing.assert_array_equal(
         thinned(points[-4:], np.array([[0, 1, 2], [0, 2, 3]]), np.ones((2, 3)), (90, 100)), np.ones((90, 100))
     )
+
+
+def test_the_extremes_that_pictures_name_are_those_of_all_cells(tmp_path: Path) -> None:
+    """Thousands of cells share a pixel at a corner; one of them has the largest stress, one vertex the way farthest."""
+    body = square(60)
+    body.geometry.x[:, :2] **= 4
+    folder = result(tmp_path / "r", body, pressed)
+    arrays = load(folder / FILE)
+    assert arrays.displacement is not None
+    sizes = body_mesh(arrays).volumes
+    stress, moved = np.full(len(arrays.cells), 1e6, dtype=np.float32), arrays.displacement.copy()
+    stress[np.argmin(sizes)] = 7e6
+    moved[arrays.cells[np.argmin(sizes), 0]] = [0.0, 3.3e-5]
+    change(folder, displacement=moved, von_mises=stress)
+    found = reader.read(folder)
+    for kind, words in ((stress_plane, "von Mises stress, peak 7 MPa"), (body_plane, "displacement |u|, up to 33 µm")):
+        assert words in [text.get_text().replace("\u202f", " ") for text in kind.draw(found).findobj(Text)]
 
 
 def test_numbers_are_said_as_people_say_them() -> None:
