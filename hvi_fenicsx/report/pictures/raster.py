@@ -14,7 +14,7 @@ import numpy as np
 from ...typing import Array, Integers, Mask
 
 _AT_ONCE = 100_000
-"""Candidate pixels handled at a time: what fits a cache is twice as fast."""
+"""Candidate pixels, or triangles, handled at a time: what fits a cache is twice as fast."""
 _EDGE = 1e-6
 _LARGEST = 1 << 20
 """More pixels than an image has on a side."""
