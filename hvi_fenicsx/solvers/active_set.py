@@ -231,11 +231,14 @@ class _SnesRun:
         ksp.setPythonContext(InactiveSolve(snes, self.owner.held, self._goal))
 
     def _goal(self, *, moved: bool) -> Goal:
-        """How exact a linear solve is: what the tolerance needs, but loose while the active set changes."""
+        """How exact a linear solve is: what the tolerance needs, but loose while the active set changes.
+
+        Where net forces are left, which residuals by vertex do not tell, its norm falls as far as they have to.
+        """
         thresholds = self.thresholds
         least = thresholds.moving_accuracy if moved else 0.0 if self.steady else thresholds.finest_accuracy
         wanted = max(thresholds.forcing * self.tolerance, least * self.last)
-        if np.max(self.sizes.net) > wanted:
+        if np.any(self.sizes.net > 0.0):
             return Goal(rtol=wanted / self.last)
         return Goal(rtol=wanted / self.last, reached=self.owner.convergence.reaches(wanted, self.sizes.forces))
 

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
-from . import ending, factor_counts, schur
+from . import factor_counts, free_rows, schur
 from .algebraic import Algebraic
 from .direct import Direct
 from .factorisation import FactorForm, form_of
@@ -79,6 +79,7 @@ class HeldPreconditioner:
     def __init__(self, system: System, levels: Levels, settings: LinearSettings, timer: Timer) -> None:
         self.system, self.levels, self.settings, self._timer = system, levels, settings, timer
         self._held: Entities | None = None
+        self._wanted: Entities = np.empty(0, np.int32)  # those held now; the preconditioner may be of others
         self._rates: list[Array] = []
         self._first_iterations, self._outdated = 0, False
         self._preconditioner: Preconditioner | None = None
@@ -90,6 +91,7 @@ class HeldPreconditioner:
 
     def prepare(self, held: Entities) -> None:
         """Make it suit these held unknowns (local, owned, sorted). Collective."""
+        self._wanted = held.copy()
         self.system.jacobian.hold(held if self.settings.kind in ("mg", "mixed") else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
             return
@@ -245,7 +247,7 @@ class HeldPreconditioner:
             ksp.solve(load, x)
         if self.system.free_motions is not None:
             self.system.free_motions.null_space.remove(x)
-        iterations, reason = ending.iterations(ksp), int(ksp.getConvergedReason())
+        iterations, reason = free_rows.iterations(ksp), int(ksp.getConvergedReason())
         ksp.destroy()
         self.report(iterations, failed=reason < 0)
         return iterations + self.inner_iterations - before, reason
@@ -260,9 +262,11 @@ class HeldPreconditioner:
             self._preconditioner.accuracy = min(goal.rtol, settings.thresholds.mixed_accuracy)
         ksp.setTolerances(rtol=goal.rtol, max_it=settings.iterations)
         configure(ksp, settings.ksp)
-        if goal.reached is not None and ksp.getType() == PETSc.KSP.Type.CG:
-            ksp.setTolerances(rtol=settings.thresholds.surplus * goal.rtol)
-            ksp.setPC(ending.ending_at(goal.reached, self._preconditioner.pc))
+        if ksp.getType() == PETSc.KSP.Type.CG:
+            if goal.reached is not None:
+                ksp.setTolerances(rtol=settings.thresholds.surplus * goal.rtol)
+            whole, held = self.system.jacobian.matrix, np.union1d(self._wanted, self.system.pins)
+            free_rows.set_up(ksp, whole, self._preconditioner.pc, held, goal.reached)
         return ksp
 
 
