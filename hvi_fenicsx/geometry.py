@@ -136,9 +136,10 @@ def chains(edges: Integers, rank: Integers | None = None) -> list[Integers]:
         The vertices of each chain in order; a closed one ends with the vertex that it begins with.
     """
     onwards: dict[int, list[int]] = {}
-    for a, b in edges:
-        onwards.setdefault(int(a), []).append(int(b))
-    inner = set(map(int, edges[:, 1]))
+    starts, ends = (list(map(int, column)) for column in edges.T)
+    for a, b in zip(starts, ends, strict=True):
+        onwards.setdefault(a, []).append(b)
+    inner = set(ends)
     found = [_walk(start, onwards) for start in [a for a in onwards if a not in inner]]
     while onwards:
         start = next(iter(onwards)) if rank is None else min(onwards, key=lambda a: int(rank[a]))

@@ -82,6 +82,8 @@ def _nearest(space: fem.FunctionSpace, work: Any) -> Array:
     for _ in _each_basis_function(weight):
         right.append(works.values())
         mass.append(masses.values().reshape(len(right[0]), basis))
+    if basis == 1:  # a division, a tenth of the time
+        return np.asarray(np.stack(right, axis=1) / mass[0][:, None])
     return np.asarray(np.linalg.solve(np.stack(mass, axis=1), np.stack(right, axis=1)))
 
 

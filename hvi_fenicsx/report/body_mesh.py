@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from ..geometry import chains
 from ..typing import Array, Integers, Mask
 from .solution_arrays import SolutionArrays
 
@@ -37,14 +36,32 @@ class BodyMesh:
         return int(self.cells.shape[1]) - 1
 
     @cached_property
-    def size(self) -> float:
-        """The largest extent, m."""
-        return float(np.max(np.ptp(self.points, axis=0)))
+    def extents(self) -> Array:
+        """How far the body reaches along each axis, m, (3,)."""
+        return np.asarray(np.ptp(self.points[self.outermost], axis=0))
 
     @property
+    def size(self) -> float:
+        """The largest extent, m."""
+        return float(np.max(self.extents))
+
+    @cached_property
     def volumes(self) -> Array:
         """Area (m²) or volume (m³) of each cell, (c,)."""
-        return np.abs(self.signed_volumes(self.points))
+        return np.abs(self._signed)
+
+    @cached_property
+    def _signed(self) -> Array:
+        return self.signed_volumes(self.points)
+
+    def kept(self, points: Array) -> Array:
+        """The part of its area or volume that each piece keeps where its vertices are elsewhere.
+
+        Args:
+            points: where they are, m, (n, 3).
+        """
+        moved = np.sign(self._signed) * self.signed_volumes(points)
+        return np.asarray(np.bincount(self.pieces, moved) / np.bincount(self.pieces, self.volumes))
 
     def signed_volumes(self, points: Array) -> Array:
         """Area (m²) or volume (m³) of each cell, (c,); it changes its sign where a cell is turned inside out.
@@ -63,15 +80,30 @@ class BodyMesh:
     @cached_property
     def pieces(self) -> Integers:
         """The number of the piece that each cell is in, (c,): pieces share no vertex."""
-        first, *others = self.cells.T
-        ends = np.tile(first, len(others)), np.concatenate(others)
-        graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(self.points),) * 2)
-        return np.asarray(connected_components(graph, directed=False)[1][first])
+        if self._has_one_surface():
+            return np.zeros(len(self.cells), dtype=np.int64)
+        return _joined(self.cells)[self.cells[:, 0]]
+
+    def _has_one_surface(self) -> bool:
+        """Whether all of the boundary hangs together; then so does the body, and nobody need ask its cells."""
+        if self.dimension == 2:
+            return len(self.outline) == 1
+        return len(np.unique(_joined(self.boundary)[self.outermost])) == 1
 
     @property
     def boundary(self) -> Integers:
         """Facets of one cell only (k, 2|3); counterclockwise seen from outside, in the plane the body on their left."""
         return self._skin[0]
+
+    @cached_property
+    def outline(self) -> list[Integers]:
+        """The closed chains of the boundary of a plane body, by their vertices."""
+        return chains(self.boundary)
+
+    @cached_property
+    def outermost(self) -> Integers:
+        """The vertices of the boundary, ascending, (m,): what a picture shows lies between them."""
+        return np.unique(self.boundary)
 
     @property
     def behind(self) -> Integers:
@@ -115,6 +147,17 @@ def body_mesh(arrays: SolutionArrays) -> BodyMesh:
         escape_mode=None if arrays.escape_mode is None else _in_space(arrays.escape_mode),
         von_mises=None if arrays.von_mises is None else arrays.von_mises.astype(np.float64),
     )
+
+
+def _joined(simplices: Integers) -> Integers:
+    """The number of what each vertex hangs together with by edges, triangles or cells (k, 2|3|4), (n,)."""
+    from scipy.sparse import coo_array  # a tenth of a second, which most plane bodies need not wait for
+    from scipy.sparse.csgraph import connected_components
+
+    first, *others = simplices.T
+    ends = np.tile(first, len(others)), np.concatenate(others)
+    graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(int(simplices.max()) + 1,) * 2)
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _in_space(vectors: Array) -> Array:

@@ -39,6 +39,7 @@ class ContactPart:
         vertices: the vertices of the body, (m,).
         facets: its facets by the vertices of the body, (k, 2) or (k, 3).
         normals: outward unit normals, (m, 2) or (m, 3).
+        drops: the slips at which the friction law drops at each vertex, m, (m, j).
     """
 
     name: str
@@ -46,6 +47,7 @@ class ContactPart:
     vertices: Integers
     facets: Integers
     normals: Array
+    drops: Array
 
     def __getitem__(self, column: str) -> Array:
         """A column of the table, (m,); NaN where the table is empty."""
@@ -137,7 +139,9 @@ class Result:
         """The parts of Γc, in the order of ``contact.csv``; none where the body is carried off."""
         found = {} if self.carried_off else self.arrays.parts
         return tuple(
-            ContactPart(name, without_noise(part.columns, self.body), part.vertices, part.facets, part.normals)
+            ContactPart(
+                name, without_noise(part.columns, self.body), part.vertices, part.facets, part.normals, part.drops
+            )
             for name, part in found.items()
         )
 

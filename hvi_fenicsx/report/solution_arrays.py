@@ -116,11 +116,15 @@ def save(path: Path, arrays: SolutionArrays) -> None:
         NotWrittenError: it cannot be written.
     """
     with writing.whole(path) as aside, aside.open("wb") as file:
-        np.savez(file, **dict(_members(arrays)))
+        np.savez(file, **members(arrays))
+
+
+def members(arrays: SolutionArrays) -> dict[str, Any]:
+    """The arrays by their keys, in the order of the file; those that are None are left out."""
+    return {key: np.asarray(value) for key, value in _members(arrays)}
 
 
 def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
-    """The arrays by their keys; those that are None are left out."""
     plain = {key: value for key, value in vars(arrays).items() if not isinstance(value, Mapping)}
     yield from ((key, value) for key, value in plain.items() if value is not None)
     yield from ((f"{_SIDE}{name}", facets) for name, facets in arrays.sides.items())
@@ -140,7 +144,7 @@ def load(path: Path) -> SolutionArrays:
     """
     try:
         with np.load(path) as stored:
-            arrays = _arrays({key: stored[key] for key in stored.files})
+            arrays = of_members({key: stored[key] for key in stored.files})
         _check(arrays)
         return arrays
     except FileNotFoundError:
@@ -151,7 +155,8 @@ def load(path: Path) -> SolutionArrays:
         raise ResultError(f"{path}: damaged ({error})") from None
 
 
-def _arrays(members: Mapping[str, Any]) -> SolutionArrays:
+def of_members(members: Mapping[str, Any]) -> SolutionArrays:
+    """The arrays from those by their keys, as :func:`members` gives them."""
     plain = {key: value for key, value in members.items() if ":" not in key}
     return SolutionArrays(
         **plain | {"degree": int(members["degree"])},

@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from dolfinx import la
 from mpi4py import MPI
 
 from ..certify.contact_state import ContactState
 from ..effects import Direction
 from ..mesh import nodes
 from ..problem import spaces
+from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..report.solution_arrays import PartArrays
-from ..runtime.row_order import RowOrder
+from ..runtime.row_order import RowOrder, distinct
 from ..typing import Array, Integers
 from . import arc_length, contact_table
 
@@ -23,7 +25,7 @@ from . import arc_length, contact_table
 def of_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
     """This rank's stretch of the rows of each part, by its name and sorted by it. Collective.
 
-    The facets are those that this rank knows, all of them, also with vertices that are on no row.
+    So are its facets, those whose vertices all have a row, each once.
 
     Args:
         problem: what was solved.
@@ -42,15 +44,24 @@ def _of_part(problem: Problem, state: ContactState) -> PartArrays:
     else:
         order = RowOrder.of(comm, _rounded(comm, surface.points))
     numbers = spaces.global_numbers(problem.space, surface.blocks)
-    facets = nodes.linear_facets(problem.space, surface.facets)
     return PartArrays(
         columns={name: order.sorted(values) for name, values in columns.items()},
         vertices=order.sorted(numbers),
-        facets=spaces.global_numbers(problem.space, facets),
+        facets=_facets(problem, surface),
         weights=order.sorted(surface.weights * scales.length ** (scales.dimension - 1)),
         normals=order.sorted(surface.normals),
         drops=order.sorted(_drops(state)) * scales.displacement,
     )
+
+
+def _facets(problem: Problem, surface: Surface) -> Integers:
+    """This rank's stretch of the facets whose vertices all have a row, by their global nodes, (k, d). Collective."""
+    on_row = la.vector(problem.space.dofmap.index_map, 1)
+    on_row.array[surface.blocks] = 1.0
+    on_row.scatter_forward()
+    facets = nodes.linear_facets(problem.space, surface.facets)
+    numbers = spaces.global_numbers(problem.space, facets[np.all(on_row.array[facets] == 1.0, axis=1)])
+    return distinct(problem.domain.mesh.comm, np.sort(numbers, axis=1))
 
 
 def _drops(state: ContactState) -> Array:

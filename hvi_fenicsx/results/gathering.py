@@ -1,4 +1,4 @@
-"""A solution as plain arrays on rank 0, in SI, whatever the ranks; its vertices are numbered as the unknowns are.
+"""A solution as plain arrays, in SI, by rank or on rank 0; its vertices are numbered as the unknowns are.
 
 At degree 2 its vertices are the nodes, and its cells and facets the parts of those of the mesh: the once refined mesh.
 """
@@ -19,42 +19,51 @@ from ..formula import Formula
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
-from ..report.solution_arrays import LoadArrays, PartArrays, Singles, SolutionArrays
+from ..report.solution_arrays import LoadArrays, PartArrays, Singles, SolutionArrays, members, of_members
 from ..runtime.mpi import agree, joined
+from ..runtime.row_order import RowOrder, distinct
 from ..solution import Solution
 from ..typing import Array, Entities, Integers
 from . import contact_rows
 
 
-def solution_arrays(
-    solution: Solution, von_mises: Singles | None = None, rows: Mapping[str, PartArrays] | None = None
-) -> SolutionArrays | None:
+def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> SolutionArrays | None:
     """A solution on rank 0; None elsewhere. Collective.
 
     Args:
         solution: what was found.
         von_mises: of the parts of the cells that this rank owns, N/m², (c,); left out where it is None.
-        rows: this rank's rows of the parts of Γc, where they are known already.
+    """
+    comm = solution.problem.domain.mesh.comm
+    own = members(own_arrays(solution, von_mises, rows_of_parts(solution)))
+    found = {key: joined(comm, values) if values.ndim else values for key, values in own.items()}
+    return None if comm.rank else of_members(found)
+
+
+def own_arrays(solution: Solution, von_mises: Singles | None, rows: Mapping[str, PartArrays]) -> SolutionArrays:
+    """This rank's rows of each array: those of all ranks, one after the other, are the solution. Collective.
+
+    Args:
+        solution: what was found.
+        von_mises: of the parts of the cells that this rank owns, N/m², (c,); left out where it is None.
+        rows: this rank's rows of the parts of Γc.
     """
     problem = solution.problem
-    comm, d = problem.domain.mesh.comm, problem.scales.dimension
-    owned = problem.space.dofmap.index_map.size_local
+    d, owned = problem.scales.dimension, problem.space.dofmap.index_map.size_local
     fields: dict[str, npt.NDArray[Any]] = {"points": problem.positions[:owned, :d], "cells": _cells(problem)}
     if solution.solve_result is not None:
         fields["displacement"] = _by_node(problem, solution.solve_result.u) * problem.scales.displacement
     elif solution.solvability.direction is not None:
         points = np.asarray(problem.points / problem.scales.length)
         fields["escape_mode"] = problem.bodies.motion(points, solution.solvability.direction)[:owned]
-    if von_mises is not None:
-        fields["von_mises"] = von_mises
-    gathered = {name: joined(comm, values) for name, values in fields.items()}
-    sides = {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}
-    loads, regions = _loads(problem), _regions(problem)
-    parts = joined_parts(comm, rows_of_parts(solution) if rows is None else rows)
-    if comm.rank:
-        return None
     return SolutionArrays(
-        **gathered, degree=nodes.degree(problem.space), sides=sides, regions=regions, loads=loads, parts=parts
+        **fields,
+        von_mises=von_mises,
+        degree=nodes.degree(problem.space),
+        sides={name: _facets(problem, facets) for name, facets in problem.part_facets.items()},
+        regions=_regions(problem),
+        loads=_loads(problem),
+        parts=rows,
     )
 
 
@@ -80,18 +89,13 @@ def _cells(problem: Problem) -> Integers:
 
 
 def _facets(problem: Problem, facets: Entities) -> Integers:
-    """Local facets by their global nodes, each once and ascending, (k, d); right on rank 0 alone. Collective."""
+    """This rank's stretch of facets by their global nodes, each once and ascending, (k, d). Collective."""
     corners = nodes.linear_facets(problem.space, facets)
-    return _distinct(joined(problem.domain.mesh.comm, spaces.global_numbers(problem.space, corners)))
-
-
-def _distinct(facets: Integers) -> Integers:
-    """Facets each once and ascending, (k, d)."""
-    return np.unique(np.sort(facets, axis=1), axis=0)
+    return distinct(problem.domain.mesh.comm, np.sort(spaces.global_numbers(problem.space, corners), axis=1))
 
 
 def _regions(problem: Problem) -> dict[str, Integers]:
-    """The cells of each region, as numbers of the gathered cells; right on rank 0 alone. Collective."""
+    """This rank's cells of each region, by their numbers among the cells of all ranks. Collective."""
     comm, parts = problem.domain.mesh.comm, nodes.parts_of_cell(problem.space)
     owned = problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local
     first = int(sum(agree(comm, owned)[: comm.rank])) * parts
@@ -100,11 +104,11 @@ def _regions(problem: Problem) -> dict[str, Integers]:
         own = np.asarray(cells[cells < owned], dtype=np.int64)
         return np.asarray((first + own[:, None] * parts + np.arange(parts)).ravel())
 
-    return {name: joined(comm, numbers(cells)) for name, cells in sorted(problem.domain.regions.items())}
+    return {name: numbers(cells) for name, cells in sorted(problem.domain.regions.items())}
 
 
 def _loads(problem: Problem) -> dict[str, LoadArrays]:
-    """The loads of each part that are no formulas, which a reader of files cannot evaluate. Collective."""
+    """This rank's stretch of the loads that are no formulas, which a reader cannot evaluate, by part. Collective."""
     found: dict[str, list[SurfaceLoad]] = {}
     for where, effect, _ in problem.contributions:
         load = effect.surface_load()
@@ -114,7 +118,7 @@ def _loads(problem: Problem) -> dict[str, LoadArrays]:
 
 
 def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> LoadArrays:
-    """Loads on one part, added up; right on rank 0 alone. Collective."""
+    """This rank's stretch of the loads on one part, added up, each vertex once. Collective."""
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
     local = np.unique(nodes.facet_nodes(problem.space, facets))
     traction, pressure = np.zeros((len(local), d)), np.zeros(len(local))
@@ -123,8 +127,10 @@ def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> L
             traction[:, i] += component.at(problem.positions[local])
         if load.pressure is not None:
             pressure += load.pressure.at(problem.positions[local])
-    vertices, first = np.unique(joined(comm, spaces.global_numbers(problem.space, local)), return_index=True)
-    return LoadArrays(vertices=vertices, traction=joined(comm, traction)[first], pressure=joined(comm, pressure)[first])
+    numbers = spaces.global_numbers(problem.space, local)
+    order = RowOrder.of(comm, numbers[:, None].astype(np.float64))
+    vertices, first = np.unique(order.sorted(numbers), return_index=True)
+    return LoadArrays(vertices=vertices, traction=order.sorted(traction)[first], pressure=order.sorted(pressure)[first])
 
 
 def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
@@ -134,27 +140,12 @@ def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, P
         problem: what was solved.
         states: of the parts.
     """
-    return joined_parts(problem.domain.mesh.comm, contact_rows.of_parts(problem, states))
+    return {
+        name: _joined(problem.domain.mesh.comm, own) for name, own in contact_rows.of_parts(problem, states).items()
+    }
 
 
-def joined_parts(comm: MPI.Comm, rows: Mapping[str, PartArrays]) -> dict[str, PartArrays]:
-    """The parts of Γc on rank 0; elsewhere this rank's rows of them. Collective.
-
-    Args:
-        comm: the ranks.
-        rows: of this rank, by part.
-    """
-    return {name: _joined_part(comm, own) for name, own in rows.items()}
-
-
-def _joined_part(comm: MPI.Comm, rows: PartArrays) -> PartArrays:
-    vertices = joined(comm, rows.vertices)
-    facets = _distinct(joined(comm, rows.facets))
-    return PartArrays(
-        columns={name: joined(comm, values) for name, values in rows.columns.items()},
-        vertices=vertices,
-        facets=facets[np.isin(facets, vertices).all(axis=1)],
-        weights=joined(comm, rows.weights),
-        normals=joined(comm, rows.normals),
-        drops=joined(comm, rows.drops),
-    )
+def _joined(comm: MPI.Comm, rows: PartArrays) -> PartArrays:
+    columns = {name: joined(comm, values) for name, values in rows.columns.items()}
+    others = {name: joined(comm, values) for name, values in vars(rows).items() if name != "columns"}
+    return PartArrays(columns=columns, **others)

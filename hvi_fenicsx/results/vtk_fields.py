@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -25,6 +26,8 @@ from .vtk_files import Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
 _STRESSES = ("stress", "von_mises", "sigma_n", "friction_t1", "friction_t2", "inclusion_distance", "traction")
+_AT_ONCE = 16_384
+"""Rows that are rounded at a time: what fits a cache takes a third of the time."""
 _UNITS = dict.fromkeys(_LENGTHS, "m") | dict.fromkeys(_STRESSES, "N/m²")
 
 
@@ -84,7 +87,7 @@ def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[st
         points=problem.positions[used],
         cells=cells,
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
-        in_cells={name: _flat(_rounded(values, 7)) for name, values in in_cells.items()},
+        in_cells={name: _rounded(values, 7) for name, values in in_cells.items()},
         units=_units(problem),
     )
 
@@ -125,29 +128,29 @@ def _units(problem: Problem) -> dict[str, str]:
     return _UNITS | {"reaction": "N/m" if problem.scales.dimension == 2 else "N"}
 
 
-def _flat(values: Array) -> npt.NDArray[np.float32]:
-    """Tensors as rows of components, numbers as they are; in single precision."""
-    rows = values if values.ndim == 1 else values.reshape(len(values), math.prod(values.shape[1:]))
-    return rows.astype(np.float32)
-
-
 def _spatial(vectors: Array) -> Array:
     """Vectors (n, d) with three components."""
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
-def _rounded(values: Array, digits: int) -> Array:
+def _rounded(values: Array, digits: int) -> npt.NDArray[np.float32]:
     """Values with so many digits beside the largest entry of their row, (c, ...), so that rounding is no value.
 
-    The digits are binary, which takes half the time.
+    Tensors become rows of components, (c, k). The digits are binary, which takes half the time.
     """
-    rows = np.abs(values).reshape(len(values), math.prod(values.shape[1:]))
-    largest = np.zeros(len(values))
-    for column in rows.T:
-        np.maximum(largest, column, out=largest)
-    size = np.where(largest > 0.0, largest, 1.0).reshape(-1, *[1] * (values.ndim - 1))
+    rows = values if values.ndim == 1 else values.reshape(len(values), math.prod(values.shape[1:]))
+    found = np.empty(rows.shape, dtype=np.float32)
+    for start in range(0, len(rows), _AT_ONCE):
+        own = slice(start, start + _AT_ONCE)
+        found[own] = _with_digits(rows[own], digits)
+    return found
+
+
+def _with_digits(rows: Array, digits: int) -> Array:
+    largest = functools.reduce(np.maximum, np.abs(rows).reshape(len(rows), -1).T)
+    size = np.where(largest > 0.0, largest, 1.0).reshape(-1, *[1] * (rows.ndim - 1))
     unit = np.ldexp(1.0, math.ceil(digits * math.log2(10)) - np.frexp(size)[1])
-    return np.asarray(np.rint(values * unit) / unit)
+    return np.asarray(np.rint(rows * unit) / unit)
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:

@@ -23,6 +23,8 @@ from ..typing import Array, Integers
 _LOG = logger("results")
 _CELLS = {2: 3, 3: 5, 4: 10}
 """VTK's numbers of line, triangle and tetrahedron, by their vertices."""
+_BLOCK = 1 << 18
+"""Bytes that are compressed at a time; in VTK's own blocks, an eighth of these, it takes a quarter longer."""
 _NAMES = {np.dtype(np.float32): "Float32", np.dtype(np.float64): "Float64"}
 
 
@@ -120,6 +122,7 @@ def _write_piece(path: Path, grid: Grid) -> int | None:
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()
     writer.SetCompressorTypeToLZ4()
+    writer.SetBlockSize(_BLOCK)
     writer.SetInputData(_vtk_grid(grid))
     written, code = writer.Write(), writer.GetErrorCode()
     if written and code == 0:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..problem.stress import von_mises
-from ..report.solution_arrays import FILE, save
+from ..report.solution_arrays import FILE, members
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
 from ..solution import Solution
 from ..typing import Array
-from . import boundary_table, contact_table, gathering, vtk_fields
+from . import array_file, boundary_table, contact_table, gathering, vtk_fields
 
 
 def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | None) -> None:
@@ -34,8 +34,7 @@ def write_basis(folder: Path, solution: Solution, target: Path, sigma: Array | N
     rows = gathering.rows_of_parts(solution)
     if rows:
         contact_table.write(comm, folder / "contact.csv", rows)
-    arrays = gathering.solution_arrays(solution, stress, rows)
-    on_root(comm, lambda: None if arrays is None else save(folder / FILE, arrays))
+    array_file.write(comm, folder / FILE, members(gathering.own_arrays(solution, stress, rows)))
     on_root(comm, lambda: writing.text(folder / "scene.toml", dump_scene(solution.scene, target)))
 
 

@@ -35,7 +35,8 @@ def part(points: Array, normals: Array, slips: Array) -> ContactPart:
     along = np.sum(tangents(normals)[:, 0] * slips, axis=1)
     s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     columns = {"s": s, "x": points[:, 0], "y": points[:, 1], "u_t1": along, "friction_t1": 3.0 * along}
-    return ContactPart("bore", columns, numbers, np.column_stack([numbers[1:], numbers[:-1]]), normals)
+    facets = np.column_stack([numbers[1:], numbers[:-1]])
+    return ContactPart("bore", columns, numbers, facets, normals, np.empty((len(points), 0)))
 
 
 def bore(turn: float = 1.0) -> ContactPart:

@@ -32,6 +32,7 @@ from matplotlib.text import Annotation, Text
 from mpi4py import MPI
 from runs import hvi, write_scene
 from scenes import model
+from scipy.spatial import Delaunay
 
 from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
@@ -47,8 +48,9 @@ from hvi_fenicsx.report.pictures.kinds import (
     escape_plane,
     scene_plane,
     scene_space,
+    stress_plane,
 )
-from hvi_fenicsx.report.pictures.raster import shade
+from hvi_fenicsx.report.pictures.raster import shade, thinned
 from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
 from hvi_fenicsx.results import contact_table
 from hvi_fenicsx.runtime import processes
@@ -106,14 +108,12 @@ def floor(body: mesh.Mesh, value: Callable[[Array], Array]) -> PartArrays:
     columns = {"x": points[:, 0], "y": points[:, 1], "u_n": -u[:, -1], "u_t1": u[:, 0], "gap": u[:, -1]}
     columns |= {"sigma_n": np.where(lifted, 0.0, -LOAD), "friction_t1": 1e3 * u[:, 0] / 9e-6}
     columns |= {"contact": (~lifted).astype(float)}
-    zero = np.zeros(len(points))
+    zero, drops = np.zeros(len(points)), np.tile([-LAW["delta"], LAW["delta"]], (len(points), 1))
     columns |= {"s": points[:, 0], "branch_t": zero} if d == 2 else {"z": points[:, 2], "u_t2": zero}
     columns |= {"friction_t2": zero} if d == 3 else {}
     normals = np.tile(-np.eye(d)[-1], (len(points), 1))
     facets = facets_on(arrays, low)
-    return PartArrays(
-        columns=columns, vertices=vertices, facets=facets, weights=zero, normals=normals, drops=np.empty(0)
-    )
+    return PartArrays(columns=columns, vertices=vertices, facets=facets, weights=zero, normals=normals, drops=drops)
 
 
 def change(folder: Path, **values: Any) -> None:
@@ -331,6 +331,26 @@ def test_one_picture_that_fails_takes_no_other_with_it(tmp_path: Path) -> None:
     assert not (folder / "body.png").exists()
 
 
+@pytest.mark.parametrize("processors", [1, 8])
+def test_a_process_that_dies_takes_the_picture_with_it_that_it_was_drawing(tmp_path: Path, processors: int) -> None:
+    folder = result(tmp_path / "r", square(4), pressed)
+    write_sides(folder, square(4), **ON)
+    code = (
+        "import os, signal, sys; from pathlib import Path; from hvi_fenicsx.report import reader\n"
+        "from hvi_fenicsx.report.pictures import __main__, drawings\n"
+        "found = list(drawings.drawings(reader.read(Path(sys.argv[1]))))\n"
+        "first = drawings.Drawing(found[0].path, '', False, lambda: os.kill(os.getpid(), signal.SIGKILL))\n"
+        "drawings.drawings = lambda result: [first, *found[1:]]\n"
+        "os.cpu_count = lambda: int(sys.argv[2])\n"
+        "print(*__main__.draw_all(reader.read(Path(sys.argv[1]))))\n"
+    )
+    command = [*processes.PYTHON, "-c", code, str(folder), str(processors)]
+    done = subprocess.run(command, env=processes.environment(), capture_output=True, text=True, check=True)
+    failure = "body.png: the drawing process ended with SIGKILL"
+    assert sorted(done.stdout.splitlines()) == sorted(["contact.png", "scene.png", failure])
+    assert {path.name for path in folder.glob("*.png")} == {"contact.png", "scene.png"}
+
+
 def test_a_library_that_aborts_is_an_error_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As VTK does, where it believes in a display that is not there."""
     monkeypatch.setenv("DISPLAY", ":99999")
@@ -489,6 +509,18 @@ def test_the_cells_fill_the_body(body: Callable[[], mesh.Mesh], size: float) -> 
     assert found.sum() == pytest.approx(size)
 
 
+@pytest.mark.parametrize("body", [square, box], ids=["plane", "space"])
+def test_pieces_are_told_apart_whatever_their_holes(body: Callable[[], mesh.Mesh]) -> None:
+    """A hole inside is a second surface of one piece; without its middle third a body is two pieces."""
+    whole = body_mesh(plain(body()))
+    lengths = np.where(whole.extents > 0.0, whole.extents, 1.0)
+    off = np.abs(whole.points[whole.cells].mean(axis=1) / lengths - 0.5)
+    hollow = replace(whole, cells=whole.cells[off[:, : whole.dimension].max(axis=1) > 0.2])
+    halves = replace(whole, cells=whole.cells[off[:, 0] > 0.2])
+    assert [len(np.unique(found.pieces)) for found in (whole, hollow, halves)] == [1, 1, 2]
+    assert len(hollow.boundary) > len(whole.boundary)
+
+
 @pytest.mark.parametrize("cells", [1, 7, 150])
 def test_shading_is_linear_and_has_no_holes(cells: int) -> None:
     x = np.linspace(0.0, 1.0, cells + 1)
@@ -506,6 +538,43 @@ def test_shading_is_linear_and_has_no_holes(cells: int) -> None:
     inside = (columns > 5) & (columns < 95) & (rows > 10) & (rows < 80)
     assert np.array_equal(np.isfinite(image), inside)
     assert np.allclose(image[inside], (columns - 2 * rows)[inside])
+
+
+def test_a_thinned_image_has_no_holes_and_is_off_by_a_pixel_at_most_where_triangles_are_small() -> None:
+    """Triangles of all sizes, from a tenth of a pixel to ten, around random points that crowd on the left."""
+    points = np.random.default_rng(5).random((6000, 2)) ** [2.0, 1.0] * [100.0, 90.0]
+    points = np.concatenate([points, [[0.0, 0.0], [100.0, 0.0], [100.0, 90.0], [0.0, 90.0]]])
+    triangles = Delaunay(points).simplices.astype(np.int64)
+    values = points[:, 0] - 2.0 * points[:, 1]
+    spans = np.ptp(points[triangles], axis=1).max(axis=1)
+    assert np.quantile(spans, 0.2) < 1.0
+    assert np.quantile(spans, 0.9) > 2.5
+    image = thinned(points, triangles, values[triangles], (90, 100))
+    rows, columns = np.mgrid[:90, :100] + 0.5
+    assert np.isfinite(image).all()
+    off = np.abs(image - (columns - 2.0 * rows))
+    assert off.max() < 3.0 * 1.5  # three by pixel
+    assert off.mean() < 0.6
+    np.testing.assert_array_equal(
+        thinned(points[-4:], np.array([[0, 1, 2], [0, 2, 3]]), np.ones((2, 3)), (90, 100)), np.ones((90, 100))
+    )
+
+
+def test_the_extremes_that_pictures_name_are_those_of_all_cells(tmp_path: Path) -> None:
+    """Thousands of cells share a pixel at a corner; one of them has the largest stress, one vertex the way farthest."""
+    body = square(60)
+    body.geometry.x[:, :2] **= 4
+    folder = result(tmp_path / "r", body, pressed)
+    arrays = load(folder / FILE)
+    assert arrays.displacement is not None
+    sizes = body_mesh(arrays).volumes
+    stress, moved = np.full(len(arrays.cells), 1e6, dtype=np.float32), arrays.displacement.copy()
+    stress[np.argmin(sizes)] = 7e6
+    moved[arrays.cells[np.argmin(sizes), 0]] = [0.0, 3.3e-5]
+    change(folder, displacement=moved, von_mises=stress)
+    found = reader.read(folder)
+    for kind, words in ((stress_plane, "von Mises stress, peak 7 MPa"), (body_plane, "displacement |u|, up to 33 µm")):
+        assert words in [text.get_text().replace("\u202f", " ") for text in kind.draw(found).findobj(Text)]
 
 
 def test_numbers_are_said_as_people_say_them() -> None:

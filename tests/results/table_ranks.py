@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
 import sys
 import tempfile
+import tracemalloc
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from full_disk import room_for
 from mpi4py import MPI
 from scenes import STEEL, Table, model, quadratic_linear, two_blocks
 
 from hvi_fenicsx import Scene, workflow
-from hvi_fenicsx.errors import HviError, InputError
+from hvi_fenicsx.errors import HviError, InputError, NotWrittenError
+from hvi_fenicsx.mesh import nodes
 from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.report.pictures.draw import PictureProcess
-from hvi_fenicsx.results import ResultFolder, arc_length, boundary_table, contact_rows, contact_table
+from hvi_fenicsx.report.solution_arrays import SolutionArrays, members
+from hvi_fenicsx.results import (
+    ResultFolder,
+    arc_length,
+    array_file,
+    boundary_table,
+    contact_rows,
+    contact_table,
+    gathering,
+)
 from hvi_fenicsx.results.whole import begin_whole
 from hvi_fenicsx.runtime.mpi import in_turn, on_root
 from hvi_fenicsx.runtime.row_order import RowOrder
@@ -105,11 +119,10 @@ def joined(values: Any) -> Any:
     return values if pieces is None else np.concatenate(pieces)
 
 
-def tables(folder: Path) -> dict[str, Any]:
+def tables(folder: Path, solutions: dict[str, Solution]) -> dict[str, Any]:
     """By scene: whether the two files are the same as by a gather, and this table's rows and former rows by rank."""
     found = {}
-    for name, scene in SCENES.items():
-        solution = solved(scene)
+    for name, solution in solutions.items():
         assert solution.examination is not None
         rows = contact_rows.of_parts(solution.problem, solution.examination.states)
         contact_table.write(COMM, folder / "contact.csv", rows)
@@ -121,6 +134,80 @@ def tables(folder: Path) -> dict[str, Any]:
         found[name] = {"same": same, "ordered": on_root(COMM, lambda: ordered(folder / "boundary.csv"))}
         found[name] |= {"had": COMM.allgather(had), "has": COMM.allgather(has)}
     return found
+
+
+def archives(folder: Path, solutions: dict[str, Solution]) -> dict[str, Any]:
+    """By scene: the members of ``solution.npz`` that are not those of a gather, and the largest share of its rows."""
+    found = {}
+    for name, solution in solutions.items():
+        states = solution.examination.states if solution.examination else ()
+        own = gathering.own_arrays(solution, None, contact_rows.of_parts(solution.problem, states))
+        array_file.write(COMM, folder / "solution.npz", members(own))
+        cells = COMM.allgather(len(own.cells))
+        every = gathered(solution, own)
+        same = COMM.bcast(differing(folder / "solution.npz", every) if COMM.rank == 0 else [])
+        found[name] = {"differing": same, "share": max(cells) / sum(cells)}
+    return found
+
+
+def gathered(solution: Solution, own: SolutionArrays) -> dict[str, Any]:
+    """The same arrays by a gather of all that ranks know: facets that several know are found among all on rank 0."""
+    assert solution.examination is not None
+    space, arrays = solution.problem.space, {key: np.asarray(values) for key, values in members(own).items()}
+    found = {key: joined(values) if values.ndim else values for key, values in arrays.items()}
+
+    def facets(local: Any) -> Any:
+        numbers = space.dofmap.index_map.local_to_global(nodes.linear_facets(space, local).ravel())
+        every = joined(np.sort(np.asarray(numbers, dtype=np.int64).reshape(-1, own.points.shape[1]), axis=1))
+        return np.unique(every, axis=0)
+
+    found |= {f"side:{name}": facets(local) for name, local in solution.problem.part_facets.items()}
+    for state in solution.examination.states:
+        rows, every = found[f"part:{state.surface.part}:vertices"], facets(state.surface.facets)
+        found[f"part:{state.surface.part}:facets"] = every[np.isin(every, rows).all(axis=1)]
+    return found
+
+
+def differing(file: Path, arrays: dict[str, Any]) -> list[str]:
+    """The members of an archive whose bytes are not those that numpy writes of arrays; where they are others, all."""
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    with zipfile.ZipFile(file) as one, zipfile.ZipFile(stream) as other:
+        if one.namelist() != other.namelist() or one.testzip() is not None:
+            return other.namelist()
+        return [name for name in other.namelist() if one.read(name) != other.read(name)]
+
+
+def uneven_archive(folder: Path) -> list[Any]:
+    """Of arrays of several blocks, some of them on one rank alone: what is not as a gather's, and the peak of rank 0.
+
+    The memory that rank 0 has taken meanwhile is told as a part of the arrays.
+    """
+    chance, last = np.random.default_rng(COMM.rank), COMM.rank == COMM.size - 1
+    own = {
+        "long": chance.random((500_000 + 100_001 * COMM.rank, 3)),
+        "of the last": chance.integers(0, 9, (1_000_001 * last, 2)),
+        "singles": chance.random(7 * COMM.rank).astype(np.float32),
+        "number": np.asarray(2 + COMM.rank),
+        "none": np.empty((0, 4)),
+    }
+    tracemalloc.start()
+    array_file.write(COMM, folder / "uneven.npz", own)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    every = {name: joined(values) if values.ndim else values for name, values in own.items()}
+    size = sum(values.nbytes for values in every.values())
+    return COMM.bcast([differing(folder / "uneven.npz", every) if COMM.rank == 0 else [], peak / size])
+
+
+def without_room(folder: Path) -> list[Any]:
+    """What each rank raises where the disk of rank 0 is full after a quarter of what the ranks send."""
+    with room_for(1 << 22) if COMM.rank == 0 else contextlib.nullcontext():
+        try:
+            array_file.write(COMM, folder / "full.npz", {"values": np.ones((16 << 20) // COMM.size // 8)})
+        except NotWrittenError as error:
+            return [COMM.allgather(error.reason), sorted(file.name for file in folder.glob("*full*"))]
+    raise AssertionError
 
 
 def ordered(file: Path) -> bool:
@@ -189,7 +276,9 @@ def main() -> None:
     """All of it, as one line."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(COMM.bcast(name))
-        found = {"tables": tables(folder), "begun": begun_early(folder)}
+        solutions = {name: solved(scene) for name, scene in SCENES.items()}
+        found = {"tables": tables(folder, solutions), "archives": archives(folder, solutions)}
+        found |= {"begun": begun_early(folder), "uneven": uneven_archive(folder), "full": without_room(folder)}
         COMM.barrier()
     found |= {"orders": orders(), "failing": failing()}
     if COMM.rank == 0:

@@ -49,5 +49,23 @@ def test_where_one_rank_cannot_write_all_are_told_and_later_ones_do_not_begin(fo
     assert words == ["contact.csv: No space left on device"] * ranks
 
 
+def test_an_archive_has_the_bytes_of_one_that_is_gathered(found: Any, ranks: int) -> None:
+    for archive in found["archives"].values():
+        assert archive["differing"] == []
+        assert archive["share"] < 1.5 / ranks
+    assert found["uneven"][0] == []
+
+
+def test_rank_0_never_holds_the_arrays_of_all(found: Any) -> None:
+    """Only a block of 4 MB goes through it, of the 12 to 70 MB that it writes beside what it has."""
+    assert found["uneven"][1] < 0.5
+
+
+def test_a_disk_that_is_full_is_told_to_all_ranks_and_leaves_nothing(found: Any, ranks: int) -> None:
+    reasons, left = found["full"]
+    assert reasons == ["File too large; make room on the disk"] * ranks
+    assert left == []
+
+
 def test_pictures_are_begun_before_the_result_is_finished_where_a_processor_is_free(found: Any, ranks: int) -> None:
     assert found["begun"] is (ranks < (os.cpu_count() or 1))

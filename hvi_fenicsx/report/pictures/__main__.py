@@ -1,17 +1,20 @@
 """``python3 -m hvi_fenicsx.report.pictures FOLDER``: draw a result folder's pictures into it and print their names.
 
-Each picture is drawn in a process of its own, side by side, so that one that fails takes no other with it.
-Exit code 0, or 1 with a message for each picture that failed; the others are there even so.
+There are as many processes as processors, each with its share of the pictures. One that ends takes the picture with it
+that it was drawing; another one draws the rest of its share. Exit code 0, or 1 with a message for each picture that
+failed; the others are there even so.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import multiprocessing
+import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -31,15 +34,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Running:
-    """A drawing in its process, which says on the connection that it is done, or why it failed.
+    """A process that draws one picture after the other, and says of each that it is done, or why it failed.
 
     Attributes:
-        drawing: what is drawn.
-        process: that draws it.
+        drawings: what is drawn, in this order.
+        process: that draws them.
         connection: on which it answers.
     """
 
-    drawing: Drawing
+    drawings: Sequence[Drawing]
     process: BaseProcess
     connection: Connection
 
@@ -75,6 +78,9 @@ def _told(dimension: int) -> bool:
     from . import drawings  # noqa: F401 (loads matplotlib)
 
     if dimension == 3:
+        import scipy.ndimage
+        import scipy.sparse.csgraph  # noqa: F401
+
         with contextlib.suppress(ModuleNotFoundError):  # each picture will say what it lacks
             import pyvista  # noqa: F401
     return sys.stdin.readline() == TOLD
@@ -97,60 +103,70 @@ def draw_all(result: Result) -> list[HviError]:
     arrays = result.arrays
     if arrays.displacement is None and arrays.escape_mode is None and not arrays.parts:
         raise PictureError(f"{result.folder}: there is nothing to draw, neither a displacement nor a part of Γc")
-    context = multiprocessing.get_context("fork")
     with XServer(wanted=result.body.dimension == 3) as server:
         from .drawings import drawings  # loads the plotting library while the server starts
 
         found = list(drawings(result))
-        _ = result.body.boundary  # which all pictures need, before they are drawn in processes of their own
+        _ = result.body.pieces  # which pictures need, as they do the boundary: once, for all processes that draw
         server.wait()
-        running = [_started(drawing, context) for drawing in found]
-        failures = [_ended(one) for one in running]
-    return [failure for failure in failures if failure is not None]
+        gc.freeze()  # the processes share what is there; a collection in one of them would copy it
+        shares = min(len(found), os.cpu_count() or 1)
+        running = [_started(found[i::shares]) for i in range(shares)]
+        return [failure for one in running for failure in _ended(one)]
 
 
-def _started(drawing: Drawing, context: multiprocessing.context.ForkContext) -> Running:
+def _started(drawings: Sequence[Drawing]) -> Running:
+    context = multiprocessing.get_context("fork")
     receiving, sending = context.Pipe(duplex=False)
-    process = context.Process(target=_drawn, args=(drawing, sending), daemon=True)
+    process = context.Process(target=_drawn, args=(drawings, sending), daemon=True)
     process.start()
     sending.close()
-    return Running(drawing, process, receiving)
+    return Running(drawings, process, receiving)
 
 
-def _drawn(drawing: Drawing, connection: Connection) -> None:
-    """In the drawing's own process."""
+def _drawn(drawings: Sequence[Drawing], connection: Connection) -> None:
+    """In a process of its own."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for drawing in drawings:
+        connection.send(_fault(drawing))
+
+
+def _fault(drawing: Drawing) -> HviError | None:
+    """Draw one picture; what went wrong, if anything did."""
     from .style import save
 
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     try:
         save(drawing.make(), drawing.path, drawing.caption)
-        connection.send(None)
     except NotWrittenError as error:
-        connection.send(error)
+        return error
     except ModuleNotFoundError as error:
-        connection.send(_failed(drawing, f"needs the package {error.name}, which is not installed here"))
+        return _failed(drawing, f"needs the package {error.name}, which is not installed here")
     except Exception as error:  # whatever it is, it is reported in one line
-        words = str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}"
-        connection.send(_failed(drawing, words))
+        return _failed(drawing, str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}")
+    return None
 
 
 def _failed(drawing: Drawing, why: str) -> PictureError:
     return PictureError(f"{drawing.path.name}: {why}")
 
 
-def _ended(one: Running) -> HviError | None:
-    """Wait for a drawing; what went wrong with it, if anything did."""
-    failure: HviError | None
-    try:
-        failure = one.connection.recv()
-    except EOFError:
-        one.process.join()
-        advice = _ADVICE if one.drawing.rendered else ""
-        return _failed(one.drawing, f"the drawing process ended with {_reason(one.process.exitcode)}{advice}")
+def _ended(one: Running) -> Iterator[HviError]:
+    """Wait for the pictures of a process; what went wrong with them."""
+    for place, drawing in enumerate(one.drawings):
+        try:
+            failure = one.connection.recv()
+        except EOFError:
+            one.process.join()
+            advice = _ADVICE if drawing.rendered else ""
+            yield _failed(drawing, f"the drawing process ended with {_reason(one.process.exitcode)}{advice}")
+            if rest := one.drawings[place + 1 :]:
+                yield from _ended(_started(rest))
+            return
+        if failure is None:
+            print(drawing.path.name, flush=True)
+        else:
+            yield failure
     one.process.join()
-    if failure is None:
-        print(one.drawing.path.name, flush=True)
-    return failure
 
 
 def _reason(code: int | None) -> str:

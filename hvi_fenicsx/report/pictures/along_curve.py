@@ -22,12 +22,15 @@ def along_curve(result: Result, part: ContactPart) -> ContactPart:
         result: the result.
         part: the part of Γc, in the plane.
     """
-    law = result.law(part.name)
-    alike = law.even if law is not None else not result.resists(part.name, "slip")
     signs = _signs(part)
-    if not alike or np.all(signs == signs[0]):
+    if np.all(signs == signs[0]) or not _is_even(result, part):
         return part
     return replace(part, columns={**part.columns, **{name: signs * part[name] for name in COLUMNS}})
+
+
+def _is_even(result: Result, part: ContactPart) -> bool:
+    law = result.law(part.name)
+    return law.even if law is not None else not result.resists(part.name, "slip")
 
 
 def _signs(part: ContactPart) -> Array:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ...typing import Array, Integers, Mask
 from .vtk_view import area_vectors
@@ -44,6 +42,9 @@ def _between_faces(facets: Integers, pairs: Integers, turns: Array, border: Inte
         turns: their angles, degrees, (k,).
         border: the edges of one facet only, (j, 2).
     """
+    from scipy.sparse import coo_array  # a tenth of a second, which pictures in the plane need not wait for
+    from scipy.sparse.csgraph import connected_components
+
     flat = pairs[turns < FLAT]
     graph = coo_array((np.ones(len(flat)), (flat[:, 0], flat[:, 1])), shape=(len(facets), len(facets)))
     patch = connected_components(graph, directed=False)[1]

@@ -52,6 +52,8 @@ class DeformedBody:
     @property
     def as_drawn(self) -> BodyMesh:
         """The body at rest as it is drawn, with its escape mode drawn alike."""
+        if not self.stretched:
+            return self.body  # which knows its boundary already
         mode = self.body.escape_mode
         return replace(self.body, points=self.at_rest, escape_mode=None if mode is None else mode * self.stretch)
 
@@ -130,22 +132,10 @@ def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
     if largest == 0.0:
         return DeformedBody(body, u, 1.0, stretch)
     factor = 1.0 if largest > 0.5 * VISIBLE * body.size else round_below(VISIBLE * body.size / largest * 1.25)
-    while factor > 1.0 and _kept(body, factor * u) < KEPT:
+    while factor > 1.0 and body.kept(body.points + factor * u).min() < KEPT:
         factor = round_below(factor / 1.5)
     gap = max((float(np.nanmax(geometry.part["gap"], initial=0.0)) for geometry in parts), default=0.0)
     return DeformedBody(body, u, factor if factor * gap * stretch.max() < NEAR * body.size else 1.0, stretch)
-
-
-def _kept(body: BodyMesh, moved: Array) -> float:
-    """The smallest share of its area or volume that a piece of the body is drawn with.
-
-    Args:
-        body: the body.
-        moved: the displacement that it is drawn with, m, (n, 3).
-    """
-    at_rest, drawn = body.signed_volumes(body.points), body.signed_volumes(body.points + moved)
-    size = np.bincount(body.pieces, np.abs(at_rest))
-    return float(np.min(np.bincount(body.pieces, np.sign(at_rest) * drawn) / size))
 
 
 def undeformed(body: BodyMesh) -> DeformedBody:
@@ -155,7 +145,7 @@ def undeformed(body: BodyMesh) -> DeformedBody:
 
 def _stretch(body: BodyMesh) -> Array:
     """By how much a picture is stretched along each axis, so that colours in a thin strip are seen, (3,)."""
-    stretch, extents = np.ones(3), np.ptp(body.points, axis=0)[: body.dimension]
+    stretch, extents = np.ones(3), body.extents[: body.dimension]
     thin = int(np.argmin(extents))
     if body.dimension == 2 and 0.0 < extents[thin] < THIN * body.size:
         stretch[thin] = max(1.0, round_below(DRAWN * body.size / float(extents[thin])))

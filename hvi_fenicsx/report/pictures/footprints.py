@@ -52,7 +52,8 @@ def footprints(
         parts: where the parts lie on the body.
         normals: outward normals of the parts, of any length, (3,) each.
     """
-    body, size = np.concatenate([shape.points, shape.body.points]), shape.body.size
+    size, at = shape.body.size, shape.body.outermost
+    body = np.concatenate([shape.points[at], shape.body.points[at]])
     units = (np.asarray(n / (float(np.linalg.norm(n)) or 1.0), dtype=np.float64) for n in normals)
     places = ((shape.points[part.vertices], unit) for part, unit in zip(parts, units, strict=True))
     ways = apart.ways(view, body, places, 0.05 * size)

@@ -10,7 +10,7 @@ import shapely
 from ...typing import Array
 from .loads_supports import LoadedSide
 from .plane_canvas import SIDE, TALLEST
-from .reach import LINE, WAYS, Label, Reach, largest_scale
+from .reach import LINE, WAYS, Label, Reach, boxes, largest_scale
 from .vtk_view import View
 
 HEAD = 0.09
@@ -50,7 +50,8 @@ def labels(
     """
     reached = [*reaches(view, np.concatenate(clouds), arrows), *words]
     scale = largest_scale(reached, (SIDE, TALLEST))
-    bodies = shapely.union_all([shapely.MultiPoint(view.project(c)).convex_hull.buffer(LINE / scale) for c in clouds])
+    hulls = shapely.convex_hull([shapely.multipoints(view.project(c)) for c in clouds])
+    bodies = shapely.union_all(shapely.buffer(hulls, LINE / scale))
     taken = [*(one.hull(scale) for one in words), *strokes(view, arrows, scale)]
     found = list[Label]()
     for load, (tails, ways) in zip(pulled, arrows, strict=True):
@@ -75,10 +76,10 @@ def strokes(view: View, arrows: Sequence[tuple[Array, Array]], scale: float) -> 
 def _best(
     candidates: list[Label], ends: Array, taken: list[shapely.Geometry], bodies: shapely.Geometry, scale: float
 ) -> Label:
-    boxes = np.array([label.reach.hull(scale) for label in candidates])
-    spoilt = shapely.area(shapely.intersection(boxes, shapely.union_all(taken)))
-    covered = shapely.area(shapely.intersection(boxes, bodies))
+    places = boxes(candidates, scale)
+    spoilt = shapely.area(shapely.intersection(places, shapely.union_all(taken)))
+    covered = shapely.area(shapely.intersection(places, bodies))
     middle = shapely.Point(ends.mean(axis=0))
     size = float(np.hypot(*np.ptp(shapely.get_coordinates(bodies), axis=0)))
-    cost = (SPOILS * spoilt + covered) / shapely.area(boxes) + FAR * shapely.distance(boxes, middle) / size
+    cost = (SPOILS * spoilt + covered) / shapely.area(places) + FAR * shapely.distance(places, middle) / size
     return candidates[int(np.argmin(np.round(cost, 6)))]

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from ...geometry import chains
 from ...typing import Array
 from ..body_mesh import BodyMesh
 from .loads_supports import Side
-from .reach import APART, WAYS, Label, Reach
+from .reach import APART, WAYS, Label, Reach, boxes
 from .style import BLUE
 
 PLACES = (0.5, 0.4, 0.6, 0.25, 0.75, 0.1, 0.9)
@@ -39,7 +38,7 @@ def names(body: BodyMesh, sides: Sequence[Side], drawn: Sequence[Reach], window:
     """
     low, high, inches = window
     scale, inside = float(inches[0] / (high[0] - low[0])), shapely.box(*low, *high)
-    lines = shapely.union_all([shapely.LineString(body.points[loop, :2]) for loop in chains(body.boundary)])
+    lines = shapely.union_all([shapely.linestrings(body.points[loop, :2]) for loop in body.outline])
     wide = lines.simplify(0.1 * EDGE / scale).buffer(EDGE / scale)
     for geometry in (lines, wide):
         shapely.prepare(geometry)
@@ -47,20 +46,21 @@ def names(body: BodyMesh, sides: Sequence[Side], drawn: Sequence[Reach], window:
     for side in sides:
         candidates = list(_candidates(body, side))
         labels = [label for label, _ in candidates]
-        boxes = np.array([label.reach.hull(scale) for label in labels])
-        spoilt = shapely.area(shapely.intersection(boxes, shapely.union_all(taken)))
-        left = shapely.area(shapely.difference(boxes, inside))
-        cost = (SPOILS * spoilt + LEAVES * left) / shapely.area(boxes) + TOUCHES * shapely.intersects(boxes, wide)
-        cost += CROSSES * shapely.intersects(np.array([_leader(label, scale) for label in labels]), lines)
+        places = boxes(labels, scale)
+        spoilt = shapely.area(shapely.intersection(places, shapely.union_all(taken)))
+        left = shapely.area(shapely.difference(places, inside))
+        cost = (SPOILS * spoilt + LEAVES * left) / shapely.area(places) + TOUCHES * shapely.intersects(places, wide)
+        cost += CROSSES * shapely.intersects(_leaders(labels, scale), lines)
         best = int(np.argmin(np.round(cost + [own for _, own in candidates], 6)))
         found.append(labels[best])
-        taken.append(boxes[best])
+        taken.append(places[best])
     return found
 
 
-def _leader(label: Label, scale: float) -> shapely.Geometry:
-    """The line from a side to its name, without its beginning on the side."""
-    return shapely.LineString([label.at + inches / scale * label.way for inches in (EDGE, label.away)])
+def _leaders(labels: Sequence[Label], scale: float) -> Array:
+    """The lines from a side to its names, without their beginning on the side: shapely's lines, (k,)."""
+    ends = [[label.at + inches / scale * label.way for inches in (EDGE, label.away)] for label in labels]
+    return np.asarray(shapely.linestrings(np.array(ends)))
 
 
 def _candidates(body: BodyMesh, side: Side) -> list[tuple[Label, float]]:

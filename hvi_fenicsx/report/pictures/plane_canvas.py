@@ -13,12 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
 
-from ...geometry import chains
 from ...typing import Array
 from .deformed import DeformedBody
 from .legend import FOOT
 from .outline import closed_path
-from .raster import shade
+from .raster import thinned
 from .reach import Reach, corners, largest_scale
 from .style import DPI, GREY, HEADING, INK, area, figure
 
@@ -65,12 +64,11 @@ def paint(axes: Axes, shape: DeformedBody, values: Array, colours: Colormap, end
         end: the value at the end of the colours.
     """
     body, points = shape.body, shape.points
-    loops = chains(body.boundary)
-    outline = closed_path(points, loops)
+    outline = closed_path(points, body.outline)
     drawn = _shading(axes, shape, values, lambda image: colours(image / (end or 1.0), bytes=True))
     drawn.set_clip_path(outline, axes.transData)
     for patch, style in (
-        (closed_path(shape.at_rest, loops), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
+        (closed_path(shape.at_rest, body.outline), {"ec": GREY, "ls": (0, (5, 4)), "lw": 1.3, "zorder": 3}),
         (outline, {"ec": INK, "lw": 1.6, "zorder": 4}),
     ):
         axes.add_artist(PathPatch(patch, fc="none", joinstyle="round", **style))
@@ -90,6 +88,6 @@ def _shading(axes: Axes, shape: DeformedBody, values: Array, coloured: Callable[
     wide = round(SIDE * DPI)
     tall = round(wide * (top - bottom) / (right - left))
     pixels = (shape.points[:, :2] - [left, bottom]) * [wide / (right - left), tall / (top - bottom)]
-    image = shade(pixels, shape.body.cells, values, (tall, wide))
+    image = thinned(pixels, shape.body.cells, values, (tall, wide))
     extent = (left, right, bottom, top)
     return axes.imshow(coloured(image), origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=1)

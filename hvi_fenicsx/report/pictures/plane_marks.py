@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Polygon
 from matplotlib.patheffects import withStroke
 
 from ...geometry import chains
@@ -295,7 +295,8 @@ def _profile(base: Array, outward: Array, pressure: Array, largest: Largest, siz
 def _filled(base: Array, tips: Array, colour: str, words: str) -> Mark:
     def draw(axes: Axes) -> None:
         ends = np.where(np.isnan(tips), base, tips)
-        axes.fill(*np.concatenate([base, ends[::-1]]).T, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2)
+        outline = np.concatenate([base, ends[::-1]])
+        axes.add_artist(Polygon(outline, color=colour, alpha=0.16, lw=0, clip_on=False, zorder=2))
         halo = [withStroke(linewidth=1.8 + HALO, foreground="white")]
         axes.plot(*tips.T, color=colour, lw=1.8, clip_on=False, zorder=5, path_effects=halo)
 

@@ -1,4 +1,4 @@
-"""Linear values on triangles as an image: every pixel centre in triangles takes the largest value there.
+"""Linear values on triangles as an image: exactly, or thinned to its pixels.
 
 matplotlib's own shading takes 3 s for half a million triangles; this takes a fraction of one, for many small triangles
 as for few large ones.
@@ -7,21 +7,81 @@ as for few large ones.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ...typing import Array, Integers
+from ...typing import Array, Integers, Mask
 
 _AT_ONCE = 100_000
 """Candidate pixels handled at a time: what fits a cache is twice as fast."""
 _EDGE = 1e-6
 _LARGEST = 1 << 20
 """More pixels than an image has on a side."""
+_SMALL = 2.25
+"""Pixels: the middle of a triangle that is no wider and no higher is at most one pixel beside each that it covers."""
+
+
+def thinned(points: Array, triangles: Integers, values: Array, shape: tuple[int, int]) -> Array:
+    """An image of values that are linear on triangles, of which small ones count by their middles.
+
+    A pixel has what large triangles have at its centre, as :func:`shade` finds it; else the mean of the small ones
+    whose middles it has, or the pixels around it. So there is no hole, but values reach a pixel beyond small triangles.
+
+    Args:
+        points: in pixels from the image's lower left corner, (n, 2).
+        triangles: by their points, (k, 3).
+        values: at the corners of each triangle, (k, 3).
+        shape: rows and columns of the image.
+
+    Returns:
+        An array of this shape, its first row the lowest, NaN where there is no triangle.
+    """
+    total, count, large = np.zeros(shape), np.zeros(shape), np.zeros(len(triangles), dtype=np.bool_)
+    for start in range(0, len(triangles), _AT_ONCE):
+        own = slice(start, start + _AT_ONCE)
+        corners = [[column[corner] for corner in triangles[own].T] for column in points.T]
+        small = _within(corners, _SMALL)
+        large[own] = ~small
+        _count(total, count, [_mean(column)[small] for column in corners], _mean(values[own].T)[small])
+    exact = shade(points, triangles[large], values[large], shape)
+    with np.errstate(invalid="ignore"):
+        means = np.where(count > 0.0, total / count, _around(total) / _around(count))
+    return np.where(np.isnan(exact), means, exact)
+
+
+def _mean(three: Iterable[Array]) -> Array:
+    return np.asarray(functools.reduce(np.add, three) / 3.0, dtype=np.float64)
+
+
+def _within(corners: Iterable[Sequence[Array]], size: float) -> Mask:
+    """Which triangles are at most so large along each axis, from their three corners there, (k,)."""
+    spans = (functools.reduce(np.maximum, column) - functools.reduce(np.minimum, column) for column in corners)
+    return functools.reduce(np.logical_and, (span <= size for span in spans))
+
+
+def _count(total: Array, count: Array, places: Sequence[Array], values: Array) -> None:
+    """Add values to the pixels that have their places; some places may be outside of the image."""
+    column, row = (np.floor(place).astype(np.int64) for place in places)
+    rows, columns = total.shape
+    seen = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    pixel = (row * columns + column)[seen]
+    np.add.at(total.ravel(), pixel, values[seen])
+    np.add.at(count.ravel(), pixel, 1.0)
+
+
+def _around(image: Array) -> Array:
+    """The sum over the nine pixels around each."""
+    for _ in range(2):
+        wider = image.copy()
+        wider[1:] += image[:-1]
+        wider[:-1] += image[1:]
+        image = wider.T
+    return image
 
 
 def shade(points: Array, triangles: Integers, values: Array, shape: tuple[int, int]) -> Array:
-    """An image of values that are linear on triangles.
+    """An image of values that are linear on triangles: a pixel has the largest of those at its centre.
 
     Args:
         points: in pixels from the image's lower left corner, (n, 2).

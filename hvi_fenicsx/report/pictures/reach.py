@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
+from matplotlib.textpath import text_to_path
 
 from ...typing import Array
 from .style import INK
@@ -48,7 +48,7 @@ class Reach:
         """
         low, high = self.points - self.before / scale, self.points + self.behind / scale
         others = [np.column_stack([low[:, 0], high[:, 1]]), np.column_stack([high[:, 0], low[:, 1]])]
-        return shapely.MultiPoint(np.concatenate([low, high, *others])).convex_hull
+        return shapely.convex_hull(shapely.multipoints(np.concatenate([low, high, *others])))
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,19 @@ class Label:
         )
 
 
+def boxes(labels: Sequence[Label], scale: float) -> Array:
+    """What the letters of labels take, m: shapely's rectangles, (k,).
+
+    Args:
+        labels: each at one point.
+        scale: inches for a metre.
+    """
+    taken = [label.reach for label in labels]
+    low = np.array([one.points[0] - one.before / scale for one in taken])
+    high = np.array([one.points[0] + one.behind / scale for one in taken])
+    return np.asarray(shapely.box(*low.T, *high.T))
+
+
 def letters(words: str, size: float, weight: str = "normal") -> Array:
     """The width and the height of a line of letters, inches, (2,).
 
@@ -134,7 +147,8 @@ def letters(words: str, size: float, weight: str = "normal") -> Array:
 @functools.cache
 def _width(words: str, size: float, weight: str) -> float:
     """Points; kept, since it takes milliseconds and a label is tried in a hundred places."""
-    return float(TextPath((0.0, 0.0), words, size=size, prop=FontProperties(weight=weight)).get_extents().width)
+    letters = FontProperties(weight=weight, size=size)
+    return float(text_to_path.get_text_width_height_descent(words, letters, ismath=False)[0])
 
 
 def largest_scale(reaches: Sequence[Reach], room: tuple[float, float]) -> float:
@@ -165,5 +179,6 @@ def corners(reaches: Sequence[Reach], scale: float) -> tuple[Array, Array]:
 
 def _ends(reaches: Sequence[Reach]) -> tuple[Array, Array, Array, Array]:
     found = [r for r in reaches if len(r.points)]
-    low, high = (np.array([end(r.points, axis=0) for r in found]) for end in (np.min, np.max))
+    # By columns, since numpy takes ten times as long for the ends of many short rows.
+    low, high = (np.array([[end(column) for column in r.points.T] for r in found]) for end in (np.min, np.max))
     return low, high, np.array([r.before for r in found]), np.array([r.behind for r in found])

@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -52,7 +51,7 @@ def say(fig: Figure, body: BodyMesh, stretched: str = "") -> None:
         body: the body.
         stretched: how the picture is stretched, in words.
     """
-    extent = " × ".join(quantity(float(c), "m") for c in np.ptp(body.points, axis=0)[: body.dimension])
+    extent = " × ".join(quantity(float(c), "m") for c in body.extents[: body.dimension])
     extent += f" (drawn {stretched})" if stretched else ""
     tall = fig.get_figheight()
     for line, words in enumerate(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from ...typing import Array, Integers, Mask
 from .raster import shade
@@ -80,6 +79,8 @@ class Seen:
 
     def _below(self, up: Array, across: Array) -> Array:
         """How many pixels are seen to the left of places and below them, (k,); exact within pixels."""
+        from scipy.ndimage import map_coordinates  # which pictures in the plane need not wait for
+
         return np.asarray(map_coordinates(self._sums, [up, across], order=1, mode="nearest"))
 
     @cached_property

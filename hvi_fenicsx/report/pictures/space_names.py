@@ -10,7 +10,7 @@ import shapely
 from ...typing import Array
 from .load_labels import reaches, strokes
 from .plane_canvas import SIDE, TALLEST
-from .reach import WAYS, Label, largest_scale
+from .reach import WAYS, Label, boxes, largest_scale
 from .seen import Seen, Surface, seen
 from .style import BLUE
 from .vtk_view import View
@@ -57,30 +57,25 @@ def _on(name: str, piece: Seen, taken: Sequence[shapely.Geometry], scale: float)
     sides = np.linspace(piece.middles.min(axis=0), piece.middles.max(axis=0), PLACES)
     places = [piece.middle, *(np.array([x, y]) for x in sides[:, 0] for y in sides[:, 1])]
     labels = [Label(name, at, np.zeros(2), weight="normal", colour=BLUE) for at in places]
-    boxes = _boxes(labels, scale)
-    on, extent = piece.within(shapely.bounds(boxes)), float(np.hypot(*np.ptp(piece.middles, axis=0)))
+    taking = boxes(labels, scale)
+    on, extent = piece.within(shapely.bounds(taking)), float(np.hypot(*np.ptp(piece.middles, axis=0)))
     away = np.linalg.norm(np.array(places) - piece.middle, axis=1) / (extent or 1.0)
-    left = np.maximum(1.0 - on / shapely.area(boxes), 0.0)
-    return _cheapest(labels, LEAVES * left + HIDES * on / piece.area + FAR * away + _spoilt(boxes, taken))
+    left = np.maximum(1.0 - on / shapely.area(taking), 0.0)
+    return _cheapest(labels, LEAVES * left + HIDES * on / piece.area + FAR * away + _spoilt(taking, taken))
 
 
 def _beside(name: str, piece: Seen, others: Sequence[Seen], taken: Sequence[shapely.Geometry], scale: float) -> Priced:
     """The best label beside a part, with a line to its middle."""
     labels = [Label(name, piece.middle, way, weight="normal", colour=BLUE, away=away) for away in AWAY for way in WAYS]
-    boxes = _boxes(labels, scale)
+    taking = boxes(labels, scale)
     away = np.array([label.away for label in labels])
-    on = sum(one.within(shapely.bounds(boxes)) for one in (piece, *others)) / shapely.area(boxes)
-    return _cheapest(labels, BESIDE + away + SPOILS * on + _spoilt(boxes, taken))
+    on = sum(one.within(shapely.bounds(taking)) for one in (piece, *others)) / shapely.area(taking)
+    return _cheapest(labels, BESIDE + away + SPOILS * on + _spoilt(taking, taken))
 
 
-def _boxes(labels: Sequence[Label], scale: float) -> Array:
-    """What the letters take, m: shapely's rectangles, (k,)."""
-    return np.array([label.reach.hull(scale) for label in labels])
-
-
-def _spoilt(boxes: Array, taken: Sequence[shapely.Geometry]) -> Array:
-    covered = shapely.area(shapely.intersection(boxes, shapely.union_all(taken)))
-    return np.asarray(SPOILS * covered / shapely.area(boxes))
+def _spoilt(letters: Array, taken: Sequence[shapely.Geometry]) -> Array:
+    covered = shapely.area(shapely.intersection(letters, shapely.union_all(taken)))
+    return np.asarray(SPOILS * covered / shapely.area(letters))
 
 
 def _cheapest(labels: Sequence[Label], cost: Array) -> Priced:

@@ -31,7 +31,9 @@ def draw(result: Result) -> Figure:
         *marks.loads(shape, borne_loads(result)),
         *marks.contacts(shape, parts),
     ]
-    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(shape.at_rest[:, :2]), *(m.reach for m in drawn)])
+    fig, axes = canvas(
+        [Reach(shape.points[body.outermost, :2]), Reach(shape.at_rest[body.outermost, :2]), *(m.reach for m in drawn)]
+    )
     heading(fig, result, "deformed body")
     largest = float(shape.amount.max())
     paint(axes, shape, shape.amount[body.cells], SLATE, largest)

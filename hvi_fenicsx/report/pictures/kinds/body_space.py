@@ -46,7 +46,11 @@ def draw(result: Result) -> Figure:
     view = best_view(normals)
     shown = footprints(shape, view, parts, normals)
     arrows = [vtk_loads.arrows(shape, load) for load in pulled]
-    reached = [shape.points, body.points, *(s.points[s.geometry.vertices] for s in shown)]
+    reached = [
+        shape.points[body.outermost],
+        body.points[body.outermost],
+        *(s.points[s.geometry.vertices] for s in shown),
+    ]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
     found = labels(view, reached, pulled, arrows)
     fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])

@@ -70,7 +70,7 @@ def _worth_seeing(part: ContactPart) -> ContactPart:
     room = np.ptp(closed)
     near = (s >= closed.min() - room) & (s <= closed.max() + room)
     columns = {name: values[near] for name, values in part.columns.items()}
-    return replace(part, columns=columns, vertices=part.vertices[near])
+    return replace(part, columns=columns, vertices=part.vertices[near], drops=part.drops[near])
 
 
 def _panels(result: Result, part: ContactPart, length: Unit, way: str) -> Iterator[Callable[[Axes], None]]:
@@ -91,7 +91,9 @@ def _panels(result: Result, part: ContactPart, length: Unit, way: str) -> Iterat
 
 
 def _drops(result: Result, part: ContactPart, direction: str) -> Array:
-    """Where the law of a part drops at each vertex, m, (m, j)."""
+    """Where the law of a part drops at each vertex, m, (m, j); of friction the result has it."""
+    if direction == "slip":
+        return part.drops
     law, multipliers = result.law(part.name, direction), result.multipliers(part, direction)
     if law is None or multipliers is None:
         return np.empty((len(part["s"]), 0))

@@ -57,7 +57,7 @@ def draw(result: Result, part: ContactPart) -> Figure:
         if arrows is not None:
             _arrows(axes, flat, arrows)
         _frame(axes, flat, leftmost=places.leftmost(i), lowest=places.lowest(i))
-    _notes(fig, result, part, flat, places)
+    _notes(fig, part, flat, places)
     fig.text(1 - 0.3 / WIDTH, 0.25 / fig.get_figheight(), flat.how, size=12, color=GREY, ha="right")
     return fig
 
@@ -164,18 +164,15 @@ def _across(axes: Axes) -> int:
     return max(1, min(6, int(axes.get_window_extent().width / axes.figure.dpi / 0.7)))
 
 
-def _notes(fig: Figure, result: Result, part: ContactPart, flat: FlatPart, places: MapLayout) -> None:
+def _notes(fig: Figure, part: ContactPart, flat: FlatPart, places: MapLayout) -> None:
     """Where the law drops, as a line on the map of the slip, and what grey means; both said there."""
-    law, multipliers, said = result.law(part.name), result.multipliers(part), []
-    stretch = np.ones(len(part.slip)) if multipliers is None else multipliers[1]
-    slip, constant = part.slip / stretch, np.ptp(stretch) == 0.0
-    axes = fig.axes[0]  # the map of the slip
-    kinks = law.concave.kinks if law is not None else np.empty(0)
-    for kink in kinks[kinks > 0.0]:
-        at = f"at {quantity(float(kink * stretch[0]), 'm')}" if constant else "at lengths that change"
-        if np.nanmin(slip) < kink < np.nanmax(slip):
+    axes, said = fig.axes[0], list[str]()  # the map of the slip
+    for drop in part.drops.T[part.drops[0] > 0.0]:
+        slip, constant = part.slip / drop, np.ptp(drop) == 0.0
+        at = f"at {quantity(float(drop[0]), 'm')}" if constant else "at lengths that change"
+        if np.nanmin(slip) < 1.0 < np.nanmax(slip):
             triangles = Triangulation(flat.points[:, 0], flat.points[:, 1], flat.triangles)
-            axes.tricontour(triangles, slip[flat.rows], [kink], colors=INK, linestyles="--")
+            axes.tricontour(triangles, slip[flat.rows], [1.0], colors=INK, linestyles="--")
             said.append(f"dashed: the law drops {at}")
         else:
             said.append(f"the law drops {at}, not reached")

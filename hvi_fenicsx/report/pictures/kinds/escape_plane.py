@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 
-from ....geometry import chains
 from ....typing import Array
 from ...body_mesh import BodyMesh
 from ...reader import Result
@@ -50,7 +49,7 @@ def draw(result: Result) -> Figure:
 
 
 def _bodies(axes: Axes, body: BodyMesh, mover: BodyMesh, ghost: Array) -> None:
-    axes.add_patch(PathPatch(closed_path(body.points, chains(body.boundary)), fc=PALE, ec=INK, lw=1.6, zorder=1))
-    loops = chains(mover.boundary)
-    axes.add_patch(PathPatch(closed_path(ghost, loops), fc="none", ec=VERMILION, lw=2, ls=(0, (5, 3)), zorder=4))
-    axes.add_patch(PathPatch(closed_path(ghost, loops), fc=VERMILION, alpha=0.12, lw=0, zorder=3))
+    axes.add_artist(PathPatch(closed_path(body.points, body.outline), fc=PALE, ec=INK, lw=1.6, zorder=1))
+    loops = mover.outline
+    axes.add_artist(PathPatch(closed_path(ghost, loops), fc="none", ec=VERMILION, lw=2, ls=(0, (5, 3)), zorder=4))
+    axes.add_artist(PathPatch(closed_path(ghost, loops), fc=VERMILION, alpha=0.12, lw=0, zorder=3))

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 
-from ....geometry import chains
 from ...reader import Result
 from .. import plane_marks as marks
 from ..deformed import undeformed
@@ -39,14 +38,14 @@ def draw(result: Result) -> Figure:
     rest = undeformed(body)
     points = rest.points
     drawn = [*marks.supports(rest, held_sides(result)), *marks.loads(rest, loaded_sides(result))]
-    fig, axes = canvas([Reach(points[:, :2]), *(mark.reach for mark in drawn)])
+    fig, axes = canvas([Reach(points[body.outermost, :2]), *(mark.reach for mark in drawn)])
     heading(fig, result, "the scene")
     areas = regions(result)
     for region in areas:
         corners = points[body.cells[region.cells], :2]
         axes.add_collection(PolyCollection(list(corners), fc=region.tint, ec=region.tint, lw=0.3, zorder=0.5))
-    outline = closed_path(points, chains(body.boundary))
-    axes.add_patch(PathPatch(outline, fc="none" if areas else PALE_BODY, ec=INK, lw=1.6, joinstyle="round", zorder=1))
+    outline = closed_path(points, body.outline)
+    axes.add_artist(PathPatch(outline, fc="none" if areas else PALE_BODY, ec=INK, lw=1.6, joinstyle="round", zorder=1))
     found = list(roles_by_side(result))
     for side, roles in found:
         if touches(roles):

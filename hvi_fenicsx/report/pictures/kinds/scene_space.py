@@ -68,10 +68,12 @@ def draw(result: Result) -> Figure:
     held = {support.side.part for support in held_sides(result)}
     colours = [CONTACT if touches(t) else SUPPORT if s.part in held else LOADED for s, t in found]
     sides = [side for side, _ in found]
-    ways = apart.ways(view, body.points, ((body.points[s.vertices], s.normal) for s in sides), 0.05 * body.size)
+    ways = apart.ways(
+        view, body.points[body.outermost], ((body.points[s.vertices], s.normal) for s in sides), 0.05 * body.size
+    )
     shown = [ColouredSide(s, c, way) for s, c, way in zip(sides, colours, ways, strict=True)]
     arrows = _arrows(rest, pulled, shown)
-    reached = [body.points, *(body.points[s.side.vertices] + s.away for s in shown)]
+    reached = [body.points[body.outermost], *(body.points[s.side.vertices] + s.away for s in shown)]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
     drawn = [(s.side.part, Surface(points=body.points + s.away, facets=s.side.facets)) for s in shown]
     written = names(view, Surface(points=body.points, facets=body.boundary), drawn, arrows)

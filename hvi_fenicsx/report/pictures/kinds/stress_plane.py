@@ -33,7 +33,9 @@ def draw(result: Result) -> Figure:
         *marks.loads(shape, borne_loads(result)),
         *marks.contacts(shape, parts),
     ]
-    fig, axes = canvas([Reach(shape.points[:, :2]), Reach(shape.at_rest[:, :2]), *(m.reach for m in drawn)])
+    fig, axes = canvas(
+        [Reach(shape.points[body.outermost, :2]), Reach(shape.at_rest[body.outermost, :2]), *(m.reach for m in drawn)]
+    )
     heading(fig, result, "stress in the body")
     scale = scale_of(body, values)
     paint(axes, shape, np.broadcast_to(values[:, None], body.cells.shape), EMBER, scale.end)

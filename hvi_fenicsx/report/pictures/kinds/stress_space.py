@@ -43,7 +43,11 @@ def draw(result: Result) -> Figure:
     view = best_view(normals)
     apart = [patch for patch in footprints(shape, view, parts, normals) if patch.away.any()]
     arrows = [vtk_loads.arrows(shape, load) for load in pulled]
-    reached = [shape.points, body.points, *(p.points[p.geometry.vertices] for p in apart)]
+    reached = [
+        shape.points[body.outermost],
+        body.points[body.outermost],
+        *(p.points[p.geometry.vertices] for p in apart),
+    ]
     everything = np.concatenate([*reached, *(end for tails, ways in arrows for end in (tails, tails + ways))])
     found = labels(view, reached, pulled, arrows)
     fig, axes = space_canvas(view, [*reaches(view, np.concatenate(reached), arrows), *(label.reach for label in found)])
