@@ -7,6 +7,7 @@ each part to what it claims to measure: the mesh, the smoothing, the solver.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -221,6 +222,19 @@ def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str, degree: int) -> 
     assert found.ravel() == pytest.approx(matrix.diagonal(), rel=1e-12)
     e = np.random.default_rng(1).standard_normal(found.shape)
     assert BubbleStiffness(problem, bubbles).times(e).ravel() == pytest.approx(matrix @ e.ravel(), rel=1e-9, abs=1e-12)
+
+
+def test_the_bubbles_diagonal_is_near_their_stiffness_on_an_elastic_bed() -> None:
+    """The diagonal of affine functions is no more the bubbles' own; the spectrum of both is as narrow."""
+    problem = prepare(Scene.model_validate(CASES["l-shape"])).problem
+    v, u = problem.bulk.form.arguments()
+    problem = replace(problem, bulk=replace(problem.bulk, form=problem.bulk.form + 2e6 * ufl.inner(u, v) * ufl.dx))
+    bubbles = space(problem.domain.mesh, 1)
+    form = problem.bulk.between(ufl.TrialFunction(bubbles), ufl.TestFunction(bubbles))
+    root = 1 / np.sqrt(diagonal(problem, bubbles).ravel())
+    matrix = fem.assemble_matrix(fem.form(form)).to_scipy().toarray() * root * root[:, None]
+    least, *_, most = np.linalg.eigvalsh(matrix)
+    assert most < 6 * least
 
 
 @pytest.mark.parametrize("strong", [False, True])

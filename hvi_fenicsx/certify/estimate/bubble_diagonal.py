@@ -72,8 +72,9 @@ def _affine_densities(problem: Problem, slopes: _Slopes) -> list[Any]:
 
     The function vanishes at the middle of the cell: where there is a foundation, its energy depends on that.
     """
-    d = len(slopes)
-    place = ufl.classes.CellCoordinate(problem.space.mesh) - ufl.as_vector([1 / (d + 1)] * d)
+    d, mesh = len(slopes), problem.space.mesh
+    from_corner = ufl.SpatialCoordinate(mesh) - ufl.classes.CellVertices(mesh)[0, :]
+    place = ufl.JacobianInverse(mesh) * from_corner - ufl.as_vector([1 / (d + 1)] * d)
     height = ufl.dot(ufl.as_vector(slopes), place)
     along = [height * ufl.as_vector([float(x) for x in axis]) for axis in np.eye(d)]
     each = [[integral.integrand() for integral in _over_cells(problem.bulk.between(w, w))] for w in along]
