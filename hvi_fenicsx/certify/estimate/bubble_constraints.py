@@ -79,6 +79,10 @@ class Prescribed:
     component: int
     values: Array
 
+    def project(self, r: Array) -> None:
+        """Take out of r (n, d) what is prescribed, in place."""
+        r[self.blocks, self.component] = 0.0
+
 
 def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Prescribed, ...]:
     """What prescribed displacements ask of the bubbles. Collective.
@@ -111,13 +115,14 @@ class _Points:
         self._space, self.blocks = space, blocks
         chosen = np.zeros(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.bool_)
         chosen[blocks] = True
-        self._cells = np.flatnonzero(chosen[space.dofmap.list].any(axis=1)).astype(np.int32)
+        of_cells = space.dofmap.list
+        around = np.flatnonzero(chosen[of_cells.ravel()]) // of_cells.shape[1]
+        self._cells, self._found = np.unique(around).astype(np.int32), fem.Function(space)
 
     def values(self, u: fem.Function) -> Array:
         """The values (k, d) of a function of another space, from the cells around the points."""
-        found = fem.Function(self._space)
-        found.interpolate(u, self._cells, self._cells)
-        return np.array(found.x.array.reshape(-1, self._space.dofmap.bs)[self.blocks])
+        self._found.interpolate(u, self._cells, self._cells)
+        return np.array(self._found.x.array.reshape(-1, self._space.dofmap.bs)[self.blocks])
 
     def positions(self, *, needed: bool) -> Array:
         """Where they are, m, (k, 3); zeros where it does not matter: dolfinx finds the points of all bubbles."""
@@ -164,14 +169,23 @@ class Constraints:
     """What the bubbles must meet.
 
     Attributes:
-        free: where they are not prescribed, (n, d).
-        prescribed: what is prescribed elsewhere.
+        prescribed: what is prescribed.
         bounds: of the parts with contact.
     """
 
-    free: Mask
     prescribed: tuple[Prescribed, ...]
     bounds: tuple[BubbleBounds, ...]
+
+    def free(self, blocks: Entities) -> Mask:
+        """Where bubbles are not prescribed, (k, d).
+
+        Args:
+            blocks: the bubbles' owned blocks, with bounds, (k,).
+        """
+        found = np.ones((len(blocks), self.bounds[0].normals.shape[1]), dtype=np.bool_)
+        for given in self.prescribed:
+            found[np.isin(blocks, given.blocks), given.component] = False
+        return found
 
 
 def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Constraints:
@@ -182,10 +196,6 @@ def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> 
         u: the solution, nondimensional.
         space: the bubbles.
     """
-    free = np.ones((space.dofmap.index_map.size_local, problem.scales.dimension), dtype=np.bool_)
-    given = prescribed(problem, u, space)
-    for part in given:
-        free[part.blocks, part.component] = False
     parts = [b for b in problem.bounds if problem.interface_of(b.surface) is None]
     bounds = tuple(bubble_bounds(problem, u, part, space) for part in parts)
-    return Constraints(free=free, prescribed=given, bounds=bounds)
+    return Constraints(prescribed=prescribed(problem, u, space), bounds=bounds)

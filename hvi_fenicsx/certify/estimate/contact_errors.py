@@ -103,7 +103,8 @@ def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
     for state in traces.states:
         for law in state.laws:
             points, tau = _drops(traces, state, law)
-            force.x.array[:] += points.tested(tau)[1].ravel()
+            dropped = points.tested(tau)[1]
+            force.x.array.reshape(-1, d)[dropped.blocks] += dropped.values
             count += int(np.count_nonzero(np.any(tau, axis=(1, 2))))
     force.x.scatter_reverse(la.InsertMode.add)
     owned = problem.space.dofmap.index_map.size_local

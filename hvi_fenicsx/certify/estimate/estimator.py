@@ -132,15 +132,16 @@ def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: floa
 def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
     """η_K² of the owned cells: of the bubbles, and of the nodal forces that the laws are taken for. Collective."""
     problem, u = traces.problem, traces.u
-    load, unmet = traces.tested()
-    load *= -1.0
-    load += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+    between, unmet = traces.tested()
+    load[between.blocks] -= between.values
     stiffness = BubbleStiffness(problem, traces.bubbles)
     bubbles, under = fem.Function(traces.bubbles), bubble_constraints.constraints(problem, u, traces.bubbles)
     defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
-        cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
+        owned = problem.space.dofmap.index_map.size_local
+        cells += problem.bulk.energy_by_cell(inverse.solve(unmet.everywhere(owned))[0])
     return cells
 
 
