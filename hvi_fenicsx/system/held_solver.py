@@ -220,7 +220,7 @@ class HeldPreconditioner:
         ksp.setOperators(self._preconditioner.matrix)
         ksp.setPC(self._preconditioner.pc)
         ksp.setTolerances(rtol=rtol, max_it=self.settings.iterations)
-        ksp.setInitialGuessNonzero(self.settings.kind != "lu")
+        ksp.setInitialGuessNonzero(self.settings.kind != "lu" and x.norm() > 0.0)
         configure(ksp, self.settings.ksp)
         if isinstance(self._preconditioner, MixedMultigrid):
             self._preconditioner.accuracy = min(rtol, self.settings.thresholds.mixed_accuracy)

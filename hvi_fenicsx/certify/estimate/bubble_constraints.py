@@ -12,8 +12,10 @@ import numpy.typing as npt
 from dolfinx import fem
 
 from ...mesh import nodes
+from ...problem import spaces
 from ...problem.problem import Bounds, Problem
 from ...typing import Array, Entities, Mask
+from .bubbles import of_cell
 
 _FAR = 1e30
 """Stands for no bound: an infinite nodal value has no interpolant."""
@@ -105,7 +107,7 @@ class _Points:
 
     Args:
         space: of the bubbles.
-        blocks: their owned blocks, (k,).
+        blocks: their owned blocks, ascending, (k,).
 
     Attributes:
         blocks: as they are given.
@@ -115,14 +117,18 @@ class _Points:
         self._space, self.blocks = space, blocks
         chosen = np.zeros(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.bool_)
         chosen[blocks] = True
-        of_cells = space.dofmap.list
-        around = np.flatnonzero(chosen[of_cells.ravel()]) // of_cells.shape[1]
-        self._cells, self._found = np.unique(around).astype(np.int32), fem.Function(space)
+        of_cells = space.dofmap.list.ravel()
+        places = np.flatnonzero(chosen[of_cells])
+        _, one = np.unique(of_cells[places], return_index=True)  # any cell around a point knows what is there
+        self._cells, self._numbers = np.divmod(places[one], space.dofmap.list.shape[1])
 
     def values(self, u: fem.Function) -> Array:
-        """The values (k, d) of a function of another space, from the cells around the points."""
-        self._found.interpolate(u, self._cells, self._cells)
-        return np.array(self._found.x.array.reshape(-1, self._space.dofmap.bs)[self.blocks])
+        """The values of a displacement of the problem's space, (k, d)."""
+        space, degree = u.function_space, nodes.degree(u.function_space)
+        places = np.array(of_cell(degree, self._space.mesh.topology.cell_name())) / (2 * degree)
+        functions = spaces.simplex_functions(degree, places, spaces.edge_share(space))[self._numbers]
+        there = u.x.array.reshape(-1, self._space.dofmap.bs)[space.dofmap.list[self._cells]]
+        return np.asarray(np.einsum("kn,knd->kd", functions, there))
 
     def positions(self, *, needed: bool) -> Array:
         """Where they are, m, (k, 3); zeros where it does not matter: dolfinx finds the points of all bubbles."""

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from ...problem.law_term import LawTerm
 from ...problem.problem import Problem
-from ...problem.vectors import new_vector, turn
+from ...problem.vectors import turn
 from ...runtime.mpi import total
 from ...runtime.timing import Timer
 from ...system.held_solver import HeldPreconditioner
@@ -105,7 +105,7 @@ class DualNorm:
 
     def _load(self, functional: Array) -> PETSc.Vec:
         system = self.system
-        load = new_vector(system.problem.space)
+        load = system.load.duplicate()
         load.array[:] = functional.ravel()
         turn(load, system.rotation)
         load.array[self.held] = 0.0
