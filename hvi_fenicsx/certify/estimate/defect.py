@@ -55,7 +55,7 @@ class LeastEnergy:
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
         again = limits.bubble_tolerance_again[nodes.degree(stiffness.problem.space)]
         tolerance = again if self._begun else limits.bubble_tolerance
-        goal = tolerance**2 * stiffness.square(self.residual, self._descent)
+        goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), limits.rounding**2)
         for _ in range(limits.bubble_rounds):
             self._put_on_bounds()
             steps = limits.bubble_steps
