@@ -58,12 +58,13 @@ class Coupled:
     Args:
         traces: the laws between the nodes.
         inverse: of the system.
+        stiffness: of the bubbles.
 
     Attributes:
         error: as it is known so far.
     """
 
-    def __init__(self, traces: LawTraces, inverse: DualNorm) -> None:
+    def __init__(self, traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> None:
         problem, space = traces.problem, traces.bubbles
         self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
         self._longest = 0.0
@@ -71,7 +72,7 @@ class Coupled:
         load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
         self._laws, _ = traces.tested()
         load[self._laws.blocks] -= self._laws.values
-        stiffness, under = BubbleStiffness(problem, space), bubble_constraints.constraints(problem, traces.u, space)
+        under = bubble_constraints.constraints(problem, traces.u, space)
         self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load, self._thresholds)
         self._moved = fem.Function(problem.space)
         self._of_moved = problem.bulk.force_in(space, self._moved)
@@ -138,23 +139,24 @@ class Coupled:
         self._least.residual -= self._of_moved.values()
 
 
-def of_solution(traces: LawTraces, inverse: DualNorm) -> tuple[ErrorField, Array]:
+def of_solution(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> tuple[ErrorField, Array]:
     """Bubbles and nodes in turns, each under the influence of the other, until their energy settles. Collective.
 
     Args:
         traces: the laws between the nodes.
         inverse: of the system.
+        stiffness: of the bubbles.
 
     Returns:
         The estimated error, and η_K² of the owned cells.
     """
-    error = _found(traces, inverse)
+    error = _found(traces, inverse, stiffness)
     return error, traces.problem.bulk.energy_by_cell(error.nodes + error.bubbles)
 
 
-def _found(traces: LawTraces, inverse: DualNorm) -> ErrorField:
+def _found(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> ErrorField:
     """The estimated error. Collective."""
-    coupled, size = Coupled(traces, inverse), 0.0
+    coupled, size = Coupled(traces, inverse, stiffness), 0.0
     for _ in range(traces.thresholds.coupled_rounds):
         coupled.find_bubbles()
         coupled.move_nodes()
