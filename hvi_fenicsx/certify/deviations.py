@@ -37,8 +37,12 @@ def measured(
     }
 
 
-def rounding(references: References, u: fem.Function, forces: Forces, states: Sequence[ContactState]) -> Array:
-    """By how much the entries change when the last digits of u are shuffled, by body. Collective.
+def rounding(
+    references: References, u: fem.Function, forces: Forces, states: Sequence[ContactState]
+) -> dict[str, Array]:
+    """By how much the entries of :func:`measured` change when the last digits of u are shuffled, by body. Collective.
+
+    Where a law is steep, as one with a narrow smoothing, they move the traction that it gives too.
 
     Args:
         references: of the problem that was solved.
@@ -54,6 +58,18 @@ def rounding(references: References, u: fem.Function, forces: Forces, states: Se
         )
         traction = np.max(np.abs(force[state.surface.blocks]), axis=1) / state.surface.weights
         worst = np.maximum(worst, references.largest(state.surface.blocks, traction / scale))
+    names = ("equilibrium", "penetration", "tension", "complementarity")
+    return {**dict.fromkeys(names, worst), "inclusion": worst + _rounding_of_laws(references, u, states)}
+
+
+def _rounding_of_laws(references: References, u: fem.Function, states: Sequence[ContactState]) -> Array:
+    """By how much the last digits of u move what the laws give, relative to their scales, by body. Collective."""
+    worst: Array = np.zeros(references.count)
+    vectors = np.abs(u.x.array.reshape(-1, references.problem.scales.dimension)) * np.finfo(float).eps
+    for law in (law for state in states for law in state.laws):
+        blocks = law.term.surface.blocks
+        digits = np.einsum("mkd,md->mk", np.abs(law.term.directions), vectors[blocks])
+        worst = np.maximum(worst, references.largest(blocks, law.moved_by(digits) / law.scale))
     return worst
 
 

@@ -69,6 +69,21 @@ class LawState:
         """Distance of displacements that is none, (m,)."""
         return self.near * self.term.stretch
 
+    def moved_by(self, digits: Array) -> Array:
+        """How far the tractions that it gives move on their pieces, (m,); none on a kink, which gives a whole interval.
+
+        Args:
+            digits: by which the displacement along its directions moves, at most, (m, k).
+        """
+        term, kink = self.term, self.on_convex_kink()
+        low, high = term.law.interval(self.argument)
+        second = term.law.convex.second(self.argument) - term.law.concave.second(self.argument)
+        first, second = (np.where(kink, 0.0, values) for values in ((low + high) / 2, second / term.stretch))
+        if term.length is None:
+            return np.abs(second) * digits[:, 0]
+        rates = np.abs(term.length.hessian(self.components, first, second))
+        return np.linalg.norm(np.einsum("mkl,ml->mk", rates, digits), axis=1)
+
     def on_convex_kink(self) -> Mask:
         """Where it is on a kink of the law's convex part, (m,)."""
         return force_attribution.on_kink(self.term.law.convex, self.argument, self.near)

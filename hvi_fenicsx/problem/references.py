@@ -57,8 +57,8 @@ class References:
             blocks: the vertices, local, (m,).
             values: what is compared; what is no number counts as infinite.
         """
-        found = np.zeros(self.count)
-        np.maximum.at(found, self.problem.bodies.labels[blocks], np.where(np.isnan(values), np.inf, values))
+        labels, known = self.problem.bodies.labels[blocks], np.where(np.isnan(values), np.inf, values)
+        found = np.array([np.max(known, initial=0.0, where=labels == body) for body in range(self.count)])
         self.problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
         return found
 

@@ -31,11 +31,11 @@ def stiffness_tensor(bulk: Bulk, cells: Entities) -> Array:
     sizes, work = LinearForm(size).values()[cells, 0], LinearForm(whole)
     found = np.zeros((len(cells), *[d] * 4))
     strains = list(itertools.combinations_with_replacement(range(d), 2))
-    for (i, j), (k, m) in itertools.product(strains, strains):
+    for (i, j), (k, m) in itertools.combinations_with_replacement(strains, 2):
         one.value[...], other.value[...] = _strain(d, k, m), _strain(d, i, j)
         entry = work.values()[cells, 0] / sizes * bulk.scales.length**d
-        for a, b in {(i, j), (j, i)}:
-            found[:, a, b, k, m] = found[:, a, b, m, k] = entry
+        for (a, b), (p, q) in itertools.product({(i, j), (j, i)}, {(k, m), (m, k)}):
+            found[:, a, b, p, q] = found[:, p, q, a, b] = entry
     return found
 
 

@@ -226,11 +226,13 @@ def rigid_fields(points: Array, body: RigidBody) -> Array:
         points: (m, 3), nondimensional.
         body: the body that moves.
     """
-    lever, d = points - body.centre, body.dimension
-    fields = np.zeros((len(points), body.motions, d))
-    fields[:, :d, :] = np.eye(d)
+    d, centre = body.dimension, body.centre
+    shifts = np.zeros((body.motions, d))
+    shifts[:d] = np.eye(d)
+    fields = np.tile(shifts.ravel(), len(points)).reshape(-1, *shifts.shape)  # far quicker than to fill it by columns
     if d == 2:
-        fields[:, 2, 0], fields[:, 2, 1] = -lever[:, 1], lever[:, 0]
+        np.subtract(centre[1], points[:, 1], out=fields[:, 2, 0])
+        np.subtract(points[:, 0], centre[0], out=fields[:, 2, 1])
     else:
-        fields[:, 3:, :] = np.cross(np.eye(3)[None], lever[:, None, :])
+        fields[:, 3:, :] = np.cross(np.eye(3)[None], (points - centre)[:, None, :])
     return fields

@@ -16,15 +16,15 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..runtime.timing import Timer
-from ..system.held_solver import HeldPreconditioner
+from ..system.held_solver import Goal, HeldPreconditioner
 from ..system.law_model import LawModel
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
-from ..system.petsc_options import configure, prefix
+from ..system.petsc_options import default_options, prefix
 from ..system.system import System
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
-from .snes_views import ReducedPreconditioner, unextracted
+from .snes_views import InactiveSolve, unextracted
 from .stalls import StallTest
 from .thresholds import DEFAULT, FULL_STEPS, Thresholds
 
@@ -119,7 +119,7 @@ class ActiveSetSolver:
         self.held.prepare(held)
         step = x.duplicate()
         step.set(0.0)
-        iterations, reason = self.held.solve(self._residual, step, rtol)
+        iterations, reason = self.held.solve(self._residual, step, Goal(rtol=rtol))
         step.array[held] = 0.0  # multigrid leaves rounding there, and a vertex must stay exactly on its bound
         finite = np.isfinite(step.norm())
         if finite:
@@ -201,12 +201,11 @@ class _SnesRun:
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
         self.sizes = NOT_MEASURED
-        self._inner = owner.held.inner_iterations
         self.stopped = self.far = False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
         """The configured SNES."""
-        system, linear = self.owner.system, self.owner.settings
+        system = self.owner.system
         self._stalls = StallTest(self.thresholds, full_steps=line_search == FULL_STEPS)
         snes = PETSc.SNES().create(system.comm)
         snes.setType("vinewtonrsls")
@@ -216,33 +215,37 @@ class _SnesRun:
         snes.setObjective(lambda _, x: system.equations.energy(x, self.models))
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=max_iterations)
-        snes.getKSP().setTolerances(rtol=self.thresholds.finest_accuracy, atol=0.0, max_it=linear.iterations)
         near = self.thresholds.on_bound * float(np.min(system.references.scale))
-        defaults = {"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": near}
-        configure(snes, {**defaults, **self.owner.settings.ksp})
-        self._set_preconditioner(snes)
+        with default_options({"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": near}):
+            snes.setOptionsPrefix(prefix())
+            snes.getKSP().setOptionsPrefix(f"{prefix()}inactive_")
+            snes.setFromOptions()
+        self._set_linear_solve(snes)
         return snes
 
-    def _set_preconditioner(self, snes: PETSc.SNES) -> None:
-        """The PC of the inactive dofs. The user's -pc_type is for the one at full size that it calls."""
-        pc = snes.getKSP().getPC()
-        pc.setOptionsPrefix(f"{prefix()}inactive_")
-        pc.setType(PETSc.PC.Type.PYTHON)
-        pc.setPythonContext(ReducedPreconditioner(snes, self.owner.held, self._accuracy))
+    def _set_linear_solve(self, snes: PETSc.SNES) -> None:
+        """The KSP of the inactive dofs. The user's -ksp_type is for the one at full size that it calls."""
+        ksp = snes.getKSP()
+        ksp.getPC().setType(PETSc.PC.Type.NONE)
+        ksp.setType(PETSc.KSP.Type.PYTHON)
+        ksp.setPythonContext(InactiveSolve(snes, self.owner.held, self._goal))
 
-    def _accuracy(self, *, moved: bool) -> float:
-        """Relative tolerance of a linear solve: what the tolerance needs, but loose while the active set changes."""
-        if self.steady and not moved:
-            return self.thresholds.straight * self.tolerance / self.last
-        wanted = self.thresholds.moving_accuracy if moved else self.thresholds.forcing * self.tolerance / self.last
-        return max(wanted, self.thresholds.finest_accuracy)
+    def _goal(self, *, moved: bool) -> Goal:
+        """How exact a linear solve is: what the tolerance needs, but loose while the active set changes.
+
+        Where net forces are left, which residuals by vertex do not tell, its norm falls as far as they have to.
+        """
+        thresholds = self.thresholds
+        least = thresholds.moving_accuracy if moved else 0.0 if self.steady else thresholds.finest_accuracy
+        wanted = max(thresholds.forcing * self.tolerance, least * self.last)
+        if np.any(self.sizes.net > 0.0):
+            return Goal(rtol=wanted / self.last)
+        return Goal(rtol=wanted / self.last, reached=self.owner.convergence.reaches(wanted, self.sizes.forces))
 
     def finish(self, snes: PETSc.SNES) -> None:
         """Take iterations and reason from the SNES, and free it."""
         self.iterations, self.reason = snes.getIterationNumber(), snes.getConvergedReason()
-        self.linear = snes.getLinearSolveIterations() + self.owner.held.inner_iterations - self._inner
-        if self.reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE:
-            self.owner.held.report(snes.getKSP().getIterationNumber(), failed=True)
+        self.linear = snes.getLinearSolveIterations()
         snes.destroy()
 
     def outcome(self) -> Outcome:
@@ -266,8 +269,6 @@ class _SnesRun:
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         x, (f, _) = snes.getSolution(), snes.getFunction()[:2]
-        if iteration:
-            self.owner.held.report(snes.getKSP().getIterationNumber())
         self.sizes = self.owner.convergence.sizes(x, f, self.lower, self.upper)
         self.last = self.sizes.worst
         if self.owner.progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,12 +23,14 @@ class Sizes:
         traction: the largest nodal traction on Γc, over what is allowed there.
         net: the largest net force along a rigid motion (:mod:`.net_forces`).
         noise: what ``net`` grows by with a unit of noise in all unknowns.
+        forces: what ``norm`` is relative to.
     """
 
     norm: Array
     traction: Array
     net: Array
     noise: Array
+    forces: Array
 
     @property
     def worst(self) -> float:
@@ -35,7 +38,7 @@ class Sizes:
         return float(np.max([self.norm, self.traction, self.net]))
 
 
-NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(4)))
+NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(5)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,7 @@ class ConvergenceTest:
         on_lower = x.array_r[at] <= lower.array_r[at] + self._near
         on_upper = x.array_r[at] >= upper.array_r[at] - self._near
         r[at] = projected(r[at], on_lower, on_upper)
-        return Sizes(*self._forces(r, x), *self._net.sizes(x, residual.array_r, r, (on_lower, on_upper)))
+        return self._measured(x, residual.array_r, r, (on_lower, on_upper))
 
     def sizes_without_bounds(self, x: PETSc.Vec, residual: PETSc.Vec) -> Sizes:
         """Size of the residual of an equation. Collective.
@@ -100,14 +103,40 @@ class ConvergenceTest:
             residual: of the equation at x.
         """
         r, nowhere = residual.array_r, np.zeros(len(self._blocks), dtype=bool)
-        return Sizes(*self._forces(r, x), *self._net.sizes(x, r, r, (nowhere, nowhere)))
+        return self._measured(x, r, r, (nowhere, nowhere))
 
-    def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array]:
-        """Norm and largest traction of a residual (n,) at x, by body. Collective."""
-        system, references = self._system, self._system.references
-        nodal = np.abs(residual[system.jacobian.rows.dofs]) / self._limits
-        forces = references.forces(x.array_r, system.holding_forces(x))
-        return references.norms(residual) / forces, references.largest(self._blocks, nodal)
+    def _measured(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Sizes:
+        """As :meth:`.NetForceTest.sizes`. Collective."""
+        norm, traction, forces = self._forces(projected, x)
+        net, noise = self._net.sizes(x, residual, projected, on)
+        return Sizes(norm, traction, net, noise, forces)
+
+    def reaches(self, wanted: float, forces: Array) -> Callable[[Array], bool]:
+        """Whether the residual (n,) of a linear solve is small enough, net forces aside; collective.
+
+        Args:
+            wanted: its size at most, relative.
+            forces: what its norm is relative to, by body (:attr:`Sizes.forces`).
+        """
+
+        def reached(residual: Array) -> bool:
+            return bool(
+                np.all(self._traction(residual) <= wanted)
+                and np.all(self._system.references.norms(residual) <= wanted * forces)
+            )
+
+        return reached
+
+    def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array, Array]:
+        """Norm and largest traction of a residual (n,) at x, and what the norm is relative to, by body. Collective."""
+        references = self._system.references
+        forces = references.forces(x.array_r, self._system.holding_forces(x))
+        return references.norms(residual) / forces, self._traction(residual), forces
+
+    def _traction(self, residual: Array) -> Array:
+        """The largest traction of a residual (n,) on Γc, relative, by body. Collective."""
+        nodal = np.abs(residual[self._system.jacobian.rows.dofs]) / self._limits
+        return self._system.references.largest(self._blocks, nodal)
 
     def rounding(self, x: PETSc.Vec, sizes: Sizes) -> Sizes:
         """What rounding makes of the residual at x. Collective.
@@ -119,12 +148,12 @@ class ConvergenceTest:
         system, safety = self._system, self._thresholds.rounding_safety
         sample = system.load.duplicate()
         system.equations.rounding_sample(x, sample)
-        norm, traction = (safety * size for size in self._forces(sample.array_r, x))
+        norm, traction, _ = self._forces(sample.array_r, x)
         system.equations.rounding_sample(system.jacobian.strained(x), sample)
         unknowns = system.references.vertices * system.problem.scales.dimension
         noise = safety * system.references.norms(sample.array_r) / np.sqrt(unknowns)
         sample.destroy()
-        return Sizes(norm, traction, noise * sizes.noise, sizes.noise)
+        return Sizes(safety * norm, safety * traction, noise * sizes.noise, sizes.noise, sizes.forces)
 
     def in_contact(self, x: PETSc.Vec) -> int:
         """Vertices on a bound of the problem. Collective."""

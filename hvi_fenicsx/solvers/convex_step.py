@@ -130,9 +130,9 @@ class ConvexStep:
             xi: ξ by term, (m,) each.
         """
         models = self.majorants(cells, self._nearest(x, xi))
-        if self.anywhere(self._overloaded(x, models)):
-            return math.inf
         self._system.equations.residual(x, self._residual, models)
+        if self.anywhere(self._beyond_kinks(x, models)):
+            return math.inf
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
         return self._solver.measure(x, self._residual, lower, upper)
 
@@ -216,9 +216,15 @@ class ConvexStep:
         return found
 
     def _overloaded(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
+        """To which cell each vertex moves whose kink cannot carry its force, by term."""
+        if kink_bounds.exist([m.cells for m in models]):
+            self._system.equations.residual(x, self._residual, models)
+        return self._beyond_kinks(x, models)
+
+    def _beyond_kinks(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
+        """As :meth:`_overloaded`, where the residual at x is known."""
         if not kink_bounds.exist([m.cells for m in models]):
             return [np.zeros(len(m.cells.index), dtype=np.int64) for m in models]
-        self._system.equations.residual(x, self._residual, models)
         slack = self._thresholds.kink_slack * self._options.tolerance
         return kink_bounds.overloaded(self._system, x, self._residual, models, slack)
 

@@ -86,7 +86,9 @@ def overloaded(
         models: of the step, by term.
         slack: traction by which the kink may be exceeded, relative to the law's scale.
     """
-    moves, shared = [], radial_kinks.Shared(system.terms, models, _left_to_radial(system, x, residual, models))
+    radial = any(term.radial for term in system.terms)
+    left = _left_to_radial(system, x, residual, models) if radial else residual.array_r
+    moves, shared = [], radial_kinks.Shared(system.terms, models, left)
     for number, (term, model) in enumerate(zip(system.terms, models, strict=True)):
         excess = slack * system.references.traction_scale(term) * term.weights
         argument = term.argument(x.array_r)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from petsc4py import PETSc
 
+from ..system.held_solver import Goal
 from ..system.law_model import LawModel
 from ..typing import Array
 from .active_set import ActiveSetSolver
@@ -106,7 +107,7 @@ class ProjectedNewton:
         right.array[fixed] = 0.0
         step.set(0.0)
         held.prepare(fixed)
-        self._linear += held.solve(right, step, self._thresholds.linear_tolerance)[0]
+        self._linear += held.solve(right, step, Goal(rtol=self._thresholds.linear_tolerance))[0]
         step.array[fixed] = 0.0
         right.destroy()
         return step

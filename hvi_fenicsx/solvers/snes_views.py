@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from petsc4py import PETSc
 
-from ..system.held_solver import HeldPreconditioner
+from ..system.held_solver import Goal, HeldPreconditioner
 from ..typing import Entities
 
 
@@ -38,7 +38,7 @@ class _FullMatrix:
     multTranspose = mult
 
     def createSubMatrix(self, _: PETSc.Mat, rows: PETSc.IS, columns: PETSc.IS, into: PETSc.Mat | None) -> PETSc.Mat:
-        """The rows and columns of the inactive dofs. Collective.
+        """The rows and columns of the inactive dofs, of which only the size is asked. Collective.
 
         Args:
             _: the matrix whose context this is.
@@ -46,61 +46,46 @@ class _FullMatrix:
             columns: the same.
             into: not used.
         """
-        self._held.select(rows)
         sizes = (rows.getLocalSize(), rows.getSize())
-        matrix = PETSc.Mat().createPython((sizes, sizes), _InactiveMatrix(self._held), comm=rows.comm)
+        matrix = PETSc.Mat().createPython((sizes, sizes), self, comm=rows.comm)
         matrix.setUp()
         return matrix
 
 
-class _InactiveMatrix:
-    """PETSc's view of J on the inactive dofs of a step."""
-
-    def __init__(self, held: HeldPreconditioner) -> None:
-        self._held = held
-
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Multiply y = J x. Collective.
-
-        Args:
-            _: the matrix whose context this is.
-            x: the vector, on the inactive dofs.
-            y: where the product is written.
-        """
-        self._held.multiply_reduced(x, y)
-
-
-class ReducedPreconditioner:
-    """PETSc's view of :class:`HeldPreconditioner` on the inactive dofs of a SNES VI step.
+class InactiveSolve:
+    """The linear solve of a SNES VI step on its inactive dofs, as PETSc's KSP: :class:`HeldPreconditioner` solves it.
 
     Args:
         snes: the solver, which knows the inactive dofs.
-        held: the preconditioner.
-        accuracy: relative tolerance of a linear solve, by whether the active set has changed.
+        held: the preconditioner, by which equations are solved at full size.
+        goal: how exact a step is to be, by whether the active set has changed.
     """
 
-    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, accuracy: Callable[..., float]) -> None:
-        self._snes, self._held, self._accuracy = snes, held, accuracy
+    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, goal: Callable[..., Goal]) -> None:
+        self._snes, self._held, self._goal = snes, held, goal
         self._active: Entities | None = None
 
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Take the active dofs of this step and prepare for them."""
-        start, end = self._held.system.load.owner_range
-        active = np.ones(end - start, dtype=bool)
-        active[self._snes.getVIInactiveSet().getIndices() - start] = False
-        found = np.flatnonzero(active).astype(np.int32)
-        moved = self._active is not None and not np.array_equal(found, self._active)
-        moved = bool(self._held.system.comm.allreduce(moved))
-        self._snes.getKSP().setTolerances(rtol=self._accuracy(moved=moved))
-        self._active = found
-        self._held.prepare(found)
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Apply the preconditioner, y = P^-1 x.
+    def solve(self, ksp: PETSc.KSP, load: PETSc.Vec, x: PETSc.Vec) -> None:
+        """Solve J x = load on the inactive dofs. Collective.
 
         Args:
-            pc: the PC whose context this is.
-            x: the vector, on the inactive dofs.
-            y: where the result is written.
+            ksp: the KSP whose context this is.
+            load: the right-hand side, on the inactive dofs.
+            x: where the solution is written.
         """
-        self._held.apply_reduced(x, y)
+        inactive = self._snes.getVIInactiveSet()
+        goal = self._goal(moved=self._prepare(inactive))
+        iterations, reason = self._held.solve_reduced(inactive, load, x, goal)
+        ksp.setIterationNumber(iterations)
+        ksp.setConvergedReason(reason)
+
+    def _prepare(self, inactive: PETSc.IS) -> bool:
+        """Prepare for the active dofs of this step; whether others were active in the last one. Collective."""
+        start, end = self._held.system.load.owner_range
+        active = np.ones(end - start, dtype=bool)
+        active[inactive.getIndices() - start] = False
+        found = np.flatnonzero(active).astype(np.int32)
+        moved = self._active is not None and not np.array_equal(found, self._active)
+        self._active = found
+        self._held.prepare(found)
+        return bool(self._held.system.comm.allreduce(moved))

@@ -45,9 +45,7 @@ class ActiveSetThresholds:
         nothing_acts: net forces along a rigid motion that are this small beside the sum of all forces are none.
         moving_accuracy: relative tolerance of a step's linear solve while the active set changes.
         forcing: relative tolerance of a linear solve, as a part of the reduction that is still needed.
-        finest_accuracy: the least relative tolerance of a linear solve.
-        straight: part of the tolerance that a step from a steady start shall reach: nodal tractions fall by a quarter
-            as much as the norm where ranks meet on Γc.
+        finest_accuracy: the least relative tolerance of a linear solve, unless the active set is expected to stay.
         runaway: a displacement of so many times p0 L / E0 is a body that slides away.
     """
 
@@ -64,7 +62,6 @@ class ActiveSetThresholds:
     moving_accuracy: float = 1e-2
     forcing: float = 0.5
     finest_accuracy: float = 1e-4
-    straight: float = 0.125
     runaway: float = 1e8
 
 

@@ -10,6 +10,7 @@ which they are held by their diagonals (:meth:`.Jacobian.hold`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +19,7 @@ from petsc4py import PETSc
 
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
-from . import factor_counts, schur
+from . import factor_counts, free_rows, schur
 from .algebraic import Algebraic
 from .direct import Direct
 from .factorisation import FactorForm, form_of
@@ -48,6 +49,20 @@ class Preconditioner(Protocol):
         """Free the PETSc objects."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """How exact a linear solve is to be.
+
+    Attributes:
+        rtol: relative tolerance of the residual's norm.
+        reached: whether a residual (n,) is small enough for what the solve is for, which a conjugate gradient method
+            asks at each iteration instead: tractions on Γc may fall more slowly than the norm, or faster. Collective.
+    """
+
+    rtol: float
+    reached: Callable[[Array], bool] | None = None
+
+
 class HeldPreconditioner:
     """The preconditioner of the system's matrix with some unknowns held; made anew only where it has to be.
 
@@ -64,6 +79,7 @@ class HeldPreconditioner:
     def __init__(self, system: System, levels: Levels, settings: LinearSettings, timer: Timer) -> None:
         self.system, self.levels, self.settings, self._timer = system, levels, settings, timer
         self._held: Entities | None = None
+        self._wanted: Entities = np.empty(0, np.int32)  # those held now; the preconditioner may be of others
         self._rates: list[Array] = []
         self._first_iterations, self._outdated = 0, False
         self._preconditioner: Preconditioner | None = None
@@ -75,6 +91,7 @@ class HeldPreconditioner:
 
     def prepare(self, held: Entities) -> None:
         """Make it suit these held unknowns (local, owned, sorted). Collective."""
+        self._wanted = held.copy()
         self.system.jacobian.hold(held if self.settings.kind in ("mg", "mixed") else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
             return
@@ -170,15 +187,6 @@ class HeldPreconditioner:
         self._runs = list(consecutive_runs(inactive.getIndices() - self.system.load.owner_range[0]))
         self._in.set(0.0)
 
-    def multiply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Multiply y = J x on the selected dofs, all others being zero. Collective.
-
-        Args:
-            x: a reduced vector.
-            y: where the product is written, reduced too.
-        """
-        self._reduced(self.system.jacobian.matrix.mult, x, y)
-
     def apply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Apply the preconditioner, y = P^-1 x, on the selected dofs. Collective.
 
@@ -186,53 +194,80 @@ class HeldPreconditioner:
             x: a reduced vector.
             y: where the result is written, reduced too.
         """
-        self._reduced(self._precondition, x, y)
+        self._spread(x)
+        self._in.array[self.system.pins] = 0.0
+        self._preconditioner.pc.apply(self._in, self._out)  # type: ignore[union-attr]
+        self._collect(y)
 
-    def _precondition(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        x.array[self.system.pins] = 0.0
-        self._preconditioner.pc.apply(x, y)  # type: ignore[union-attr]
+    def solve_reduced(self, inactive: PETSc.IS, load: PETSc.Vec, x: PETSc.Vec, goal: Goal) -> tuple[int, int]:
+        """As :meth:`solve`, on the dofs that are not held. Collective.
 
-    def _reduced(self, operation: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec) -> None:
+        Args:
+            inactive: these dofs.
+            load: the right-hand side, a reduced vector.
+            x: where the solution is written, reduced too.
+            goal: how exact it is to be.
+
+        Returns:
+            Iterations, and PETSc's reason for the end.
+        """
+        self.select(inactive)
+        self._spread(load)
+        ended = self.solve(self._in, self._out, goal)
+        self._collect(x)
+        return ended
+
+    def _spread(self, x: PETSc.Vec) -> None:
+        """Write a reduced vector into the one at full size, in which all others are zero."""
         whole, part = self._in.array, x.array_r
         for at, of in self._runs:
             whole[at] = part[of]
-        operation(self._in, self._out)
+
+    def _collect(self, y: PETSc.Vec) -> None:
         whole, part = self._out.array_r, y.array
         for at, of in self._runs:
             part[of] = whole[at]
 
-    def solve(self, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
+    def solve(self, load: PETSc.Vec, x: PETSc.Vec, goal: Goal) -> tuple[int, int]:
         """Solve with the matrix in which unknowns are held. Collective.
 
         Where motions are free, x is the shortest of all solutions.
 
         Args:
             load: the right-hand side; changed at pinned dofs.
-            x: the first guess; the solution is written into it.
-            rtol: relative tolerance.
+            x: where the solution is written.
+            goal: how exact it is to be.
 
         Returns:
             Iterations, and PETSc's reason for the end.
         """
         load.array[self.system.pins] = 0.0
-        ksp = PETSc.KSP().create(self.system.comm)
-        assert self._preconditioner is not None
-        ksp.setOperators(self._preconditioner.matrix)
-        ksp.setPC(self._preconditioner.pc)
-        ksp.setTolerances(rtol=rtol, max_it=self.settings.iterations)
-        ksp.setInitialGuessNonzero(self.settings.kind != "lu")
-        configure(ksp, self.settings.ksp)
-        if isinstance(self._preconditioner, MixedMultigrid):
-            self._preconditioner.accuracy = min(rtol, self.settings.thresholds.mixed_accuracy)
-        before = self.inner_iterations
+        ksp, before = self._krylov(goal), self.inner_iterations
         with self._timer("solve"):
             ksp.solve(load, x)
         if self.system.free_motions is not None:
             self.system.free_motions.null_space.remove(x)
-        iterations, reason = int(ksp.getIterationNumber()), int(ksp.getConvergedReason())
+        iterations, reason = free_rows.iterations(ksp), int(ksp.getConvergedReason())
         ksp.destroy()
-        self.report(iterations)
+        self.report(iterations, failed=reason < 0)
         return iterations + self.inner_iterations - before, reason
+
+    def _krylov(self, goal: Goal) -> PETSc.KSP:
+        """The Krylov method, to be destroyed after use."""
+        assert self._preconditioner is not None
+        ksp, settings = PETSc.KSP().create(self.system.comm), self.settings
+        ksp.setOperators(self._preconditioner.matrix)
+        ksp.setPC(self._preconditioner.pc)
+        if isinstance(self._preconditioner, MixedMultigrid):
+            self._preconditioner.accuracy = min(goal.rtol, settings.thresholds.mixed_accuracy)
+        ksp.setTolerances(rtol=goal.rtol, max_it=settings.iterations)
+        configure(ksp, settings.ksp)
+        if ksp.getType() == PETSc.KSP.Type.CG:
+            if goal.reached is not None:
+                ksp.setTolerances(rtol=settings.thresholds.surplus * goal.rtol)
+            whole, held = self.system.jacobian.matrix, np.union1d(self._wanted, self.system.pins)
+            free_rows.set_up(ksp, whole, self._preconditioner.pc, held, goal.reached)
+        return ksp
 
 
 def consecutive_runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:

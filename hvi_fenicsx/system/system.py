@@ -177,7 +177,7 @@ class System:
 
     def unknowns(self, u: fem.Function) -> PETSc.Vec:
         """The unknowns of a displacement field (in units of u0). Collective."""
-        x = new_vector(self.problem.space)
+        x = self.load.duplicate()
         x.array[:] = self.problem.relative(u.x.array)[: x.local_size]
         turn(x, self.rotation)
         return x

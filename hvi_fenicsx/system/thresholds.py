@@ -30,6 +30,7 @@ class Thresholds:
         rebuilt: times that algebraic multigrid is made before a direct solver takes over where it can: most of its cost
             is then in its setup (on cells 1000 times as long as high, ten times that of a factorisation).
         slower: factor of the first iterations from which a preconditioner is made anew.
+        surplus: part of the relative tolerance at which a Krylov method ends though its goal is not reached.
         krylov_iterations: iterations of a Krylov method at most.
         replaced_iterations: the same where a direct solver can take over: 2,000 in vain took far longer than that.
         condensing: cost of condensing to Γc, in terms of the factorisations so far, up to which it is done.
@@ -63,6 +64,7 @@ class Thresholds:
     slow: int = 50
     rebuilt: int = 30
     slower: float = 1.5
+    surplus: float = 1e-2
     krylov_iterations: int = 2_000
     replaced_iterations: int = 100
     condensing: float = 1.0

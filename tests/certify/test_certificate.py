@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pytest
 from dolfinx import fem
 from runs import process
-from scenes import STEEL, P, Q, Table, displacement, far, model, quadratic_linear, solved
+from scenes import STEEL, P, Q, Table, displacement, far, model, quadratic_linear, solved, two_blocks
 
 from hvi_fenicsx import Scene, Solution, dump_scene, prepare, solve
 from hvi_fenicsx.certify.certificate import Certificate, examine
@@ -205,3 +205,23 @@ def test_a_law_whose_slip_is_partly_prescribed_shares_an_edge() -> None:
     table["boundary"]["floor"] = {"on": "bottom", "adhesion": quadratic_linear(1e6)}
     found = solved(table)
     assert found.exit_code == 0, str(found.examination)
+
+
+def test_the_last_digits_of_a_displacement_excuse_a_steep_law_and_no_more_do() -> None:
+    """Of two bodies that stick in a narrow smoothing the slip is a difference of displacements, and has few digits."""
+    table = two_blocks("rectangle", [1.0], [[5, 5], [4, 4]], "plane_stress", smoothing="quadratic", epsilon=1e-7)
+    table["boundary"] |= {
+        "press": {"on": "upper.top", "traction": [0.0, -1e6]},
+        "push": {"on": "upper.left", "traction": [9e4, 0.0]},
+    }
+    table["interface"]["seam"]["friction"] = {"law": "tresca", "yield_traction": 1e5, "reference_slip": 1e-6}
+    found = solved(table)
+    assert found.exit_code == 0
+    assert found.certificate is not None
+    assert found.certificate.tolerance < found.certificate.inclusion <= (found.certificate.rounding or 0.0) < 1e-6
+    u = displacement(found).copy()
+    members = found.problem.bodies.members
+    u[members == members[vertex(found, 0.7, 0.9)], 0] += 1e3 * np.finfo(float).eps * np.max(np.abs(u))
+    again = certified(found, u)
+    assert not again.passed
+    assert again.inclusion > 100.0 * found.certificate.inclusion

@@ -7,6 +7,7 @@ each part to what it claims to measure: the mesh, the smoothing, the solver.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -221,6 +222,18 @@ def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str, degree: int) -> 
     assert found.ravel() == pytest.approx(matrix.diagonal(), rel=1e-12)
     e = np.random.default_rng(1).standard_normal(found.shape)
     assert BubbleStiffness(problem, bubbles).times(e).ravel() == pytest.approx(matrix @ e.ravel(), rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(("name", "degree"), [("l-shape", 1), ("l-shape", 2), ("block in space", 2)])
+def test_the_bubbles_diagonal_is_their_own_on_an_elastic_bed(name: str, degree: int) -> None:
+    problem = prepare(Scene.model_validate(CASES[name]).with_solver(degree=degree)).problem
+    bulk, (v, u) = problem.bulk, problem.bulk.form.arguments()
+    bed = 20.0 * ufl.inner(u, v) * ufl.dx
+    problem = replace(problem, bulk=replace(bulk, form=bulk.form + bed, foundation=bed))
+    bubbles = space(problem.domain.mesh, degree)
+    form = problem.bulk.between(ufl.TrialFunction(bubbles), ufl.TestFunction(bubbles))
+    matrix = fem.assemble_matrix(fem.form(form)).to_scipy()
+    assert diagonal(problem, bubbles).ravel() == pytest.approx(matrix.diagonal(), rel=1e-9)
 
 
 @pytest.mark.parametrize("strong", [False, True])

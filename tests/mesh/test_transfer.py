@@ -94,7 +94,7 @@ def iterations(cells: int) -> int:
     load, x = prepared.system.load.copy(), prepared.system.load.duplicate()
     load.array[contact] = 0.0
     x.set(0.0)
-    return solver.held.solve(load, x, 1e-8)[0]
+    return solver.held.solve(load, x, linear.Goal(rtol=1e-8))[0]
 
 
 @pytest.mark.parametrize("kind", ["lu", "gamg", "mg"])

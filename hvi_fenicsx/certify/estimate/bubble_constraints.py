@@ -12,8 +12,10 @@ import numpy.typing as npt
 from dolfinx import fem
 
 from ...mesh import nodes
+from ...problem import spaces
 from ...problem.problem import Bounds, Problem
 from ...typing import Array, Entities, Mask
+from .bubbles import of_cell
 
 _FAR = 1e30
 """Stands for no bound: an infinite nodal value has no interpolant."""
@@ -79,6 +81,10 @@ class Prescribed:
     component: int
     values: Array
 
+    def project(self, r: Array) -> None:
+        """Take out of r (n, d) what is prescribed, in place."""
+        r[self.blocks, self.component] = 0.0
+
 
 def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Prescribed, ...]:
     """What prescribed displacements ask of the bubbles. Collective.
@@ -101,7 +107,7 @@ class _Points:
 
     Args:
         space: of the bubbles.
-        blocks: their owned blocks, (k,).
+        blocks: their owned blocks, ascending, (k,).
 
     Attributes:
         blocks: as they are given.
@@ -111,13 +117,18 @@ class _Points:
         self._space, self.blocks = space, blocks
         chosen = np.zeros(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.bool_)
         chosen[blocks] = True
-        self._cells = np.flatnonzero(chosen[space.dofmap.list].any(axis=1)).astype(np.int32)
+        of_cells = space.dofmap.list.ravel()
+        places = np.flatnonzero(chosen[of_cells])
+        _, one = np.unique(of_cells[places], return_index=True)  # any cell around a point knows what is there
+        self._cells, self._numbers = np.divmod(places[one], space.dofmap.list.shape[1])
 
     def values(self, u: fem.Function) -> Array:
-        """The values (k, d) of a function of another space, from the cells around the points."""
-        found = fem.Function(self._space)
-        found.interpolate(u, self._cells, self._cells)
-        return np.array(found.x.array.reshape(-1, self._space.dofmap.bs)[self.blocks])
+        """The values of a displacement of the problem's space, (k, d)."""
+        space, degree = u.function_space, nodes.degree(u.function_space)
+        places = np.array(of_cell(degree, self._space.mesh.topology.cell_name())) / (2 * degree)
+        functions = spaces.simplex_functions(degree, places, spaces.edge_share(space))[self._numbers]
+        there = u.x.array.reshape(-1, self._space.dofmap.bs)[space.dofmap.list[self._cells]]
+        return np.asarray(np.einsum("kn,knd->kd", functions, there))
 
     def positions(self, *, needed: bool) -> Array:
         """Where they are, m, (k, 3); zeros where it does not matter: dolfinx finds the points of all bubbles."""
@@ -164,14 +175,23 @@ class Constraints:
     """What the bubbles must meet.
 
     Attributes:
-        free: where they are not prescribed, (n, d).
-        prescribed: what is prescribed elsewhere.
+        prescribed: what is prescribed.
         bounds: of the parts with contact.
     """
 
-    free: Mask
     prescribed: tuple[Prescribed, ...]
     bounds: tuple[BubbleBounds, ...]
+
+    def free(self, blocks: Entities) -> Mask:
+        """Where bubbles are not prescribed, (k, d).
+
+        Args:
+            blocks: the bubbles' owned blocks, with bounds, (k,).
+        """
+        found = np.ones((len(blocks), self.bounds[0].normals.shape[1]), dtype=np.bool_)
+        for given in self.prescribed:
+            found[np.isin(blocks, given.blocks), given.component] = False
+        return found
 
 
 def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Constraints:
@@ -182,10 +202,6 @@ def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> 
         u: the solution, nondimensional.
         space: the bubbles.
     """
-    free = np.ones((space.dofmap.index_map.size_local, problem.scales.dimension), dtype=np.bool_)
-    given = prescribed(problem, u, space)
-    for part in given:
-        free[part.blocks, part.component] = False
     parts = [b for b in problem.bounds if problem.interface_of(b.surface) is None]
     bounds = tuple(bubble_bounds(problem, u, part, space) for part in parts)
-    return Constraints(free=free, prescribed=given, bounds=bounds)
+    return Constraints(prescribed=prescribed(problem, u, space), bounds=bounds)

@@ -4,46 +4,83 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import ufl
-from dolfinx import fem, la
-from dolfinx import mesh as dmesh
+from dolfinx import fem
 
 from ...mesh import nodes
 from ...problem.problem import Problem
-from ...runtime import forms
+from ...problem.vectors import nodal_sum
 from ...typing import Array
-from .bubbles import Index, of_cell, quadrature, slope
+from .bubbles import Index, of_cell, quadrature, shape, slope
 
 
 def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     """The diagonal of the bubbles' stiffness at the blocks that this rank owns, (n, d). Collective.
 
     On a cell in which the material is constant it is a sum of the energies of the affine functions λ_a and λ_a + λ_b
-    (:func:`energy_shares`). Those of λ_a + λ_b and of the others' sum are one, since all together are constant.
+    (:func:`energy_shares`); what a foundation adds is that of a constant, by the mean of the bubble's square. At a
+    bubble's own point no other bubble has a value, so a linear form whose quadrature points are these takes each
+    energy to the bubbles that have a share in it.
 
     Args:
         problem: whose elastic operator it is.
         bubbles: the space of bubbles.
     """
-    affine, d = _Affine(problem), problem.scales.dimension
-    hats = np.vstack([-np.ones(d), np.eye(d)])
+    v, integrals = ufl.TestFunction(bubbles), []
+    for form, height, shares in _energies(problem):
+        each = [_over_cells(_energy(problem, form, height, axis)) for axis in range(problem.scales.dimension)]
+        for along in zip(*each, strict=True):
+            density = ufl.dot(ufl.as_vector([integral.integrand() for integral in along]), v)
+            for share in sorted(set(shares.values())):
+                rule = _rule([index for index, own in shares.items() if own == share])
+                integrals.append(along[0].reconstruct(integrand=share * density, metadata=rule))
+    return nodal_sum(ufl.Form(integrals))
+
+
+def _energies(problem: Problem) -> Iterator[tuple[Any, Any, Mapping[Index, float]]]:
+    """Functions whose energies make up those of a cell's bubbles: the form, the function, the bubbles' shares.
+
+    The energies of λ_a + λ_b and of the others' sum are one, since all together are constant.
+    """
+    d, cell = problem.scales.dimension, problem.space.mesh.topology.cell_name()
+    hats, of_bubbles = np.vstack([-np.ones(d), np.eye(d)]), of_cell(nodes.degree(problem.space), cell)
     slopes = [*hats, *(hats[a] + hats[b] for a, b in itertools.combinations(range(d + 1), 2))]
-    upward = [tuple((slope * np.sign(slope[np.flatnonzero(slope)[0]])).tolist()) for slope in slopes]
-    energies = {slope: affine.energies(np.array(slope)) for slope in dict.fromkeys(upward)}
-    del affine
-    cells, values = bubbles.dofmap.list[: len(energies[upward[0]][0])], fem.Function(bubbles)
-    blocks, cell = values.x.array.reshape(-1, d), bubbles.mesh.topology.cell_name()
-    for k, index in enumerate(of_cell(nodes.degree(problem.space), cell)):
-        shares: dict[tuple[float, ...], float] = {}
+    upward = [tuple((one * np.sign(one[np.flatnonzero(one)[0]])).tolist()) for one in slopes]
+    of_slopes: dict[tuple[float, ...], dict[Index, float]] = {}
+    for index in of_bubbles:
         for number, share in energy_shares(index, cell):
-            shares[upward[number]] = shares.get(upward[number], 0.0) + share * 16 / ((d + 1) * (d + 2))
-        for i in range(d):
-            own = sum(share * energies[slope][i] for slope, share in shares.items())
-            blocks[:, i] += np.bincount(cells[:, k], own, minlength=len(blocks))
-    values.x.scatter_reverse(la.InsertMode.add)
-    return blocks[: bubbles.dofmap.index_map.size_local]
+            shares = of_slopes.setdefault(upward[number], {})
+            shares[index] = shares.get(index, 0.0) + share * 16 / ((d + 1) * (d + 2))
+    mesh = problem.space.mesh
+    place = ufl.JacobianInverse(mesh) * (ufl.SpatialCoordinate(mesh) - ufl.classes.CellVertices(mesh)[0, :])
+    for affine, shares in of_slopes.items():
+        yield problem.bulk.material, ufl.dot(ufl.as_vector(affine), place), shares
+    if problem.bulk.foundation is not None:
+        yield problem.bulk.foundation, 1.0, {index: _mean_square(index, cell) for index in of_bubbles}
+
+
+def _energy(problem: Problem, form: Any, height: Any, axis: int) -> Any:
+    """The form of the energy of a function along an axis, in UFL."""
+    d, arguments = problem.scales.dimension, problem.bulk.form.arguments()
+    moved = ufl.as_vector([height if i == axis else 0.0 for i in range(d)])
+    return ufl.replace(form, dict.fromkeys(arguments, moved))
+
+
+def _over_cells(form: Any) -> list[Any]:
+    """The integrals of a form over cells."""
+    return [integral for integral in form.integrals() if integral.integral_type() == "cell"]
+
+
+def _rule(places: list[Index]) -> dict[str, Any]:
+    """A quadrature rule of the points of some bubbles, each with the whole cell for its weight."""
+    points = [[part / sum(index) for part in index[1:]] for index in places]
+    weights = [1 / math.factorial(len(point)) for point in points]
+    return {"quadrature_rule": "custom", "quadrature_points": points, "quadrature_weights": weights}
 
 
 @functools.cache
@@ -68,27 +105,13 @@ def energy_shares(index: Index, cell: str) -> list[tuple[int, float]]:
     return [(number, float(share)) for number, share in enumerate(rounded) if share]
 
 
-class _Affine:
-    """Elastic energies of functions affine on a cell that vanish at its middle. Creation is collective."""
+@functools.cache
+def _mean_square(index: Index, cell: str) -> float:
+    """The mean of the square of a bubble over a cell.
 
-    def __init__(self, problem: Problem) -> None:
-        mesh, d = problem.space.mesh, problem.scales.dimension
-        space = fem.functionspace(mesh, ("Discontinuous Lagrange", 0, (d,)))
-        self._slopes, self._sums = fem.Constant(mesh, np.zeros(d)), fem.Function(space)
-        place = ufl.SpatialCoordinate(mesh)
-        if problem.bulk.foundation is not None:  # no strain sees where the function vanishes
-            middle, cells = fem.Function(space), np.arange(len(space.dofmap.list), dtype=np.int32)
-            middle.x.array[:] = dmesh.compute_midpoints(mesh, d, cells)[:, :d].ravel()
-            place = place - middle
-        height = ufl.dot(self._slopes, ufl.JacobianInverse(mesh) * place)
-        q, axes = ufl.TestFunction(space), [ufl.as_vector([float(x) for x in axis]) for axis in np.eye(d)]
-        each = [problem.bulk.energy_form(height * axis, q[i]) for i, axis in enumerate(axes)]
-        self._form = forms.compiled(ufl.Form([integral for form in each for integral in form.integrals()]))
-
-    def energies(self, slopes: Array) -> Array:
-        """The energies of the function with these slopes in reference coordinates (d,), along each axis, (d, cells)."""
-        self._slopes.value[:] = slopes
-        self._sums.x.array[:] = 0.0
-        fem.assemble_vector(self._sums.x.array, self._form)
-        d, cells = len(slopes), self._sums.function_space.mesh.topology.index_map(len(slopes)).size_local
-        return np.ascontiguousarray(self._sums.x.array[: cells * d].reshape(-1, d).T)
+    Args:
+        index: of the bubble.
+        cell: the name of the cell's shape.
+    """
+    barycentric, weights = quadrature(cell, 2 * sum(index))
+    return float(np.round(np.sum(weights * shape(index, barycentric) ** 2), 12))

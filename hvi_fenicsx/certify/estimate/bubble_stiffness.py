@@ -16,7 +16,8 @@ from mpi4py import MPI
 
 from ...problem.problem import Problem
 from ...runtime import forms
-from ...typing import Array, Entities, Mask
+from ...typing import Array, Entities
+from .block_forces import BlockForces
 from .bubble_diagonal import diagonal
 
 _WEAK = 0.05
@@ -37,12 +38,12 @@ class Held(Protocol):
 class Springs(Protocol):
     """What holds bubbles elastically, as laws do."""
 
-    def diagonal(self) -> Array:
-        """Forces for a unit of each bubble, at the owned blocks, (n, d). Collective."""
+    def diagonal(self) -> BlockForces:
+        """Forces for a unit of each bubble, at the owned blocks. Collective."""
         ...
 
-    def times(self, e: fem.Function) -> Array:
-        """Forces of bubbles, at the owned blocks, (n, d). Collective.
+    def times(self, e: fem.Function) -> BlockForces:
+        """Forces of bubbles, at the owned blocks. Collective.
 
         Args:
             e: the bubbles, ghosts updated.
@@ -81,34 +82,43 @@ class BubbleStiffness:
         at, elastic = self._sprung
         self._inverse[at] = elastic
         rates = springs.diagonal()
-        at = np.unique(np.flatnonzero(rates) // rates.shape[1]).astype(np.int32)  # those of Γc: few
-        strong = bool(self.comm.allreduce(bool(np.any(rates[at] * self._inverse[at] > _WEAK)), op=MPI.LOR))
+        matter = bool(np.any(rates.values * self._inverse[rates.blocks] > _WEAK))
+        strong = bool(self.comm.allreduce(matter, op=MPI.LOR))
         self._springs = springs if strong else None
-        at = at if strong else at[:0]
+        at = rates.blocks if strong else rates.blocks[:0]
         self._sprung = at, self._inverse[at]
-        self._inverse[at] = 1.0 / (1.0 / self._inverse[at] + rates[at])
+        self._inverse[at] = 1.0 / (1.0 / self._inverse[at] + rates.values[: len(at)])
         return strong
 
     def times(self, e: Array) -> Array:
         """A e of owned values (n, d), overwritten by the next product. Collective."""
-        self._in.x.array[: e.size] = e.ravel()
+        self._owned(self._in)[:] = e
+        return self._product()
+
+    def _product(self) -> Array:
+        """A e of what the owned values are that products are made of; overwritten by the next one. Collective."""
         self._in.x.scatter_forward()
         self._out.x.array[:] = 0.0
         fem.assemble_vector(self._out.x.array, self._action)
         self._out.x.scatter_reverse(la.InsertMode.add)
-        result = np.asarray(self._out.x.array[: e.size]).reshape(e.shape)
+        result = self._owned(self._out)
         if self._springs is not None:
-            result += self._springs.times(self._in)
+            force = self._springs.times(self._in)
+            result[force.blocks] += force.values
         return result
 
-    def work(self, e: Array, force: Array) -> float:
+    def _owned(self, field: fem.Function) -> Array:
+        """The owned values of a field of bubbles, (n, d), in place."""
+        return np.asarray(field.x.array[: self._inverse.size].reshape(self._inverse.shape))
+
+    def work(self, e: Array, force: BlockForces) -> float:
         """The work of a force on bubbles. Collective.
 
         Args:
             e: the bubbles, (n, d).
-            force: on them, (n, d).
+            force: on them.
         """
-        return self._dot(e, force)
+        return self._dot(e[force.blocks], force.values)
 
     def diagonal_solve(self, r: Array, at: Entities) -> Array:
         """The diagonal's inverse times r at some blocks, (k, d).
@@ -119,26 +129,21 @@ class BubbleStiffness:
         """
         return np.asarray(r * self._inverse[at])
 
-    def descent(self, r: Array, free: Mask, bounds: Sequence[Held], at: Entities) -> Array:
-        """P D⁻¹ P r, D being the diagonal and P taking out what is not free; overwritten by the next product.
+    def descent(self, r: Array, held: Sequence[Held], at: Entities) -> Array:
+        """P D⁻¹ P r, D being the diagonal and P taking out what is held; overwritten by the next product.
 
         Args:
             r: (n, d).
-            free: where a bubble is not prescribed, (n, d).
-            bounds: what else is held.
-            at: the blocks of all of them, (k,).
+            held: what is.
+            at: the blocks where something is, (k,).
         """
-        z = self._out.x.array[: r.size].reshape(r.shape)
-        for piece in _pieces(len(r)):
-            np.multiply(r[piece], self._inverse[piece], out=z[piece])
-            z[piece] *= free[piece]
-        if bounds:
-            z[at] = r[at] * free[at]
-            for held in bounds:
-                held.project(z)
-            z[at] *= self._inverse[at] * free[at]
-            for held in bounds:
-                held.project(z)
+        z = np.multiply(r, self._inverse, out=self._owned(self._out))
+        z[at] = r[at]
+        for part in held:
+            part.project(z)
+        z[at] *= self._inverse[at]
+        for part in held:
+            part.project(z)
         return z
 
     def move(self, r: Array, e: Array, at: Entities, step: Array) -> float:
@@ -155,10 +160,10 @@ class BubbleStiffness:
         """
         if not self.comm.allreduce(bool(step.any()), op=MPI.LOR):
             return 0.0
-        p = self._in.x.array[: r.size].reshape(r.shape)
+        p = self._owned(self._in)
         p[:] = 0.0
         p[at] = step
-        q = self.times(p)
+        q = self._product()
         return self._dot(p, q) + self._moved(r, e, 1.0, p, q)
 
     def _moved(self, r: Array, e: Array, alpha: float, p: Array, q: Array) -> float:
@@ -190,14 +195,14 @@ class BubbleStiffness:
         Returns:
             By how much e·A e grows.
         """
-        p, rho, growth = self._in.x.array[: r.size].reshape(r.shape), 0.0, 0.0  # in place: they are large
+        p, rho, growth = self._owned(self._in), 0.0, 0.0  # in place: they are large
         for step in range(max_steps):
             z = descent(r)
             rho, before = self._dot(r, z), rho
             if rho <= goal:
                 break
             _combine(p, z, rho / before if step else 0.0)
-            q = self.times(p)
+            q = self._product()
             alpha = rho / self._dot(p, q)
             growth += alpha * rho + self._moved(r, e, alpha, p, q)
         return growth

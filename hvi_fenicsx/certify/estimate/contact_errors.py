@@ -19,6 +19,7 @@ from ..certificate import Examination
 from ..contact_state import ContactState
 from ..law_state import LawState
 from . import coupled_errors
+from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawTraces, Trace
 from .thresholds import DEFAULT, Thresholds
@@ -64,7 +65,7 @@ def estimate_contact_errors(
     """
     traces = LawTraces(system.problem, u, examination.states, thresholds, exact=True)
     inverse = DualNorm(system, levels, u, thresholds)
-    error = known or coupled_errors.of_solution(traces, inverse)[0]
+    error = known or coupled_errors.of_solution(traces, inverse, BubbleStiffness(system.problem, traces.bubbles))[0]
     uncertain = _uncertainty(traces, inverse)
     inverse.destroy()
     slips = [_slip(traces, state, error, uncertain) for state in examination.states]
@@ -103,7 +104,8 @@ def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
     for state in traces.states:
         for law in state.laws:
             points, tau = _drops(traces, state, law)
-            force.x.array[:] += points.tested(tau)[1].ravel()
+            dropped = points.tested(tau)[1]
+            force.x.array.reshape(-1, d)[dropped.blocks] += dropped.values
             count += int(np.count_nonzero(np.any(tau, axis=(1, 2))))
     force.x.scatter_reverse(la.InsertMode.add)
     owned = problem.space.dofmap.index_map.size_local

@@ -14,6 +14,7 @@ from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Entities
 from . import bubbles, tangent_alignment
+from .block_forces import BlockForces, summed
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class PartTrace:
     def __init__(
         self, problem: Problem, space: fem.FunctionSpace, surface: Surface, directions: Array, degree: int
     ) -> None:
-        self._problem, self._bubbles, self._surface = problem, space, surface
+        self._problem, self._surface = problem, surface
         d = problem.scales.dimension
         self._facets = contact_facets(problem, space, surface.facets)
         each = [self._at_local_nodes(directions[:, i]) for i in range(directions.shape[1])]
@@ -145,30 +146,29 @@ class PartTrace:
             result = result + at[:, None, :] * shape[None, :, None]
         return np.asarray(result)
 
-    def tested(self, tau: Array) -> tuple[Array, Array]:
-        """∫ τ·v ds of tractions (f, q, k) over this rank's facets: with bubbles and at nodes, local blocks (n, d)."""
-        d, scaled = self._problem.scales.dimension, self.weights[:, :, None] * tau
-        found, at_nodes = np.zeros((local_blocks(self._bubbles), d)), np.zeros((local_blocks(self._problem.space), d))
+    def tested(self, tau: Array) -> tuple[BlockForces, BlockForces]:
+        """∫ τ·v ds of tractions (f, q, k) over this rank's facets: with bubbles and at nodes, local blocks."""
+        d, scaled, at_nodes = self._problem.scales.dimension, self.weights[:, :, None] * tau, []
         for i in range(self._functions.shape[1]):
             share = np.einsum("fqk,q->fk", scaled, self._functions[:, i])
-            np.add.at(at_nodes, self._facets.nodes[:, i], np.einsum("fk,fkd->fd", share, self._vectors[:, i]))
-        for i, shape, middle in self._bubbles_of_facet:
-            share = np.einsum("fqk,q->fk", scaled, shape)
-            np.add.at(found, self._facets.bubbles[:, i], np.einsum("fk,fkd->fd", share, middle))
-        return found, at_nodes
+            at_nodes.append((self._facets.nodes[:, i], np.einsum("fk,fkd->fd", share, self._vectors[:, i])))
+        return self._with_bubbles(scaled, 1), summed(at_nodes, d)
 
-    def squared(self, rates: Array) -> Array:
-        """∫ Σ rate (v·direction)² ds over this rank's facets, v being each bubble; local blocks (n, d).
+    def squared(self, rates: Array) -> BlockForces:
+        """∫ Σ rate (v·direction)² ds over this rank's facets, v being each bubble; local blocks.
 
         Args:
             rates: along the directions, (f, q, k).
         """
-        found = np.zeros((local_blocks(self._bubbles), self._vectors.shape[3]))
-        scaled = self.weights[:, :, None] * rates
+        return self._with_bubbles(self.weights[:, :, None] * rates, 2)
+
+    def _with_bubbles(self, scaled: Array, power: int) -> BlockForces:
+        """Sums over the points of weights (f, q, k) times powers of each bubble along the directions."""
+        found = []
         for i, shape, middle in self._bubbles_of_facet:
-            share = np.einsum("fqk,q->fk", scaled, shape**2)
-            np.add.at(found, self._facets.bubbles[:, i], np.einsum("fk,fkd->fd", share, middle**2))
-        return found
+            share = np.einsum("fqk,q->fk", scaled, shape**power)
+            found.append((self._facets.bubbles[:, i], np.einsum("fk,fkd->fd", share, middle**power)))
+        return summed(found, self._problem.scales.dimension)
 
     def _along(self, u: fem.Function) -> Array:
         """The coefficients of a displacement along the directions by facet, (f, n, k)."""
@@ -193,8 +193,3 @@ class PartTrace:
             middle = np.einsum("n,fnkd->fkd", at, self._vectors)
             found.append((i, bubbles.shape(index, self._barycentric), middle))
         return found
-
-
-def local_blocks(space: fem.FunctionSpace) -> int:
-    """The number of a space's blocks on this rank, owned and ghost."""
-    return int(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts)

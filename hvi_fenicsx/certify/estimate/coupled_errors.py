@@ -18,6 +18,7 @@ from ...runtime.mpi import total
 from ...typing import Array
 from ..law_state import LawState
 from . import bubble_constraints, defect
+from .block_forces import BlockForces
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_springs import LawSprings
@@ -57,26 +58,28 @@ class Coupled:
     Args:
         traces: the laws between the nodes.
         inverse: of the system.
+        stiffness: of the bubbles.
 
     Attributes:
         error: as it is known so far.
     """
 
-    def __init__(self, traces: LawTraces, inverse: DualNorm) -> None:
+    def __init__(self, traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> None:
         problem, space = traces.problem, traces.bubbles
         self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
         self._longest = 0.0
         self.error = ErrorField(fem.Function(problem.space), fem.Function(space))
         load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
         self._laws, _ = traces.tested()
-        load -= self._laws
-        stiffness, under = BubbleStiffness(problem, space), bubble_constraints.constraints(problem, traces.u, space)
+        load[self._laws.blocks] -= self._laws.values
+        under = bubble_constraints.constraints(problem, traces.u, space)
         self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load, self._thresholds)
         self._moved = fem.Function(problem.space)
         self._of_moved = problem.bulk.force_in(space, self._moved)
         self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
         self._shared, self._strongest = 0.0, 0.0
-        self._answer: Array = np.zeros((1, 1))
+        self._answer = self._laws - self._laws
+        self._force: Array = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
 
     @property
     def residual(self) -> Array:
@@ -86,8 +89,10 @@ class Coupled:
     @property
     def size(self) -> float:
         """The energy norm of the error. Collective."""
-        square = self._least.energy + 2 * self._shared + self._inverse.energy(self.error.nodes)
-        return float(np.sqrt(max(square, 0.0)))
+        problem = self._traces.problem
+        relative = problem.relative(self.error.nodes.x.array)[: self._force.size]
+        of_nodes = total(problem.domain.mesh.comm, float(np.vdot(relative, self._force)))
+        return float(np.sqrt(max(self._least.energy + 2 * self._shared + of_nodes, 0.0)))
 
     def find_bubbles(self) -> None:
         """Find the bubbles that belong to the nodes. Collective."""
@@ -98,26 +103,30 @@ class Coupled:
         traces, inverse, nodes = self._traces, self._inverse, self.error.nodes
         np.negative(nodes.x.array, out=self._moved.x.array)
         of_bubbles = self._of_bubbles.values()
+        asked = traces.problem.combined(of_bubbles)
         for number in range(self._thresholds.answer_rounds):
             _, laws = traces.tested(self.error)
             if self._settled(laws) and number > 0:
                 break
-            unmet = laws - traces.problem.combined(of_bubbles)
-            unmet -= inverse.force(nodes)
+            unmet = -asked
+            unmet -= self._force
+            unmet[laws.blocks] += laws.values
             step, length = inverse.solve(unmet, self._thresholds.answer_tolerance)
             nodes.x.array[:] += step.x.array
+            self._force = inverse.force(nodes)
             self._longest = max(self._longest, length)
             if length <= self._thresholds.answer_change * self._longest:
                 break
-        inverse.keep_within_bounds(nodes)
+        if inverse.keep_within_bounds(nodes):
+            self._force = inverse.force(nodes)
         self._moved.x.array[:] += nodes.x.array
         work = float(np.vdot(nodes.x.array[: of_bubbles.size], of_bubbles))
         self._shared = total(traces.problem.domain.mesh.comm, work)
 
-    def _settled(self, laws: Array) -> bool:
-        """Whether the laws' force on the nodes (n, d) is nearly the one before. Collective."""
+    def _settled(self, laws: BlockForces) -> bool:
+        """Whether the laws' force on the nodes is nearly the one before. Collective."""
         comm = self._traces.problem.domain.mesh.comm
-        changed = np.sqrt(total(comm, float(np.sum((laws - self._answer) ** 2))))
+        changed = np.sqrt(total(comm, float(np.sum((laws - self._answer).values ** 2))))
         self._answer, self._strongest = laws, max(self._strongest, changed)
         return bool(changed <= self._thresholds.answer_settled * self._strongest)
 
@@ -125,28 +134,29 @@ class Coupled:
         """Let the bubbles feel that nodes and laws have moved. Collective."""
         before = self._laws
         self._laws, _ = self._traces.tested(self.error)
-        changed = np.flatnonzero(np.any(self._laws != before, axis=1))
-        self._least.residual[changed] += before[changed] - self._laws[changed]
+        fallen = before - self._laws
+        self._least.residual[fallen.blocks] += fallen.values
         self._least.residual -= self._of_moved.values()
 
 
-def of_solution(traces: LawTraces, inverse: DualNorm) -> tuple[ErrorField, Array]:
+def of_solution(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> tuple[ErrorField, Array]:
     """Bubbles and nodes in turns, each under the influence of the other, until their energy settles. Collective.
 
     Args:
         traces: the laws between the nodes.
         inverse: of the system.
+        stiffness: of the bubbles.
 
     Returns:
         The estimated error, and η_K² of the owned cells.
     """
-    error = _found(traces, inverse)
+    error = _found(traces, inverse, stiffness)
     return error, traces.problem.bulk.energy_by_cell(error.nodes + error.bubbles)
 
 
-def _found(traces: LawTraces, inverse: DualNorm) -> ErrorField:
+def _found(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> ErrorField:
     """The estimated error. Collective."""
-    coupled, size = Coupled(traces, inverse), 0.0
+    coupled, size = Coupled(traces, inverse, stiffness), 0.0
     for _ in range(traces.thresholds.coupled_rounds):
         coupled.find_bubbles()
         coupled.move_nodes()

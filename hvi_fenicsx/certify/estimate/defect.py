@@ -45,8 +45,7 @@ class LeastEnergy:
         self._bubbles, self._stiffness, self._under, self._thresholds = bubbles, stiffness, under, thresholds
         self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
         self._e = bubbles.x.array[: load.size].reshape(load.shape)
-        self._bounded = _union(part.blocks for part in under.bounds)
-        self._special = _union([self._bounded, *(part.blocks for part in under.prescribed)])
+        self._special = _union([*(p.blocks for p in under.bounds), *(p.blocks for p in under.prescribed)])
         for given in under.prescribed:
             self._e[given.blocks, given.component] = given.values
 
@@ -56,7 +55,7 @@ class LeastEnergy:
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
         again = limits.bubble_tolerance_again[nodes.degree(stiffness.problem.space)]
         tolerance = again if self._begun else limits.bubble_tolerance
-        goal = tolerance**2 * stiffness.square(self.residual, self._descent)
+        goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), limits.rounding**2)
         for _ in range(limits.bubble_rounds):
             self._put_on_bounds()
             steps = limits.bubble_steps
@@ -77,19 +76,20 @@ class LeastEnergy:
         if not self._stiffness.hold(springs):
             self.find()
             return
-        before = springs.times(self._bubbles) if self._begun else np.zeros_like(self.residual)
-        work = self._stiffness.work(self._e, before)
+        before = springs.times(self._bubbles)
+        work = self._stiffness.work(self._e, before) if self._begun else 0.0
         self.find()
         force = springs.times(self._bubbles)
-        self.residual += force - before
+        grown = force - before if self._begun else force
+        self.residual[grown.blocks] += grown.values
         self.energy += work - self._stiffness.work(self._e, force)
 
     def _guess(self, part: BubbleBounds) -> Array:
         """The bubbles of a part as they are, at first what the diagonal alone makes of the load, (k, d)."""
-        at, free = part.blocks, self._under.free[part.blocks]
+        at = part.blocks
         if self._begun:
             return self._e[at]
-        return np.where(free, self._stiffness.diagonal_solve(self.residual[at], at), self._e[at])
+        return np.where(self._under.free(at), self._stiffness.diagonal_solve(self.residual[at], at), self._e[at])
 
     def _put_on_bounds(self) -> None:
         """Put the bubbles on the bounds that hold them; the residual follows, at first what is prescribed, too."""
@@ -102,7 +102,7 @@ class LeastEnergy:
         self.energy += self._stiffness.move(self.residual, self._e, self._special, step)
 
     def _descent(self, r: Array) -> Array:
-        return self._stiffness.descent(r, self._under.free, self._parts, self._bounded)
+        return self._stiffness.descent(r, (*self._under.prescribed, *self._parts), self._special)
 
 
 def _union(parts: Iterable[Entities]) -> Entities:

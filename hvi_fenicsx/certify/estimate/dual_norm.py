@@ -14,10 +14,10 @@ from petsc4py import PETSc
 
 from ...problem.law_term import LawTerm
 from ...problem.problem import Problem
-from ...problem.vectors import new_vector, turn
+from ...problem.vectors import turn
 from ...runtime.mpi import total
 from ...runtime.timing import Timer
-from ...system.held_solver import HeldPreconditioner
+from ...system.held_solver import Goal, HeldPreconditioner
 from ...system.levels import Levels
 from ...system.linear_settings import LinearSettings
 from ...system.system import System
@@ -61,7 +61,7 @@ class DualNorm:
         load, x = self._load(functional), system.load.duplicate()
         x.set(0.0)
         if load.norm() > 0:
-            self._inverse.solve(load, x, self._tolerance if tolerance is None else tolerance)
+            self._inverse.solve(load, x, Goal(rtol=self._tolerance if tolerance is None else tolerance))
         energy = float(load.dot(x))
         return system.displacement(x), float(np.sqrt(max(energy, 0.0))) if np.isfinite(energy) else np.inf
 
@@ -72,31 +72,20 @@ class DualNorm:
             field: of u_h's space, nondimensional; zero where u is prescribed.
         """
         system = self.system
-        out = self._elastic(system.unknowns(field))
+        x, out = system.unknowns(field), system.load.duplicate()
+        system.jacobian.matrix.mult(x, out)
+        system.jacobian.rows.overwrite(x, out)  # without what laws and holding add to them
         cartesian = out if system.rotation is None else system.rotation * out
         return np.array(cartesian.array_r).reshape(-1, system.problem.scales.dimension)
 
-    def energy(self, field: fem.Function) -> float:
-        """a(field, field), with what is averaged. Collective.
-
-        Args:
-            field: as of :meth:`force`.
-        """
-        x = self.system.unknowns(field)
-        return float(x.dot(self._elastic(x)))
-
-    def _elastic(self, x: PETSc.Vec) -> PETSc.Vec:
-        """A x, without what laws and holding add to A."""
-        out = self.system.load.duplicate()
-        self.system.jacobian.matrix.mult(x, out)
-        self.system.jacobian.rows.overwrite(x, out)
-        return out
-
-    def keep_within_bounds(self, error: fem.Function) -> None:
+    def keep_within_bounds(self, error: fem.Function) -> bool:
         """Put u + an error on the bounds that it leaves, in place; from then on it is held there. Collective.
 
         Args:
             error: a field of u_h's space, nondimensional.
+
+        Returns:
+            Whether it left any.
         """
         x = self.system.unknowns(self._u)
         at, before = x.array_r.copy(), self.held
@@ -108,13 +97,15 @@ class DualNorm:
             beyond = np.abs(along - inside) > self._near
             error_there.array[dofs[beyond]] = (sign * inside - at[dofs])[beyond]
             self.held = np.union1d(self.held, dofs[beyond]).astype(np.int32)
-        if self.system.comm.allreduce(len(self.held) > len(before), op=MPI.LOR):
+        leaves = bool(self.system.comm.allreduce(len(self.held) > len(before), op=MPI.LOR))
+        if leaves:
             error.x.array[:] = self.system.displacement(error_there).x.array
             self._inverse.prepare(self.held)
+        return leaves
 
     def _load(self, functional: Array) -> PETSc.Vec:
         system = self.system
-        load = new_vector(system.problem.space)
+        load = system.load.duplicate()
         load.array[:] = functional.ravel()
         turn(load, system.rotation)
         load.array[self.held] = 0.0

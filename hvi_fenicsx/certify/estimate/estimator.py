@@ -121,26 +121,26 @@ def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: floa
     """The error, where it is known as a field, and η_K² of the owned cells; a(u_h, u_h) is the energy. Collective."""
     if traces.problem.bulk.averages_dilatation:
         return None, nearly_incompressible.squares(traces, inverse)
-    limit = traces.thresholds.coupled[traces.degree]
+    stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), traces.thresholds.coupled[traces.degree]
     if limit and not coupled_errors.within_facets(traces):
-        cells = _between_nodes(traces, inverse)
+        cells = _between_nodes(traces, inverse, stiffness)
         if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:
             return None, cells
-    return coupled_errors.of_solution(traces, inverse)
+    return coupled_errors.of_solution(traces, inverse, stiffness)
 
 
-def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm) -> Array:
+def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm, stiffness: BubbleStiffness) -> Array:
     """η_K² of the owned cells: of the bubbles, and of the nodal forces that the laws are taken for. Collective."""
     problem, u = traces.problem, traces.u
-    load, unmet = traces.tested()
-    load *= -1.0
-    load += problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
-    stiffness = BubbleStiffness(problem, traces.bubbles)
+    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+    between, unmet = traces.tested()
+    load[between.blocks] -= between.values
     bubbles, under = fem.Function(traces.bubbles), bubble_constraints.constraints(problem, u, traces.bubbles)
     defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
-        cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
+        owned = problem.space.dofmap.index_map.size_local
+        cells += problem.bulk.energy_by_cell(inverse.solve(unmet.everywhere(owned))[0])
     return cells
 
 

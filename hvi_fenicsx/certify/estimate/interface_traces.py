@@ -16,7 +16,7 @@ from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Integers
 from . import tangent_alignment
-from .contact_facets import local_blocks
+from .block_forces import BlockForces, summed
 from .interface_points import InterfacePoints, SideBubbles
 
 
@@ -25,7 +25,6 @@ class InterfaceTrace:
 
     Args:
         problem: what was solved.
-        bubbles: the space of bubbles.
         points: of the interface.
         surface: the nodes of its first side.
         directions: at these, (m, k, d).
@@ -34,10 +33,8 @@ class InterfaceTrace:
         weights: of the points, over L^(d-1), (f, q).
     """
 
-    def __init__(
-        self, problem: Problem, bubbles: fem.FunctionSpace, points: InterfacePoints, surface: Surface, directions: Array
-    ) -> None:
-        self._problem, self._bubbles, self._points = problem, bubbles, points
+    def __init__(self, problem: Problem, points: InterfacePoints, surface: Surface, directions: Array) -> None:
+        self._problem, self._points = problem, points
         self._surface, self._directions, self.weights = surface, directions, points.weights
         own = points.spread.of_carriers(directions)
         self._rotations = tangent_alignment.rotations(own, points.spread.reference)
@@ -118,38 +115,37 @@ class InterfaceTrace:
                 found += sign * values[:, :, None] * known[side.of_facet[facet, i]][:, None]
         return np.asarray(np.einsum("fqkd,fqd->fqk", self._vectors, found))
 
-    def tested(self, tau: Array) -> tuple[Array, Array]:
-        """∫ τ·w ds of tractions (f, q, k): with both sides' bubbles and at nodes, local blocks (n, d). Collective.
+    def tested(self, tau: Array) -> tuple[BlockForces, BlockForces]:
+        """∫ τ·w ds of tractions (f, q, k): with both sides' bubbles and at nodes, owned blocks. Collective.
 
         Args:
             tau: against the motion of the first side.
         """
         scaled = self.weights[:, :, None] * tau
         found = self._summed(np.einsum("fqk,fqkd->fqd", scaled, self._vectors), 1)
-        at_nodes = np.zeros((local_blocks(self._problem.space), self._problem.scales.dimension))
         on_facets = np.zeros(self._rotations.shape[:3])
         np.add.at(on_facets, self._points.facets[0], np.einsum("fqk,fqn->fnk", scaled, self._points.functions))
         carried = self._points.spread.summed(tangent_alignment.turned_back(self._rotations, on_facets))
-        at_nodes[self._surface.blocks] = np.einsum("mk,mkd->md", carried, self._directions)
-        return found, at_nodes
+        at_nodes = np.einsum("mk,mkd->md", carried, self._directions)
+        return found, summed([(self._surface.blocks, at_nodes)], at_nodes.shape[1])
 
-    def squared(self, rates: Array) -> Array:
-        """∫ Σ rate (v·direction)² ds, v being each bubble of a side; local blocks (n, d). Collective.
+    def squared(self, rates: Array) -> BlockForces:
+        """∫ Σ rate (v·direction)² ds, v being each bubble of a side; owned blocks. Collective.
 
         Args:
             rates: along the directions, (f, q, k).
         """
         return self._summed(np.einsum("fqk,fqkd->fqd", self.weights[:, :, None] * rates, self._vectors**2), 2)
 
-    def _summed(self, vectors: Array, power: int) -> Array:
-        """Sums of vectors (f, q, d) times powers of both sides' bubbles, local blocks (n, d). Collective."""
-        found = np.zeros((local_blocks(self._bubbles), vectors.shape[2]))
+    def _summed(self, vectors: Array, power: int) -> BlockForces:
+        """Sums of vectors (f, q, d) times powers of both sides' bubbles, owned blocks. Collective."""
+        found = []
         for sign, side, facet, shapes in self._sides():
             sums = np.zeros((side.count, vectors.shape[2]))
             for i, values in enumerate(shapes):
                 np.add.at(sums, side.of_facet[facet, i], np.einsum("fq,fqd->fd", (sign * values) ** power, vectors))
-            found[side.blocks] += self._problem.domain.mesh.comm.allreduce(sums)[side.owned]
-        return found
+            found.append((side.blocks, self._problem.domain.mesh.comm.allreduce(sums)[side.owned]))
+        return summed(found, vectors.shape[2])
 
     def _sides(self) -> Iterator[tuple[float, SideBubbles, Integers, list[Array]]]:
         """By side: its sign, its bubbles, the facet of each intersection (f,), the bubbles at the points (f, q)."""

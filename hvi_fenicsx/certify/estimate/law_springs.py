@@ -7,14 +7,10 @@ as the rising law hold the bubbles while they are found; what the law gives them
 
 from __future__ import annotations
 
-import functools
-
-import numpy as np
 from dolfinx import fem
 
-from ...typing import Array
-from .contact_facets import local_blocks
-from .law_traces import ErrorField, LawTraces, gathered
+from .block_forces import BlockForces, gathered, summed
+from .law_traces import ErrorField, LawTraces
 
 
 class LawSprings:
@@ -29,19 +25,19 @@ class LawSprings:
         self._space = traces.bubbles
         self._rates = [traces.rising(state, law, error) for state in traces.states for law in state.laws]
 
-    def diagonal(self) -> Array:
-        """Forces for a unit of each bubble, at the owned blocks, (n, d). Collective."""
+    def diagonal(self) -> BlockForces:
+        """Forces for a unit of each bubble, at the owned blocks. Collective."""
         return self._summed([points.squared(rates) for points, rates in self._rates])
 
-    def times(self, e: fem.Function) -> Array:
-        """Forces of bubbles, at the owned blocks, (n, d). Collective.
+    def times(self, e: fem.Function) -> BlockForces:
+        """Forces of bubbles, at the owned blocks. Collective.
 
         Args:
             e: the bubbles, ghosts updated.
         """
         return self._summed([points.tested(rates * points.of_bubbles(e))[0] for points, rates in self._rates])
 
-    def _summed(self, local: list[Array]) -> Array:
-        """Contributions at local blocks as one at the owned blocks, (n, d). Collective."""
-        nothing = np.zeros((local_blocks(self._space), self._space.dofmap.bs))
-        return gathered(self._space, functools.reduce(np.add, local) if local else nothing)
+    def _summed(self, local: list[BlockForces]) -> BlockForces:
+        """Contributions at local blocks as one at the owned blocks. Collective."""
+        parts = [(force.blocks, force.values) for force in local]
+        return gathered(self._space, summed(parts, self._space.dofmap.bs))

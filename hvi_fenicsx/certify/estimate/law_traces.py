@@ -11,18 +11,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import fem, la
+from dolfinx import fem
 
 from ...laws import Length, Superpotential
 from ...mesh import nodes
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
-from ...typing import Array, Mask
+from ...typing import Array, Entities, Mask
 from ..contact_state import ContactState
 from ..law_state import LawState
 from ..placed_forces import traction
 from . import bubbles, tangent_alignment
-from .contact_facets import PartTrace, local_blocks
+from .block_forces import BlockForces, gathered, summed
+from .contact_facets import PartTrace
 from .interface_points import InterfacePoints
 from .interface_traces import InterfaceTrace
 from .thresholds import DEFAULT, Thresholds
@@ -168,7 +169,7 @@ class LawTraces:
             return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree])
         if interface.name not in self._interfaces:
             self._interfaces[interface.name] = InterfacePoints(problem, space, interface, degree)
-        return InterfaceTrace(problem, space, self._interfaces[interface.name], surface, directions)
+        return InterfaceTrace(problem, self._interfaces[interface.name], surface, directions)
 
     def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> LawTrace:
         """One law between the nodes. Collective.
@@ -233,34 +234,29 @@ class LawTraces:
             self._solved[id(law)] = law, solved
         return self._solved[id(law)][1]
 
-    def tested(self, error: ErrorField | None = None) -> tuple[Array, Array]:
-        """∫ τ·v ds of all laws tested with bubbles; the nodal forces minus that with u_h's; each (n, d). Collective.
+    def tested(self, error: ErrorField | None = None) -> tuple[BlockForces, BlockForces]:
+        """∫ τ·v ds of all laws tested with bubbles; the nodal forces minus that with u_h's; owned blocks. Collective.
 
         ``error`` is added to u_h as in :meth:`of_law`. The bubbles of two bodies that meet feel what contact or glue
         carries, too.
         """
-        d = self.problem.scales.dimension
-        between = np.zeros((local_blocks(self.bubbles), d))
-        at_nodes = np.zeros((local_blocks(self.problem.space), d))
+        d, at_nodes, between = self.problem.scales.dimension, [], list(self._carried_between_bodies)
         for state in self.states:
             for law in state.laws:
                 trace = self.of_law(state, law, error)
                 with_bubbles, with_nodes = trace.points.tested(trace.traction)
-                nodal = law.given * law.term.weights[:, None]
-                between += with_bubbles
-                at_nodes -= with_nodes
-                np.add.at(at_nodes, state.surface.blocks, np.einsum("mk,mkd->md", nodal, law.term.directions))
-        if self._carried_between_bodies is not None:
-            between += self._carried_between_bodies
-        return gathered(self.bubbles, between), gathered(self.problem.space, at_nodes)
+                nodal = np.einsum("mk,mkd->md", law.given * law.term.weights[:, None], law.term.directions)
+                between.append((with_bubbles.blocks, with_bubbles.values))
+                at_nodes += [(with_nodes.blocks, -with_nodes.values), (state.surface.blocks, nodal)]
+        return gathered(self.bubbles, summed(between, d)), gathered(self.problem.space, summed(at_nodes, d))
 
     @functools.cached_property
-    def _carried_between_bodies(self) -> Array | None:
-        """As :meth:`_carried`, of all interfaces; None where there are none. Collective when first used."""
-        found = [self._carried(state) for state in self.states if self.problem.interface_of(state.surface) is not None]
-        return np.sum(found, axis=0) if found else None
+    def _carried_between_bodies(self) -> list[tuple[Entities, Array]]:
+        """As :meth:`_carried`, of all interfaces, blocks and forces. Collective when first used."""
+        between = [state for state in self.states if self.problem.interface_of(state.surface) is not None]
+        return [(force.blocks, force.values) for force in map(self._carried, between)]
 
-    def _carried(self, state: ContactState) -> Array:
+    def _carried(self, state: ContactState) -> BlockForces:
         """∫ τ·v ds of what bodies that meet put on each other without a law, tested with bubbles. Collective."""
         force = -traction(state)
         for law in state.laws:
@@ -270,18 +266,3 @@ class LawTraces:
             axes = tangent_alignment.frames(state.surface)
         points = self.part(state.surface, axes)
         return points.tested(points.interpolated_components(np.einsum("mkd,md->mk", axes, force)))[0]
-
-
-def gathered(space: fem.FunctionSpace, values: Array) -> Array:
-    """Local contributions summed at the owned blocks, (n, d). Collective.
-
-    Args:
-        space: of the blocks.
-        values: at all local blocks, (n_local, d).
-    """
-    if space.mesh.comm.size == 1:
-        return values
-    field = fem.Function(space)
-    field.x.array[:] = values.ravel()
-    field.x.scatter_reverse(la.InsertMode.add)
-    return np.array(field.x.array.reshape(values.shape)[: space.dofmap.index_map.size_local])

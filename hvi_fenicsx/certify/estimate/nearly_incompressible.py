@@ -51,23 +51,23 @@ class CondensedStiffness(BubbleStiffness):
             forms.compiled(bulk.between(moved, v) + bulk.pressed(self.pressures, v)) for v in tests
         )
 
-    def times(self, e: Array) -> Array:
-        """The force on the bubbles by owned values, the nodes following. Collective.
+    def _product(self) -> Array:
+        """As of :class:`.BubbleStiffness`, the nodes following. Collective."""
+        self._let_follow()
+        return super()._product()
 
-        Args:
-            e: the bubbles, (n, d).
-        """
-        self.follow(e)
-        return super().times(e)
-
-    def follow(self, e: Array, unmet: Array | None = None) -> None:
+    def follow(self, e: Array, unmet: Array) -> None:
         """Let the nodes follow the bubbles and a force, and the pressures both. Collective.
 
         Args:
             e: the bubbles, (n, d).
             unmet: the force on the nodes, (n, d).
         """
-        self._in.x.array[: e.size] = e.ravel()
+        self._owned(self._in)[:] = e
+        self._let_follow(unmet)
+
+    def _let_follow(self, unmet: Array | None = None) -> None:
+        """As :meth:`follow`, of the bubbles that products are made of. Collective."""
         self._in.x.scatter_forward()
         self.at_nodes.x.array[:] = 0.0
         self._press()
@@ -91,9 +91,9 @@ class CondensedStiffness(BubbleStiffness):
         Args:
             unmet: the force on the nodes, (n, d).
         """
-        none = np.zeros((self.space.dofmap.index_map.size_local, unmet.shape[1]))
-        self.follow(none, unmet)
-        return super().times(none)
+        self._owned(self._in)[:] = 0.0
+        self._let_follow(unmet)
+        return super()._product()
 
 
 def _assembled(form: fem.Form, like: fem.Function) -> Array:
@@ -114,13 +114,15 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
     """
     problem, u = traces.problem, traces.u
     stiffness = CondensedStiffness(problem, traces.bubbles, inverse, traces.thresholds)
-    between, unmet = traces.tested()
-    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values()) - between
+    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+    between, left = traces.tested()
+    load[between.blocks] -= between.values
+    unmet = left.everywhere(problem.space.dofmap.index_map.size_local)
     if problem.terms:
         load -= stiffness.on_bubbles(unmet)
     bubbles, under = fem.Function(traces.bubbles), bubble_constraints.constraints(problem, u, traces.bubbles)
     stiffness.hold(LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles)))
     defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
-    stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(between)], unmet)
+    stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(load)], unmet)
     shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)
     return shear + problem.bulk.pressure_energy(stiffness.pressures) + problem.bulk.dilatation_error(u)

@@ -15,10 +15,10 @@ from ...effects.base import SurfaceLoad
 from ...problem import spaces
 from ...problem.problem import Problem
 from ...runtime.mpi import total
-from ...typing import Array, Mask
+from ...typing import Array, Entities, Mask
+from .block_forces import gathered, summed
 from .boundary_data import FacetSamples, sample
 from .dual_norm import DualNorm
-from .law_traces import gathered
 from .thresholds import Thresholds
 
 
@@ -33,16 +33,17 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thr
     """
     d = problem.scales.dimension
     cells = np.zeros(problem.domain.mesh.topology.index_map(d).size_local)
-    forces = np.zeros((len(problem.points), d))
+    forces: list[tuple[Entities, Array]] = []
     for on, missing in _missing(problem, bubbles, thresholds):
         functions = spaces.simplex_functions(on.facets.degree, on.barycentric, spaces.edge_share(problem.space))
         weighted = on.facets.areas[:, None, None] * on.weights[:, None] * missing
-        np.add.at(forces, on.facets.nodes, np.einsum("fqd,qn->fnd", weighted, functions))
+        forces.append((on.facets.nodes.ravel(), np.einsum("fqd,qn->fnd", weighted, functions).reshape(-1, d)))
         np.add.at(cells, on.facets.cells, np.sum(np.abs(weighted), axis=(1, 2)) ** 2)
     whole = total(problem.domain.mesh.comm, float(cells.sum()))
     if whole == 0.0:
         return cells
-    _, norm = inverse.solve(problem.combined(gathered(problem.space, forces)))
+    lacking = gathered(problem.space, summed(forces, d)).everywhere(problem.space.dofmap.index_map.size_local)
+    _, norm = inverse.solve(problem.combined(lacking))
     return np.asarray(norm**2 * cells / whole)
 
 
