@@ -43,10 +43,10 @@ class DualNorm:
 
     def __init__(self, system: System, levels: Levels, u: fem.Function, thresholds: Thresholds = DEFAULT) -> None:
         self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.dual_tolerance
-        self._u, self._near = u, thresholds.near
-        x = system.unknowns(u)
-        self.held = _held(system, x, thresholds.near)
-        system.jacobian.set_rates([_rising(system.comm, term, x.array_r, thresholds) for term in system.terms])
+        self._near, self._x = thresholds.near, system.unknowns(u)
+        self.held = _held(system, self._x, thresholds.near)
+        at = self._x.array_r
+        system.jacobian.set_rates([_rising(system.comm, term, at, thresholds) for term in system.terms])
         self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
         self._inverse.prepare(self.held)
 
@@ -87,9 +87,7 @@ class DualNorm:
         Returns:
             Whether it left any.
         """
-        x = self.system.unknowns(self._u)
-        at, before = x.array_r.copy(), self.held
-        error_there = self.system.unknowns(error)
+        at, before, error_there = self._x.array_r, self.held, self.system.unknowns(error)
         for bounds in self.system.bounds:
             dofs, sign = bounds.component()
             along = sign * (at[dofs] + error_there.array_r[dofs])

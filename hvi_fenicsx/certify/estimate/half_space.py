@@ -48,10 +48,12 @@ def _unit(vectors: Array) -> Array:
 
 def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:
     """L of waves and normals (f, d), (f, d, d)."""
-    found = np.zeros((*wave.shape, wave.shape[1]))
-    for angle in np.arange(_ANGLES) * np.pi / _ANGLES:
-        m = np.cos(angle) * wave + np.sin(angle) * normal
-        n = np.cos(angle) * normal - np.sin(angle) * wave
-        q, r, t = (np.einsum("fijkl,fj,fl->fik", stiffness, a, b) for a, b in ((m, m), (m, n), (n, n)))
-        found += q - r @ np.linalg.solve(t, r.transpose(0, 2, 1))
-    return np.asarray(found / _ANGLES)
+    along, across = (np.einsum("fijkl,fj->fikl", stiffness, one) for one in (wave, normal))
+    ww, nw = (np.einsum("fikl,fl->fik", one, wave) for one in (along, across))
+    wn, nn = (np.einsum("fikl,fl->fik", one, normal) for one in (along, across))
+    angles = (np.arange(_ANGLES) * np.pi / _ANGLES)[:, None, None, None]
+    c, s = np.cos(angles), np.sin(angles)  # of m = c wave + s normal, n = c normal - s wave
+    q = c * c * ww + c * s * (wn + nw) + s * s * nn
+    r = c * c * wn + c * s * (nn - ww) - s * s * nw
+    t = c * c * nn - c * s * (wn + nw) + s * s * ww
+    return np.asarray(np.mean(q - r @ np.linalg.solve(t, np.swapaxes(r, -1, -2)), axis=0))
