@@ -61,7 +61,8 @@ def _energies(problem: Problem) -> Iterator[tuple[Any, Any, Mapping[Index, float
     for affine, shares in of_slopes.items():
         yield problem.bulk.material, ufl.dot(ufl.as_vector(affine), place), shares
     if problem.bulk.foundation is not None:
-        yield problem.bulk.foundation, 1.0, {index: _mean_square(index, cell) for index in of_bubbles}
+        squares = {index: _mean_square(index, cell) for index in of_bubbles}
+        yield problem.bulk.foundation, fem.Constant(mesh, 1.0), squares
 
 
 def _energy(problem: Problem, form: Any, height: Any, axis: int) -> Any:
