@@ -1,7 +1,8 @@
-"""The method of conjugate gradients on the unknowns that are not held, at full size: zero stays zero at the others.
+"""A Krylov method on the unknowns that are not held, at full size: zero stays zero at the others.
 
 PETSc's convergence tests get a norm of the residual; the residual itself they could only compute anew, by a further
-product. But at each iteration the method gives it to the preconditioner, and it ends where it gets zero back.
+product. But the method of conjugate gradients gives it to the preconditioner at each iteration, and ends where it gets
+zero back.
 """
 
 from __future__ import annotations
@@ -58,11 +59,11 @@ def set_up(ksp: PETSc.KSP, whole: PETSc.Mat, inner: PETSc.PC, held: Entities, re
     """Give a method its matrix and preconditioner, for one solve from zero. Collective.
 
     Args:
-        ksp: the method of conjugate gradients.
+        ksp: the method.
         whole: J.
         inner: a preconditioner of it; one of a J with other held unknowns and another tangent will do.
         held: the unknowns that are held (local, owned).
-        reached: ends the method; the first residual never does. None: only its own tests do.
+        reached: ends the method of conjugate gradients; the first residual never does. None: only its own tests do.
     """
     matrix = PETSc.Mat().createPython(whole.getSizes(), _Matrix(whole, held), comm=whole.comm)
     matrix.setUp()

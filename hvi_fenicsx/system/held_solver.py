@@ -262,11 +262,12 @@ class HeldPreconditioner:
             self._preconditioner.accuracy = min(goal.rtol, settings.thresholds.mixed_accuracy)
         ksp.setTolerances(rtol=goal.rtol, max_it=settings.iterations)
         configure(ksp, settings.ksp)
-        if ksp.getType() == PETSc.KSP.Type.CG:
-            if goal.reached is not None:
+        if settings.kind in ("gamg", "mg"):
+            reached = goal.reached if ksp.getType() == PETSc.KSP.Type.CG else None
+            if reached is not None:
                 ksp.setTolerances(rtol=settings.thresholds.surplus * goal.rtol)
-            whole, held = self.system.jacobian.matrix, np.union1d(self._wanted, self.system.pins)
-            free_rows.set_up(ksp, whole, self._preconditioner.pc, held, goal.reached)
+            held = np.union1d(self._wanted, self.system.pins)
+            free_rows.set_up(ksp, self.system.jacobian.matrix, self._preconditioner.pc, held, reached)
         return ksp
 
 
