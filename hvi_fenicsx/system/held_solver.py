@@ -36,7 +36,7 @@ class Preconditioner(Protocol):
 
     Attributes:
         pc: PETSc's object.
-        matrix: what it preconditions; equations are solved with this matrix.
+        matrix: what it preconditions.
     """
 
     pc: PETSc.PC
