@@ -127,14 +127,14 @@ def examine(
     states = contact_state.states(known, u, forces.reaction, thresholds)
     net = {"net_force": balance.net_forces(known, forces, states, u, thresholds)}
     entries = deviations.measured(known, u, forces, states)
-    passed, rounding = _within(entries, dict.fromkeys(entries, tolerance)), None
-    if not passed and _within(entries, dict.fromkeys(entries, thresholds.largest_rounding)):
+    passed, rounding = _within(entries, tolerance), None
+    if not passed and _within(entries, thresholds.largest_rounding):
         shuffled = deviations.rounding(known, u, forces, states)
         floors = {name: thresholds.rounding_safety * moved for name, moved in shuffled.items()}
-        passed = _within(entries, {name: np.maximum(tolerance, floor) for name, floor in floors.items()})
-        rounding = float(np.max(list(floors.values())))
+        beyond = {name: np.where(values <= floors[name], 0.0, values) for name, values in entries.items()}
+        passed, rounding = _within(beyond, tolerance), float(np.max(list(floors.values())))
     mixity = _mixity(comm, states)
-    passed = passed and _within(net, dict.fromkeys(net, tolerance)) and (mixity or 0.0) <= tolerance
+    passed = passed and _within(net, tolerance) and (mixity or 0.0) <= tolerance
     true, error = (largest(comm, value) for value in _inclusion_true(states))
     allowed = max(tolerance, rounding or 0.0)
     second_order = stability.status(known, u, forces.reaction, allowed, inertia=inertia and passed)
@@ -151,8 +151,8 @@ def examine(
     return Examination(certificate, _energy(problem, u, forces, states), forces, states, error, dip)
 
 
-def _within(entries: Mapping[str, Array], limits: Mapping[str, float | Array]) -> bool:
-    return all(bool(np.all(np.isfinite(v) & (v <= limits[name]))) for name, v in entries.items())
+def _within(entries: Mapping[str, Array], limit: float) -> bool:
+    return all(bool(np.all(np.isfinite(v) & (v <= limit))) for v in entries.values())
 
 
 def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[ContactState]) -> float:

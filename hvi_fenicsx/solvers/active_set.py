@@ -238,9 +238,9 @@ class _SnesRun:
         thresholds = self.thresholds
         least = thresholds.moving_accuracy if moved else 0.0 if self.steady else thresholds.finest_accuracy
         wanted = max(thresholds.forcing * self.tolerance, least * self.last)
-        if np.any(self.sizes.net > 0.0):
-            return Goal(rtol=wanted / self.last)
-        return Goal(rtol=wanted / self.last, reached=self.owner.convergence.reaches(wanted, self.sizes.forces))
+        balanced = not np.any(self.sizes.net > 0.0)
+        reached = self.owner.convergence.reaches(wanted, self.sizes.forces) if balanced else None
+        return Goal(rtol=wanted / self.last, reached=reached)
 
     def finish(self, snes: PETSc.SNES) -> None:
         """Take iterations and reason from the SNES, and free it."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 
+from ..system.free_rows import Reached
 from ..system.system import System
 from ..typing import Array, Mask
 from .net_force_test import NetForceTest
@@ -111,7 +111,7 @@ class ConvergenceTest:
         net, noise = self._net.sizes(x, residual, projected, on)
         return Sizes(norm, traction, net, noise, forces)
 
-    def reaches(self, wanted: float, forces: Array) -> Callable[[Array], bool]:
+    def reaches(self, wanted: float, forces: Array) -> Reached:
         """Whether the residual (n,) of a linear solve is small enough, net forces aside; collective.
 
         Args:

@@ -9,7 +9,7 @@ which they are held by their diagonals (:meth:`.Jacobian.hold`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -60,7 +60,7 @@ class Goal:
     """
 
     rtol: float
-    reached: Callable[[Array], bool] | None = None
+    reached: free_rows.Reached | None = None
 
 
 class HeldPreconditioner:

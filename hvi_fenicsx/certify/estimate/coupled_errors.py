@@ -18,7 +18,7 @@ from ...runtime.mpi import total
 from ...typing import Array
 from ..law_state import LawState
 from . import bubble_constraints, defect
-from .block_forces import BlockForces
+from .block_forces import BlockForces, summed
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_springs import LawSprings
@@ -78,7 +78,7 @@ class Coupled:
         self._of_moved = problem.bulk.force_in(space, self._moved)
         self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
         self._shared, self._strongest = 0.0, 0.0
-        self._answer = self._laws - self._laws
+        self._answer = summed((), problem.scales.dimension)
         self._force: Array = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
 
     @property
