@@ -15,6 +15,9 @@ from ..runtime.manifest import MARKS
 def move_in(work: Path, target: Path) -> tuple[str, ...]:
     """Move the files of a hidden folder into a folder; again, it goes on where it was killed.
 
+    The mark is there only while the manifest and all files belong to it: the manifest comes before it, as a copy, since
+    the hidden folder needs its own until the end.
+
     Args:
         work: the hidden folder, with the manifest of what the other is to hold.
         target: the folder; one that does not exist is the hidden one, renamed.
@@ -38,11 +41,34 @@ def move_in(work: Path, target: Path) -> tuple[str, ...]:
     for name in sorted(name for name in owned if name not in new.owned or (work / name).exists()):
         if is_folder(target / name):
             _remove_owned(target / name)
-    last = {mark: 1, manifest.NAME: 2}
-    there = (n for n in sorted(new.owned, key=lambda n: (last.get(n, 0), n)) if (work / n).exists())
-    kept = tuple(filter(None, [_move(work / name, target / name, name in owned) for name in there]))
+    there = [name for name in sorted(new.files) if name != mark and (work / name).exists()]
+    kept = [_move(work / name, target / name, name in owned) for name in there]
+    kept.append(_move(_copied(work / manifest.NAME), target / manifest.NAME, manifest.NAME in owned))
+    if (work / mark).exists():
+        kept.append(_move(work / mark, target / mark, mark in owned))
+    discard(work)
+    return tuple(filter(None, kept))
+
+
+def discard(work: Path) -> None:
+    """Remove a hidden folder; its manifest first, so that what a kill leaves is not taken for a whole result.
+
+    Args:
+        work: the hidden folder.
+    """
+    with contextlib.suppress(OSError):
+        (work / manifest.NAME).unlink(missing_ok=True)
     shutil.rmtree(work, ignore_errors=True)
-    return kept
+
+
+def _copied(file: Path) -> Path:
+    """A copy beside a file, on the disk."""
+    copy = file.with_name(f".{file.name}.copy")
+    with copy.open("wb") as stream:
+        stream.write(file.read_bytes())
+        stream.flush()
+        os.fsync(stream.fileno())
+    return copy
 
 
 def _remove_owned(folder: Path) -> None:

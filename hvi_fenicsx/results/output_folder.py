@@ -1,8 +1,8 @@
 """A folder that the program fills: one process at a time, files moved in when all are whole, no other file touched.
 
 The files are written into a hidden folder of their own beside it (in it, where it is a mount point). A new folder is
-that one, renamed. In a folder that exists the program's earlier files make room: the mark goes first, it and the
-manifest come last. A process that is killed between leaves the hidden folder with its manifest; the next one goes on
+that one, renamed. In a folder that exists the program's earlier files make room: the mark goes first, and comes last,
+after the manifest. A process that is killed between leaves the hidden folder with its manifest; the next one goes on
 from there.
 """
 
@@ -25,7 +25,7 @@ from ..runtime import manifest, writing
 from ..runtime.folder_lock import FolderLock
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.signals import SIGNALS
-from .moving import is_folder, move_in
+from .moving import discard, is_folder, move_in
 
 Existing = Literal["refuse", "replace", "resume"]
 _WAYS = {
@@ -202,7 +202,7 @@ class OutputFolder:
     def close(self) -> None:
         """Let the folder go, and remove what was not moved in, with the empty folders around it that were made."""
         if self.work is not None and not self._left:
-            shutil.rmtree(self.work, ignore_errors=True)
+            discard(self.work)
         self._lock.release(keep=self._left)
         for folder in self._made:
             with contextlib.suppress(OSError):  # not empty: something else is there by now

@@ -48,6 +48,12 @@ def names(folder: Path) -> list[str]:
     return sorted(f.name for f in folder.iterdir())
 
 
+def intact(folder: Path) -> bool:
+    """Whether there is a manifest, and each file as it says."""
+    found = manifest.read(folder)
+    return found is not None and found.damaged(folder) is None
+
+
 RESULT = ["a.json", "manifest.json", "summary.json"]
 
 
@@ -197,8 +203,18 @@ def filled(work: Path) -> None:
         (work / f"{name}.json").write_text("2")
 
 
-def killed_at(step: int, out: Path, patch: pytest.MonkeyPatch, fill: Callable[[Path], None] = filled) -> bool:
-    """Replace a result, killed at a system call that changes files, counted from 0; whether there were so many."""
+def killed_at(
+    step: int, out: Path, patch: pytest.MonkeyPatch, fill: Callable[[Path], None] = filled, *, moved: bool = True
+) -> bool:
+    """Replace a result, killed at a system call that changes files, counted from 0; whether there were so many.
+
+    Args:
+        step: the number of the call.
+        out: the folder.
+        patch: of the calls.
+        fill: writes the new files.
+        moved: whether the new result is moved in; else it is given up.
+    """
     calls = itertools.count()
     folder = OutputFolder(out, "result")
     folder.check("replace")
@@ -216,7 +232,8 @@ def killed_at(step: int, out: Path, patch: pytest.MonkeyPatch, fill: Callable[[P
         for name in ("rename", "replace", "unlink", "rmdir", "fsync"):
             patched.setattr(os, name, counted(getattr(os, name)))
         try:
-            folder.move_in({})
+            if moved:
+                folder.move_in({})
             folder.close()
         except Killed:
             pass
@@ -229,7 +246,7 @@ def killed_at(step: int, out: Path, patch: pytest.MonkeyPatch, fill: Callable[[P
 def test_killed_at_any_call_the_result_is_the_old_or_the_new_one_and_the_next_run_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each system call that changes files, in turn. In between there is no summary, or all files are of one result."""
+    """Each system call that changes files, in turn. In between there is no summary, or all is of one result."""
     kinds = {"1": ["a", "b", "summary"], "2": ["a", "c", "summary"]}
     seen = []
     for step in itertools.count():
@@ -240,11 +257,10 @@ def test_killed_at_any_call_the_result_is_the_old_or_the_new_one_and_the_next_ru
         if (out / "summary.json").exists():
             now = (out / "summary.json").read_text()
             assert all((out / f"{name}.json").read_text() == now for name in kinds[now])
+            assert intact(out)
         with pytest.raises(InputError, match="already holds a result"):
             written(out, "refuse", summary="3")
-        found = manifest.read(out)
-        assert found is not None
-        assert found.damaged(out) is None
+        assert intact(out)
         now = (out / "summary.json").read_text()
         assert names(out) == sorted([*(f"{n}.json" for n in kinds[now]), "manifest.json", "notes.txt"])
         assert names(out.parent) == ["r"]
@@ -281,6 +297,27 @@ def test_killed_at_any_call_results_within_a_result_are_those_of_one(
             break
     assert seen == sorted(seen)
     assert seen.count("2") > 6
+
+
+def test_a_result_given_up_is_not_moved_in_by_the_next_run_wherever_its_removal_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A second signal may come when the files are whole, and a third end their removal."""
+
+    def whole(work: Path) -> None:
+        filled(work)
+        manifest.write(work, manifest.Manifest(kind="result", files=manifest.listed(work)))
+
+    for step in itertools.count():
+        out = tmp_path / str(step) / "r"
+        written(out, summary="1", a="1", b="1")
+        alive = not killed_at(step, out, monkeypatch, whole, moved=False)
+        OutputFolder(out, "result").close()
+        assert intact(out)
+        assert names(out.parent) == ["r"]
+        if alive:
+            break
+    assert step > 3
 
 
 def test_what_cannot_be_moved_stays_whole_and_the_next_run_moves_it(
@@ -344,9 +381,9 @@ def test_a_folder_in_the_place_of_a_listed_file_is_kept(tmp_path: Path) -> None:
 def test_a_damaged_file_is_found_whichever_it_is(tmp_path: Path) -> None:
     out = tmp_path / "r"
     written(out, summary="1", a="1")
+    assert intact(out)
     found = manifest.read(out)
     assert found is not None
-    assert found.damaged(out) is None
     (out / "a.json").write_text("")
     assert found.damaged(out) == "a.json"
     (out / "a.json").unlink()
