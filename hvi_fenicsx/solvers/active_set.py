@@ -20,6 +20,7 @@ from ..system.held_solver import Goal, HeldPreconditioner
 from ..system.law_model import LawModel
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
+from ..system.petsc_errors import raise_python_error
 from ..system.petsc_options import default_options, prefix
 from ..system.system import System
 from ..typing import Entities
@@ -159,6 +160,7 @@ class ActiveSetSolver:
             try:
                 snes.solve(None, x)
             except PETSc.Error as error:
+                raise_python_error(error)
                 return Outcome(False, snes.getIterationNumber(), run.linear, run.last, f"PETSc error {error.ierr}")
             finally:
                 run.finish(snes)

@@ -9,6 +9,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import InputError
+from ..system.petsc_errors import raise_python_error
 from ..system.system import System
 from .closed_start import resting_start
 from .context import SolveContext
@@ -59,6 +60,7 @@ class SolverRun(ABC):
             self.iterate(solver, x)
             reason = self._name_of(solver.getConvergedReason())
         except PETSc.Error as error:
+            raise_python_error(error)
             reason = f"PETSc error {error.ierr}"
         self.count(solver)
         for thing in (solver, self.matrix):

@@ -17,6 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..errors import InputError
+from .petsc_errors import raise_python_error
 
 CHOLESKY: Mapping[str, object] = {
     "pc_type": "cholesky",
@@ -149,6 +150,7 @@ def refusals_told() -> Iterator[None]:
     try:
         yield
     except PETSc.Error as error:
+        raise_python_error(error)
         given = [f"-{k} {v or ''}".strip() for k, v in PETSc.Options().getAll().items() if k.startswith(prefix())]
         if not given:
             raise
