@@ -95,7 +95,7 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
 
 
 def _run_on_ranks(options: argparse.Namespace) -> int:
-    with _interrupts_held():
+    with processes.held(processes.STOP):  # it would end an import with a library's own traceback
         from .runtime import petsc
 
         petsc.start()
@@ -131,16 +131,6 @@ def _in_one_line(text: str, options: argparse.Namespace) -> str:
     return text
 
 
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Let a stop wait for the end of an import, which it would end with a library's own traceback."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, processes.STOP)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _version() -> int:
     from .runtime import petsc
 
@@ -161,7 +151,7 @@ def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
         if not rank_variables.is_first_rank():
             return ExitCode.CERTIFIED
         _become_single_process(options.np or rank_variables.ranks(), words)
-    with _interrupts_held():
+    with processes.held(processes.STOP):
         from .studies import run as study
 
     return study.run(options)

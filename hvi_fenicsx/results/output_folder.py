@@ -15,13 +15,12 @@ import os
 import re
 import secrets
 import shutil
-import signal
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Literal
 
 from ..errors import InputError, NotWrittenError
-from ..runtime import manifest, writing
+from ..runtime import manifest, processes, writing
 from ..runtime.folder_lock import FolderLock
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.signals import SIGNALS
@@ -174,7 +173,7 @@ class OutputFolder:
             files = {**manifest.listed(self.work), **(other or {})}
             manifest.write(self.work, Manifest(kind=self.kind, files=files, inputs=inputs))
         try:
-            with _signals_held():
+            with processes.held(SIGNALS):
                 kept = move_in(self.work, self.target)
                 self.work = None
         except OSError as error:
@@ -247,15 +246,6 @@ class OutputFolder:
 
     def _refused(self, reason: str) -> InputError:
         return InputError(f"--out {self.target}: {reason}")
-
-
-@contextlib.contextmanager
-def _signals_held() -> Iterator[None]:
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def placed(error: NotWrittenError, target: Path, work: Path | None) -> NotWrittenError:

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import tempfile
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
@@ -53,10 +52,7 @@ def run(module: str, words: Sequence[str], seconds: float) -> subprocess.Complet
 def _ended_by_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
     """Have signals that are handled, or would end us, end the child; the signals that came."""
     came: list[int] = []
-    handlers = {number: signal.getsignal(number) for number in SIGNALS}
-    ours = {number: handler for number, handler in handlers.items() if callable(handler) or handler == signal.SIG_DFL}
-    if threading.current_thread() is not threading.main_thread():
-        ours = {}  # Python takes handlers from its main thread only
+    ours = processes.replaceable(SIGNALS)
     for number, handler in ours.items():
         signal.signal(number, _ending(child, handler, came))
     try:

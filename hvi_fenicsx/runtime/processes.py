@@ -13,10 +13,11 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ..errors import InputError
 
@@ -121,6 +122,41 @@ def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType |
     for number in numbers:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, caught)
+
+
+@contextlib.contextmanager
+def held(numbers: Iterable[signal.Signals]) -> Iterator[None]:
+    """Let signals wait for the end of a block, also those that another thread of the process gets, as one of MPI's.
+
+    A mask of signals would not do that: Python runs a handler in the main thread, whichever thread got the signal.
+
+    Args:
+        numbers: of the signals; those that are ignored stay so.
+    """
+    came: list[int] = []
+    with contextlib.ExitStack() as after:
+        after.callback(_raise_signals, came)
+        for number, handler in replaceable(numbers).items():
+            after.callback(signal.signal, number, handler)
+            signal.signal(number, lambda number, _: came.append(number))
+        yield
+
+
+def _raise_signals(numbers: Iterable[int]) -> None:
+    for number in numbers:
+        signal.raise_signal(number)
+
+
+def replaceable(numbers: Iterable[signal.Signals]) -> dict[signal.Signals, Any]:
+    """The handlers of signals that are handled, or would end us; none in another thread than Python's main one.
+
+    Args:
+        numbers: of the signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return {}  # Python takes handlers from its main thread only
+    handlers = {number: signal.getsignal(number) for number in numbers}
+    return {number: now for number, now in handlers.items() if callable(now) or now == signal.SIG_DFL}
 
 
 def stoppable(action: Callable[[], T]) -> T:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -318,6 +320,44 @@ def test_a_result_given_up_is_not_moved_in_by_the_next_run_wherever_its_removal_
         if alive:
             break
     assert step > 3
+
+
+def test_a_signal_waits_until_all_is_moved_whichever_thread_gets_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MPI has a thread of its own, which takes the signals that the main one blocks."""
+    out, asked, ended = tmp_path / "r", threading.Event(), threading.Event()
+    written(out, summary="1", a="1", b="1")
+    replace, before = os.replace, signal.getsignal(signal.SIGTERM)
+
+    def stopped(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    def other() -> None:
+        asked.wait()
+        signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
+        ended.set()
+
+    def signalled(source: Path, goal: Path) -> None:
+        if goal.parent == out:
+            asked.set()
+            ended.wait()
+        replace(source, goal)
+
+    threading.Thread(target=other).start()
+    signal.signal(signal.SIGTERM, stopped)
+    try:
+        with monkeypatch.context() as patched:
+            patched.setattr(os, "replace", signalled)
+            with pytest.raises(KeyboardInterrupt):
+                written(out, summary="2", a="2", c="2")
+        assert signal.getsignal(signal.SIGTERM) is stopped
+    finally:
+        asked.set()
+        signal.signal(signal.SIGTERM, before)
+    assert names(out) == ["a.json", "c.json", "manifest.json", "summary.json"]
+    assert intact(out)
+    assert names(tmp_path) == ["r"]
 
 
 def test_what_cannot_be_moved_stays_whole_and_the_next_run_moves_it(
