@@ -261,7 +261,7 @@ class HeldPreconditioner:
         if isinstance(self._preconditioner, MixedMultigrid):
             self._preconditioner.accuracy = min(goal.rtol, settings.thresholds.mixed_accuracy)
         ksp.setTolerances(rtol=goal.rtol, max_it=settings.iterations)
-        configure(ksp, settings.ksp)
+        configure(ksp, settings.ksp(ksp.getPC()))
         if settings.kind in ("gamg", "mg"):
             reached = goal.reached if ksp.getType() == PETSc.KSP.Type.CG else None
             if reached is not None:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from petsc4py import PETSc
+
 from ..mesh import nodes
 from .petsc_options import CHOLESKY
 from .system import System
@@ -30,6 +32,8 @@ _MG: dict[str, object] = {
     "mg_coarse_pc_type": "bjacobi",
     "mg_coarse_sub_pc_type": "lu",
 }
+_EXACT = (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU, PETSc.PC.Type.PYTHON)
+"""Types of a direct solver; the last is one of ours, which applies factors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +81,13 @@ class LinearSettings:
             return cls("lu", thresholds)
         return cls("lu" if small else "gamg", thresholds)
 
-    @property
-    def ksp(self) -> dict[str, str]:
-        """Default options of the Krylov method."""
-        if self.kind == "lu":
+    def ksp(self, pc: PETSc.PC) -> dict[str, str]:
+        """Default options of the Krylov method.
+
+        Args:
+            pc: the preconditioner; in the place of a factorisation the user may have chosen another one.
+        """
+        if self.kind == "lu" and pc.getType() in _EXACT:
             return {"ksp_type": "preonly"}
         # where a start is already a solution, PETSc's flexible CG (fcg) is freed without having been set up, and fails
         return {"ksp_type": "fgmres" if self.kind == "mixed" else "cg", "ksp_norm_type": "unpreconditioned"}

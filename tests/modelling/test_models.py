@@ -283,13 +283,15 @@ def test_wrong_words_are_refused_as_in_a_scene_file(body: hvi.Body) -> None:
             make()
 
 
-def test_a_preconditioner_and_a_prefix_of_the_users_choice(body: hvi.Body, found: hvi.Solution) -> None:
-    """Jacobi needs more iterations than the program's own multigrid, for the same solution."""
+@pytest.mark.parametrize("linear_solver", ["gamg", "lu"])
+def test_a_preconditioner_and_a_prefix_of_the_users_choice(
+    body: hvi.Body, found: hvi.Solution, linear_solver: str
+) -> None:
+    """Jacobi needs more iterations than the program's own solver, for the same solution."""
     model, steps = steel_square(body=body), []
     ways = [{}, {"pc_type": "jacobi", "ksp_max_it": 5000}]
-    own, jacobi = (
-        hvi.solve(model, linear_solver="gamg", petsc=way, petsc_prefix="floor_", progress=steps.append) for way in ways
-    )
+    given = {"linear_solver": linear_solver, "petsc_prefix": "floor_", "progress": steps.append}
+    own, jacobi = (hvi.solve(model, petsc=way, **given) for way in ways)
     assert own.solve_result is not None
     assert jacobi.solve_result is not None
     assert jacobi.converged
