@@ -47,10 +47,15 @@ class SplitLaw(ABC):
             low, high = self.concave.right(np.array([-_FAR, _FAR]))
         return bool(low == high)
 
-    @property
+    @cached_property
     def steepest_fall(self) -> float:
         """A bound from above of -j'', N/m³: 0 where j is convex, inf where the traction drops or no bound is known."""
-        return 0.0 if self.is_convex else np.inf
+        if self.is_convex or self.concave.kinks.size:
+            return 0.0 if self.is_convex else np.inf
+        ends = np.concatenate([[-np.inf], self.breaks, [np.inf]])
+        with np.errstate(all="ignore"):
+            falls = -self.slope_range(ends[:-1], ends[1:])[0]
+        return np.inf if np.isnan(falls).any() else max(0.0, float(np.max(falls)))
 
     def left(self, x: Array) -> Array:
         """Left derivative of j at x (m,), N/m²."""

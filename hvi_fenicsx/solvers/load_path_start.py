@@ -20,6 +20,7 @@ from ..equilibrium_paths.graphs import graph_of
 from ..equilibrium_paths.watch import Watch
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
+from ..laws.smoothing.base import SmoothedLaw
 from ..runtime.mpi import on_root_asking
 from ..system.condensation import Condensation
 from ..system.condensed_problem import CondensedProblem
@@ -44,13 +45,13 @@ class PathStart:
 
 
 def softens(law: Superpotential) -> bool:
-    """Whether a law's traction falls, other than by jumps.
+    """Whether a law's traction falls, other than by jumps, be these smoothed or not.
 
     Args:
         law: the law.
     """
-    graph = graph_of(law)
-    return 0.0 < law.steepest_fall < np.inf if graph is None else bool(np.any(graph.slopes < 0.0))
+    graph, unsmoothed = graph_of(law), law.law if isinstance(law, SmoothedLaw) else law
+    return 0.0 < unsmoothed.steepest_fall < np.inf if graph is None else bool(np.any(graph.slopes < 0.0))
 
 
 def first_steps(laws: Sequence[Superpotential], thresholds: PathThresholds) -> int | None:

@@ -17,6 +17,7 @@ from hvi_fenicsx.solution import Solution
 from hvi_fenicsx.workflow import finish
 
 TRESCA = {"law": "tresca", "yield_traction": 2e6}
+PAPER = {"gamma1": 1e3, "gamma2": 5e2, "delta": 9e-6}
 
 
 def verdict(table: Table, thresholds: UniquenessThresholds | None = None) -> uniqueness.Uniqueness:
@@ -31,11 +32,12 @@ def verdict(table: Table, thresholds: UniquenessThresholds | None = None) -> uni
     return uniqueness.uniqueness(prepared.system, found.solve_result.u, found.examination, thresholds)
 
 
-def bar(fall: float) -> Table:
+def bar(fall: float, **solver: Any) -> Table:
     """A bar of length 1 m, drawn off a bond that softens; all vertices move along it alone: it is E/1 m stiff."""
     rail = {"displacement": ["free", 0.0]}
     bond = {"law": "graph", "points": [[0.0, 0.0], [1e-6, 1e5], [1e-6 + 1e5 / fall, 0.0]]}
     return {
+        "solver": solver,
         "domain": {"shape": "rectangle", "size": [1.0, 0.1], "cells": [4, 1]},
         "material": STEEL | {"poisson_ratio": 0.0},
         "boundary": {
@@ -85,6 +87,20 @@ def test_a_bar_is_as_stiff_as_its_bond_may_fall(share: float, state: str) -> Non
     assert verdict(bar(share * E)).state == state
 
 
+@pytest.mark.parametrize("smoothing", ["chks", "log_exp"])
+@pytest.mark.parametrize(("share", "state"), [(0.99, "unique"), (1.01, "unknown")])
+def test_a_bar_is_as_stiff_as_a_smoothed_drop_may_fall(smoothing: str, share: float, state: str) -> None:
+    """A jump J of the traction falls by J²/(4ε) at most: of both plus functions p'' is at most 1/4. Tails add 0.2 %."""
+    epsilon = 1e5**2 / (4.0 * share * E)
+    assert verdict(bar(np.inf, smoothing=smoothing, epsilon_absolute=epsilon)).state == state
+
+
+def test_the_papers_model_problem_has_no_other_equilibrium() -> None:
+    """The law is smoothed as in the paper, and weak for the body."""
+    table = model(16, friction=quadratic_linear(1e3), smoothing="paper", epsilon_absolute=0.1)
+    assert verdict(table).state == "unique"
+
+
 def test_nothing_large_is_tried() -> None:
     found = verdict(bar(0.5 * E), UniquenessThresholds(most_on_boundary=3))
     assert found.state == "unknown"
@@ -104,6 +120,19 @@ def test_what_is_not_certified_says_nothing() -> None:
     found: Solution = finish(prepare(Scene.model_validate(block(2, push=4e6, friction=TRESCA))))
     assert not found.converged
     assert found.uniqueness is None
+
+
+def sampled_fall(law: Superpotential) -> float:
+    """The largest -j'' by differences of the traction, near all its breaks and far from them."""
+    x = [end + np.linspace(-1.0, 1.0, 4001) * width for end in law.breaks for width in (1e-10, 1e-8, 1e-6)]
+    return max(float(np.max(-np.diff(law.right(near)) / np.diff(near))) for near in x)
+
+
+@pytest.mark.parametrize("smoothing", ["chks", "log_exp", "paper"])
+@pytest.mark.parametrize("epsilon", [1e-4, 1e-2])
+def test_a_smoothed_drop_falls_as_steeply_as_its_differences(smoothing: str, epsilon: float) -> None:
+    law = laws.smoothing.create(smoothing, laws.create("quadratic_linear", PAPER), epsilon=epsilon)
+    assert law.steepest_fall == pytest.approx(sampled_fall(law), rel=1e-6)
 
 
 LAWS: list[tuple[dict[str, Any], float]] = [

@@ -194,12 +194,12 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
         inner = (left[1:] - right[:-1]) / np.diff(ends)
         return TractionGraph(ends, left, right, np.concatenate([tails[:1], inner, tails[1:]]))
 
-    @property
+    @cached_property
     @override
     def steepest_fall(self) -> float:
         if self.graph is not None:
             return max(0.0, -float(np.min(self.graph.slopes)))
-        return self.law.steepest_fall  # what smooths an upward jump rises; a drop leaves inf
+        return min(self.law.steepest_fall, super().steepest_fall)  # what smooths an upward jump rises
 
     @override
     def derivatives(self, x: Array) -> tuple[Array, Array]:
