@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,13 +88,13 @@ class UniquenessThresholds:
 
     Attributes:
         most_on_boundary: unknowns of Γc up to which the body's stiffness is compared with laws that fall.
-        most_unknowns: unknowns in all up to which it is.
+        most_unknowns: unknowns in all up to which it is, by dimension: that takes about 0.1 s (docs/equilibria.md).
         enlarged: the falls are enlarged by this share, against the rounding of the comparison.
         rounding: squared share of a rigid motion, or displacement by one, that is none.
     """
 
     most_on_boundary: int = 300
-    most_unknowns: int = 5_000
+    most_unknowns: Mapping[int, int] = field(default_factory=lambda: {2: 20_000, 3: 5_000})
     enlarged: float = 1e-6
     rounding: float = 1e-10
 

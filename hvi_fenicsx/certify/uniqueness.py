@@ -118,7 +118,7 @@ def _doubt(
     if not _is_tried(system, thresholds):
         return (
             f"a law falls, and it was not tried whether the body is stiffer: more than {thresholds.most_on_boundary} "
-            f"unknowns on Γc, or {thresholds.most_unknowns:,} in all"
+            f"unknowns on Γc, or {thresholds.most_unknowns[system.problem.scales.dimension]:,} in all"
         )
     each = [np.asarray(fall / term.stretch, dtype=np.float64) for term, fall in zip(system.terms, falls, strict=True)]
     if (moved := _moved(system, modes, motions, each, thresholds)) is not None:
@@ -153,7 +153,8 @@ def _supported(
 def _is_tried(system: System, thresholds: UniquenessThresholds) -> bool:
     """Whether the problem is small enough for a factorisation. Collective."""
     unknowns = int(total(system.comm, float(len(system.jacobian.rows.dofs))))
-    return unknowns <= thresholds.most_on_boundary and system.dofs <= thresholds.most_unknowns
+    most = thresholds.most_unknowns[system.problem.scales.dimension]
+    return unknowns <= thresholds.most_on_boundary and system.dofs <= most
 
 
 def _moved(
