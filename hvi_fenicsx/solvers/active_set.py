@@ -32,6 +32,14 @@ from .thresholds import DEFAULT, FULL_STEPS, Thresholds
 StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
 _REASON = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int) and not k.startswith("_")}
+_WORDS = {
+    "DIVERGED_DTOL": "Newton's method makes no progress",
+    "DIVERGED_LINE_SEARCH": "no step along Newton's direction lowers the energy",
+    "DIVERGED_MAX_IT": "Newton's method has used up its steps",
+    "DIVERGED_LINEAR_SOLVE": "a linear system was not solved",
+    "DIVERGED_FNORM_NAN": "the residual is no number",
+}
+"""What PETSc's reasons mean, for users."""
 
 
 class ActiveSetSolver:
@@ -257,10 +265,12 @@ class _SnesRun:
         )
 
     def _reason(self) -> str:
-        """Why it ended, in our words or PETSc's."""
+        """Why it ended, in our words, and PETSc's."""
         if self.far:
             return f"a displacement of more than {self.thresholds.runaway:.0e} times p0 L / E0"
-        return "interrupted" if self.stopped else _REASON.get(int(self.reason), str(self.reason))
+        name = _REASON.get(int(self.reason), str(self.reason))
+        words = f"{_WORDS[name]} ({name})" if name in _WORDS else name
+        return "interrupted" if self.stopped else words
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self.owner.system.equations.residual(x, f, self.models)

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterable
 
+from scenes import model, quadratic_linear
+
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.law_models import Cells, ExactLaw
 from hvi_fenicsx.solvers.stalls import StallTest
 from hvi_fenicsx.solvers.thresholds import ActiveSetThresholds
+from hvi_fenicsx.system.linear_settings import LinearSettings
 
 
 def steps_until_given_up(residuals: Iterable[float], *, full_steps: bool = True) -> int | None:
@@ -30,3 +38,19 @@ def test_a_residual_that_falls_now_and_then_is_no_circle() -> None:
 
 def test_a_residual_that_stands_is_given_up_at_once() -> None:
     assert steps_until_given_up([1.0, 0.5, 0.5, 0.5, 0.5]) == 3
+
+
+def test_a_solve_that_is_cut_off_says_so_in_words() -> None:
+    prepared = prepare(
+        Scene.model_validate(model(4, 6e6, friction=quadratic_linear(3e6), smoothing="chks", epsilon=0.01))
+    )
+    system = prepared.system
+    solver = ActiveSetSolver(system, (), LinearSettings("lu"), Timer())
+    x = system.load.duplicate()
+    x.set(0.0)
+    (term,) = system.terms
+    laws = [ExactLaw(term.law, Cells.around(term.law.convex, term.argument(x.array_r), radial=term.radial))]
+    found = solver.solve(x, laws, 1e-8, lower=system.lower, upper=system.upper, max_iterations=1)
+    solver.destroy()
+    assert not found.converged
+    assert re.fullmatch(r"\D+ \(DIVERGED_[A-Z_]+\)", found.reason)
