@@ -28,5 +28,5 @@ def test_what_stands_back_comes_after_the_ranks_and_is_not_bound_to_their_proces
     words = [sys.executable, "-c", _PRINTED]
     done = subprocess.run(words, capture_output=True, text=True, check=True, preexec_fn=bind)
     niceness, processors = json.loads(done.stdout)
-    assert niceness >= os.nice(0) + 10
+    assert niceness >= min(os.nice(0) + 10, 19)
     assert set(processors) >= every
