@@ -182,7 +182,7 @@ class LawTraces:
         """
         solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
         k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
-        near = (self.thresholds.near / solved.stretch).ravel()
+        near = np.asarray(self.thresholds.near / solved.stretch, dtype=np.float64).ravel()
         traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), near)
         return LawTrace(solved.points, solved.nodal, solved.multiplier * traction.reshape(slip.shape))
 
