@@ -28,14 +28,6 @@ class Arc(NamedTuple):
         """The derivative at x."""
         return self.traction + self.slope * (x - self.anchor)
 
-    def toucher(self, p: float) -> float:
-        """Where a line of slope p supports the arc, which is convex, from below."""
-        if self.low == self.high:
-            return self.low
-        if self.slope > 0.0:
-            return min(max(self.anchor + (p - self.traction) / self.slope, self.low), self.high)
-        return self.low if p < self.traction else self.high
-
     def moved(self, d: float) -> Arc:
         """The arc with ½ d x² added."""
         a = self.anchor

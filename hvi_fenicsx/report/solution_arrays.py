@@ -27,7 +27,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..runtime import writing
 from ..typing import Array, Integers
 from .errors import ResultError
 
@@ -103,20 +102,6 @@ class SolutionArrays:
     regions: Mapping[str, Integers] = field(default_factory=dict)
     loads: Mapping[str, LoadArrays] = field(default_factory=dict)
     parts: Mapping[str, PartArrays] = field(default_factory=dict)
-
-
-def save(path: Path, arrays: SolutionArrays) -> None:
-    """Write a solution, whole or not at all.
-
-    Args:
-        path: the file.
-        arrays: the solution.
-
-    Raises:
-        NotWrittenError: it cannot be written.
-    """
-    with writing.whole(path) as aside, aside.open("wb") as file:
-        np.savez(file, **members(arrays))
 
 
 def members(arrays: SolutionArrays) -> dict[str, Any]:

@@ -127,4 +127,8 @@ def inputs_of(scene: Scene, folder: Path) -> dict[str, str]:
 def _is_whole(file: Path) -> bool:
     """Whether a file ends as files of its kind do."""
     end = _ENDS.get(file.suffix)
-    return end is None or file.read_bytes()[-_LONGEST_END:].rstrip().endswith(end)
+    if end is None:
+        return True
+    with file.open("rb") as stream:
+        stream.seek(max(0, file.stat().st_size - _LONGEST_END))
+        return stream.read().rstrip().endswith(end)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import tempfile
@@ -65,7 +64,7 @@ def _ended_by_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
 def _ending(child: subprocess.Popen[bytes], handler: Any, came: list[int]) -> Callable[..., Any]:
     def end(number: int, frame: FrameType | None) -> None:
         came.append(number)
-        os.kill(child.pid, signal.SIGKILL)
+        child.kill()  # nothing where it has ended just now
         if callable(handler):
             handler(number, frame)
 

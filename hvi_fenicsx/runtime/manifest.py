@@ -19,7 +19,7 @@ from .versions import __version__
 NAME = "manifest.json"
 Kind = Literal["result", "study"]
 MARKS: Mapping[Kind, str] = {"result": "summary.json", "study": "study.json"}
-"""The file by which others know that the folder is finished: the first to go and the last but one to come."""
+"""The file by which others know that the folder is finished: the first to go and the last to come."""
 _PROGRAM, _FORMAT = "hvi_fenicsx", 1
 
 

@@ -169,11 +169,11 @@ class ActiveSetSolver:
                 snes.solve(None, x)
             except PETSc.Error as error:
                 raise_python_error(error)
-                return Outcome(False, snes.getIterationNumber(), run.linear, run.last, f"PETSc error {error.ierr}")
+                run.failure = f"PETSc error {error.ierr}"
             finally:
                 run.finish(snes)
             found = run.outcome()
-            if found.converged or found.interrupted:
+            if found.converged or found.interrupted or run.failure:
                 return found
             return self.convergence.accept_rounding(found, run.sizes, x)
 
@@ -193,7 +193,11 @@ class ActiveSetSolver:
 
 
 class _SnesRun:
-    """The callbacks of one SNES solve."""
+    """The callbacks of one SNES solve.
+
+    Attributes:
+        failure: the error of PETSc that it ended with; else empty.
+    """
 
     def __init__(
         self,
@@ -210,7 +214,7 @@ class _SnesRun:
         self.thresholds, self.steady, self.foundation = owner.thresholds.active_set, steady, foundation
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
-        self.sizes = NOT_MEASURED
+        self.sizes, self.failure = NOT_MEASURED, ""
         self.stopped = self.far = False
 
     def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
@@ -260,12 +264,13 @@ class _SnesRun:
 
     def outcome(self) -> Outcome:
         """How it ended."""
-        return Outcome(
-            self.last <= self.tolerance, self.iterations, self.linear, self.last, self._reason(), self.stopped
-        )
+        converged = self.last <= self.tolerance and not self.failure
+        return Outcome(converged, self.iterations, self.linear, self.last, self._reason(), self.stopped)
 
     def _reason(self) -> str:
         """Why it ended, in our words, and PETSc's."""
+        if self.failure:
+            return self.failure
         if self.far:
             return f"a displacement of more than {self.thresholds.runaway:.0e} times p0 L / E0"
         name = _REASON.get(int(self.reason), str(self.reason))

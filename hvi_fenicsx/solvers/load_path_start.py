@@ -45,7 +45,9 @@ class PathStart:
 
 
 def softens(law: Superpotential) -> bool:
-    """Whether a law's traction falls, other than by jumps, be these smoothed or not.
+    """Whether a law's traction falls other than by jumps, as far as it is known how steeply.
+
+    A jump that is smoothed by a curve is one; one that is smoothed by a line falls along it.
 
     Args:
         law: the law.

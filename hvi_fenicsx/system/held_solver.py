@@ -241,6 +241,7 @@ class HeldPreconditioner:
         Returns:
             Iterations, and PETSc's reason for the end.
         """
+        self.system.free_leftovers()  # of the step before, and of who asks for this one
         load.array[self.system.pins] = 0.0
         ksp, before = self._krylov(goal), self.inner_iterations
         with self._timer("solve"):

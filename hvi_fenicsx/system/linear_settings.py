@@ -9,7 +9,7 @@ from typing import Literal
 from petsc4py import PETSc
 
 from ..mesh import nodes
-from .petsc_options import CHOLESKY
+from .petsc_options import CHOLESKY, prefix
 from .system import System
 from .thresholds import DEFAULT, Thresholds
 
@@ -34,6 +34,8 @@ _MG: dict[str, object] = {
 }
 _EXACT = (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU, PETSc.PC.Type.PYTHON)
 """Types of a direct solver; the last is one of ours, which applies factors."""
+_OF_OTHER_NORM = ("minres", "symmlq")
+"""Methods that end by the norm of the preconditioned residual; PETSc refuses that of the residual itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,10 @@ class LinearSettings:
         if self.kind == "lu" and pc.getType() in _EXACT:
             return {"ksp_type": "preonly"}
         # where a start is already a solution, PETSc's flexible CG (fcg) is freed without having been set up, and fails
-        return {"ksp_type": "fgmres" if self.kind == "mixed" else "cg", "ksp_norm_type": "unpreconditioned"}
+        method = "fgmres" if self.kind == "mixed" else "cg"
+        if PETSc.Options().getString(f"{prefix()}ksp_type", method) in _OF_OTHER_NORM:
+            return {"ksp_type": method}
+        return {"ksp_type": method, "ksp_norm_type": "unpreconditioned"}
 
     @property
     def iterations(self) -> int:

@@ -256,11 +256,13 @@ class System:
         lower.array[owned], upper.array[owned] = -np.inf, np.inf
         return lower, upper
 
-    def free(self) -> None:
-        """Free the PETSc objects, those too that systems made of this one share, and what solving has left. Collective.
+    def free_leftovers(self) -> None:
+        """Free PETSc objects that no rank refers to any more: on several ranks Python alone frees none. Collective."""
+        PETSc.garbage_cleanup(self.comm)
+        PETSc.garbage_cleanup(self.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
 
-        On several ranks Python alone frees nothing: what no rank refers to any more waits for being freed together.
-        """
+    def free(self) -> None:
+        """Free the PETSc objects, also those that systems made of this one share, and what solving left. Collective."""
         for vector in (self.load, self.lower, self.upper, *self.forces.values()):
             vector.destroy()
         if self.rotation is not None:
@@ -268,5 +270,4 @@ class System:
         self.equations.free()
         self.jacobian.free()
         self.holding.free()
-        PETSc.garbage_cleanup(self.comm)
-        PETSc.garbage_cleanup(self.problem.space.dofmap.index_map.comm)  # dolfinx's vectors are on this one
+        self.free_leftovers()

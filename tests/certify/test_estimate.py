@@ -50,6 +50,29 @@ def estimated(solution: Solution) -> Estimate:
 # --- the mesh
 
 
+@pytest.mark.parametrize("multiplier", [1e-6, 1e9])
+def test_lengths_of_a_law_without_any_do_not_matter(multiplier: float) -> None:
+    """Tresca's law in space, whose slips are free.
+
+    What stands in its place in the tangent was weaker across a slip, by the multiplier; and what counts as no slip
+    between the nodes was longer by it.
+    """
+    tresca = {"law": "tresca", "yield_traction": 1e6}
+    body = {
+        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
+        "material": {"model": "three_dimensional", "youngs_modulus": 2e11, "poisson_ratio": 0.3},
+    }
+    loads = {
+        "press": {"on": "top", "traction": [0.0, 0.0, -2e6]},
+        "push": {"on": "right", "traction": [-8e5, 2e5, 0.0]},
+    }
+    plain, multiplied = (
+        solved(body | {"boundary": loads | {"floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law}}})
+        for law in (tresca, tresca | {"length_multiplier": multiplier})
+    )
+    assert estimated(multiplied).relative == pytest.approx(estimated(plain).relative, rel=1e-9)
+
+
 def test_a_solution_that_p1_holds_has_no_error() -> None:
     found = estimated(solved(model(5)))
     assert found.total < 1e-12 * found.energy_norm

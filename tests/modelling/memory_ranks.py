@@ -8,15 +8,13 @@ from __future__ import annotations
 import gc
 import json
 import os
-import re
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
+from petsc_objects import living
 from scenes import model, quadratic_linear
 
 import hvi_fenicsx as hvi
@@ -24,24 +22,6 @@ import hvi_fenicsx as hvi
 COMM = MPI.COMM_WORLD
 LAW = {"law": "graph", "points": [[0, 0], [1e-5, 3e6], [1e-5, 1e6]]}
 FEW, MORE = 4, 24
-
-
-@contextmanager
-def shared_file() -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as folder:
-        yield Path(COMM.bcast(folder)) / "log"
-        COMM.Barrier()
-
-
-def living() -> int:
-    """The number of PETSc objects of rank 0 that were made and not destroyed."""
-    with shared_file() as file:
-        viewer = PETSc.Viewer().createASCII(str(file), comm=COMM)
-        PETSc.Log.view(viewer)
-        viewer.destroy()
-        COMM.Barrier()
-        told = file.read_text().partition("Object Type")[2] if COMM.rank == 0 else ""
-    return sum(int(made) - int(freed) for made, freed in re.findall(r"(\d+) +(\d+)$", told, re.MULTILINE))
 
 
 def resident() -> float:
@@ -55,7 +35,7 @@ def measured(call: Callable[[], Any]) -> dict[str, list[float]]:
         call()
         if number in (FEW, MORE):
             gc.collect()
-            found["objects"].append(living())
+            found["objects"].append(living(COMM))
             found["memory"].append(resident())
     return found
 

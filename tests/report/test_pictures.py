@@ -51,8 +51,8 @@ from hvi_fenicsx.report.pictures.kinds import (
     stress_plane,
 )
 from hvi_fenicsx.report.pictures.raster import shade, thinned
-from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, save
-from hvi_fenicsx.results import contact_table
+from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, members
+from hvi_fenicsx.results import array_file, contact_table
 from hvi_fenicsx.runtime import processes
 
 Array = npt.NDArray[np.float64]
@@ -114,6 +114,10 @@ def floor(body: mesh.Mesh, value: Callable[[Array], Array]) -> PartArrays:
     normals = np.tile(-np.eye(d)[-1], (len(points), 1))
     facets = facets_on(arrays, low)
     return PartArrays(columns=columns, vertices=vertices, facets=facets, weights=zero, normals=normals, drops=drops)
+
+
+def save(path: Path, arrays: SolutionArrays) -> None:
+    array_file.write(MPI.COMM_SELF, path, members(arrays))
 
 
 def change(folder: Path, **values: Any) -> None:

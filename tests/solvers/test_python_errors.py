@@ -7,7 +7,14 @@ import pytest
 from petsc4py import PETSc
 from scenes import P, model, quadratic_linear, solved
 
+from hvi_fenicsx.preparation import prepare
+from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.scene import Scene
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.closed_start import resting_start
+from hvi_fenicsx.solvers.smooth_method import smooth_models
 from hvi_fenicsx.system.equations import Equations
+from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.petsc_errors import raise_python_error
 
 
@@ -46,3 +53,24 @@ def test_what_a_solve_itself_fails_by_is_no_error_of_a_function(raised: Exceptio
     with pytest.raises(PETSc.Error) as error:
         snes.solve(None, x)
     raise_python_error(error.value)
+
+
+def test_a_solve_that_petsc_gives_up_tells_its_linear_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One Newton step by a factorisation; the second finds no tangent."""
+    system = prepare(Scene.model_validate(model(4, 10 * P, friction=quadratic_linear(3e6), epsilon=0.01))).system
+    tangents, steps = Equations.tangents, 0
+
+    def failing(*arguments: object) -> object:
+        nonlocal steps
+        steps += 1
+        if steps == 2:
+            raise FloatingPointError
+        return tangents(*arguments)  # type: ignore[arg-type]
+
+    solver = ActiveSetSolver(system, (), LinearSettings("lu"), Timer())
+    x, _ = resting_start(solver, [term.law for term in system.terms])
+    monkeypatch.setattr(Equations, "tangents", failing)
+    bounds = {"lower": system.lower, "upper": system.upper}
+    ended = solver.solve(x, smooth_models(system), 1e-14, line_search="basic", **bounds)
+    assert (ended.converged, ended.newton, ended.linear) == (False, 1, 1)
+    assert ended.reason.startswith("PETSc error")

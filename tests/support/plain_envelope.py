@@ -23,6 +23,15 @@ def _rises(a: Arc, b: Arc) -> bool:
     return after >= before - ROUNDING * size
 
 
+def _toucher(arc: Arc, p: float) -> float:
+    """Where a line of slope p supports an arc, which is convex, from below."""
+    if arc.low == arc.high:
+        return arc.low
+    if arc.slope > 0.0:
+        return min(max(arc.anchor + (p - arc.traction) / arc.slope, arc.low), arc.high)
+    return arc.low if p < arc.traction else arc.high
+
+
 @dataclass(slots=True)
 class _Piece:
     """A convex arc of the hull: from where it is touched, and the slope of the chord that leads there."""
@@ -119,7 +128,7 @@ def tangent(a: Arc, b: Arc) -> tuple[float, float, float]:
         if b.low == b.high or _rises(a, b):
             return a.rate(a.high), a.high, b.low
     p = _common_slope(a, b)
-    left, right = a.toucher(p), b.toucher(p)
+    left, right = _toucher(a, p), _toucher(b, p)
     if a.slope == 0.0 and a.high > a.low and p == a.traction:
         left = a.low if math.isfinite(a.low) else a.high
     if right > left:
@@ -144,7 +153,7 @@ def _common_slope(a: Arc, b: Arc) -> float:
 
 def _difference(a: Arc, b: Arc, p: float) -> float:
     """a*(p) - b*(p), a* being the conjugate of a."""
-    x, y = a.toucher(p), b.toucher(p)
+    x, y = _toucher(a, p), _toucher(b, p)
     if not math.isfinite(x):
         return INF
     if not math.isfinite(y):
@@ -155,7 +164,7 @@ def _difference(a: Arc, b: Arc, p: float) -> float:
 def _root(a: Arc, b: Arc, lo: float, hi: float) -> float:
     """The root of a*(p) - b*(p) in a range of p where both touching points move along one formula."""
     middle = 0.5 * (lo + hi)
-    x, y = a.toucher(middle), b.toucher(middle)
+    x, y = _toucher(a, middle), _toucher(b, middle)
     free_a, free_b = a.low < x < a.high and a.slope > 0.0, b.low < y < b.high and b.slope > 0.0
     # a*(p) = p anchor - value + (p - traction)²/(2 slope) where the point is free; p x - value(x) where it is an end
     square = (0.5 / a.slope if free_a else 0.0) - (0.5 / b.slope if free_b else 0.0)

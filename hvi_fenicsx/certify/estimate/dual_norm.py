@@ -136,7 +136,7 @@ def _rising(comm: MPI.Comm, term: LawTerm, u: Array, thresholds: Thresholds) -> 
     second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
     if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
         second = np.full_like(second, thresholds.foundation)
-        return term.rate(u, second * argument, second * term.stretch)
+        return term.rate(u, second * argument * term.stretch, second * term.stretch)
     secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second
     return term.rate(u, secant, second)
 

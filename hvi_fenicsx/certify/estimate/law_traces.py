@@ -182,7 +182,8 @@ class LawTraces:
         """
         solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
         k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
-        traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), self.thresholds.near)
+        near = np.asarray(self.thresholds.near / solved.stretch, dtype=np.float64).ravel()
+        traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), near)
         return LawTrace(solved.points, solved.nodal, solved.multiplier * traction.reshape(slip.shape))
 
     def _asked(self, state: ContactState, law: LawState, error: ErrorField | None) -> tuple[Superpotential, Array]:
