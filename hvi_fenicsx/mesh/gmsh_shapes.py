@@ -18,9 +18,9 @@ from .domain import Domain
 
 _BODY = "body"
 _EXTENT = 1.6
-"""Of each outline as gmsh meshes it."""
+"""The extent at which gmsh meshes each outline."""
 _DIGITS = 13
-"""Decimals of the lengths that gmsh is given: what is rounding in them depends on the units."""
+"""Decimals of the lengths that gmsh is given; what is rounding in them depends on the units."""
 
 
 def build(comm: MPI.Comm, outline: Outline, size: float) -> Domain:
