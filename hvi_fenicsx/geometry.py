@@ -101,10 +101,29 @@ class Outline:
         return (max(x) - min(x)) * (max(y) - min(y))
 
     @property
+    def extent(self) -> float:
+        """The longer edge of the box around the corners, m."""
+        return max(max(along) - min(along) for along in zip(*self.points, strict=True))
+
+    @property
     def area(self) -> float:
         """Area within, m²."""
         ends = zip(self.points, [*self.points[1:], self.points[0]], self.sides, strict=True)
         return sum(_swept(p, q, centre) for p, q, (_, centre) in ends)
+
+    def in_units(self, unit: float, digits: int) -> Outline:
+        """The outline with its lengths in units of one of them, rounded.
+
+        Args:
+            unit: m.
+            digits: decimals of the lengths.
+        """
+
+        def at(p: Point) -> Point:
+            return round(p[0] / unit, digits), round(p[1] / unit, digits)
+
+        sides = [(name, None if centre is None else at(centre)) for name, centre in self.sides]
+        return Outline([at(p) for p in self.points], sides, [round(size / unit, digits) for size in self.sizes])
 
     def arcs(self) -> dict[str, Arc]:
         """The curved sides by name."""

@@ -161,6 +161,7 @@ class Effect(BaseModel):
         bounds_normal: whether it bounds the normal displacement, as contact does.
         in_files: whether its key may stand in scene files.
         on_interfaces: whether it may act between two bodies, on their relative displacement.
+        is_sum: whether it is a load that is stated as a sum over its part; it then says how it is spread.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, arbitrary_types_allowed=True)
@@ -174,6 +175,7 @@ class Effect(BaseModel):
     bounds_normal: ClassVar[bool] = False
     in_files: ClassVar[bool] = True
     on_interfaces: ClassVar[bool] = False
+    is_sum: ClassVar[bool] = False
     registry: ClassVar[dict[Place, dict[str, type[Effect]]]] = {place: {} for place in Place}
 
     @classmethod
@@ -247,6 +249,15 @@ class Effect(BaseModel):
     def surface_load(self) -> SurfaceLoad | None:
         """The load that it puts on its part, for pictures; None: none that has a formula."""
         return None
+
+    def spread_at(self, moments: SideMoments, points: Array) -> Array:
+        """The tractions (N/m²) by which a sum is spread over its part, at points of it, (n, d).
+
+        Args:
+            moments: of the part.
+            points: m, (n, 3).
+        """
+        raise NotImplementedError
 
     def files(self) -> tuple[Path, ...]:
         """The files that it reads."""

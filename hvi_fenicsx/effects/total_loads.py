@@ -11,7 +11,7 @@ from typing_extensions import override
 from ..errors import InputError
 from ..schema import refusal
 from ..typing import Array
-from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad, part_of
+from .base import Drive, Evaluate, FormContext, Place, SideMoments, Sizes, SurfaceLoad, part_of
 from .contribution import Contribution
 from .plain_values import Listed, OneValue
 
@@ -49,6 +49,7 @@ class _Total(Listed):
 
     place: ClassVar[Place] = Place.BOUNDARY
     drive: ClassVar[Drive] = Drive.LOAD
+    is_sum: ClassVar[bool] = True
 
     values: tuple[float, ...]
 
@@ -82,6 +83,11 @@ class TotalForce(_Total):
         scale = context.side_moments(part).area * context.stress
         mean = ufl.as_vector([context.number(force / scale) for force in self.values])
         return Contribution(linear=(ufl.inner(mean, context.test) * context.facets(part),))
+
+    @override
+    def spread_at(self, moments: SideMoments, points: Array) -> Array:
+        """The force over the area."""
+        return np.tile(np.array(self.values) / moments.area, (len(points), 1))
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
@@ -118,10 +124,13 @@ class Moment(_Total):
 
         part = part_of(where, self.key)
         moments = context.side_moments(part)
-        rate = _rotation(moments.second, self.values, part) / context.stress
+        rate, met = _rotation(moments.second, self.values)
+        if not met:
+            text = "the part has no extent across the moment's axis; take a wider part"
+            raise InputError(f"boundary.{part}.moment: {text}")
         x = ufl.SpatialCoordinate(context.test.ufl_function_space().mesh)
         r = [x[i] - context.number(c) for i, c in enumerate(moments.centroid)]
-        a = [context.number(c) for c in rate]
+        a = [context.number(c / context.stress) for c in rate]
         if context.dimension == 2:
             traction = ufl.as_vector([-a[2] * r[1], a[2] * r[0]])
         else:
@@ -129,17 +138,25 @@ class Moment(_Total):
         return Contribution(linear=(ufl.inner(traction, context.test) * context.facets(part),))
 
     @override
+    def spread_at(self, moments: SideMoments, points: Array) -> Array:
+        """A x r."""
+        d = len(moments.centroid)
+        r = np.pad(points[:, :d] - moments.centroid, ((0, 0), (0, 3 - d)))
+        return np.asarray(np.cross(_rotation(moments.second, self.values)[0], r)[:, :d], dtype=np.float64)
+
+    @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The largest component over the body's length squared, cubed in 3D."""
         return max(map(abs, self.values)) / sizes.length ** (2 if len(self.values) == 1 else 3)
 
 
-def _rotation(second: Array, moment: tuple[float, ...], part: str) -> Array:
-    """A (3,) with ∫ r x (A x r) ds = M, from the second moments ∫ r rᵀ ds, (d, d); a plane part turns about z."""
+def _rotation(second: Array, moment: tuple[float, ...]) -> tuple[Array, bool]:
+    """A (3,) with ∫ r x (A x r) ds = M, from the second moments ∫ r rᵀ ds, (d, d), and whether there is one.
+
+    A plane part turns about z.
+    """
     wide = np.pad(second, (0, 3 - len(second)))
     inertia = np.trace(wide) * np.eye(3) - wide
     wanted = np.array([0.0, 0.0, *moment] if len(moment) == 1 else moment)
     rate = np.asarray(np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ wanted)
-    if not np.allclose(inertia @ rate, wanted, rtol=0.0, atol=1e-9 * np.max(np.abs(wanted))):
-        raise InputError(f"boundary.{part}.moment: the part has no extent across the moment's axis; take a wider part")
-    return rate
+    return rate, bool(np.allclose(inertia @ rate, wanted, rtol=0.0, atol=1e-9 * np.max(np.abs(wanted))))

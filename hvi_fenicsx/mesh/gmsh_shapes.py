@@ -1,4 +1,8 @@
-"""Plane bodies meshed by gmsh on rank 0 within an outline. SI."""
+"""Plane bodies meshed by gmsh on rank 0 within an outline. SI.
+
+Gmsh's mesh depends on the last digits of what it is given. So it meshes each outline at one extent, with rounded
+lengths; then a body has the same mesh in any units of length.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,10 @@ from . import gmsh_arrays, gmsh_model
 from .domain import Domain
 
 _BODY = "body"
+_EXTENT = 1.6
+"""The extent at which gmsh meshes each outline."""
+_DIGITS = 13
+"""Decimals of the lengths that gmsh is given; what is rounding in them depends on the units."""
 
 
 def build(comm: MPI.Comm, outline: Outline, size: float) -> Domain:
@@ -26,9 +34,11 @@ def build(comm: MPI.Comm, outline: Outline, size: float) -> Domain:
     Raises:
         InputError: on all ranks alike, when gmsh cannot mesh the shape.
     """
+    unit = outline.extent / _EXTENT
     with gmsh_model.session(comm) as gmsh:
-        names = on_root(comm, lambda: _meshed(gmsh, outline, size))
+        names = on_root(comm, lambda: _meshed(gmsh, outline.in_units(unit, _DIGITS), round(size / unit, _DIGITS)))
         mesh, sides, _ = gmsh_model.distribute(comm, gmsh and gmsh_arrays.extract(gmsh, 2), 2, names)
+    mesh.geometry.x[:] *= unit
     return Domain.from_mesh(mesh, sides, curves=outline.arcs(), one_piece=True)
 
 

@@ -24,12 +24,18 @@ def of(space: fem.FunctionSpace, facets: Entities) -> SideMoments:
     comm = space.mesh.comm
     if facet_integrals.is_curved(space):
         points, weights, _ = facet_integrals.samples(space, own)
-        return _summed(comm, points.reshape(-1, d), weights.ravel())
+        return of_points(comm, points.reshape(-1, d), weights.ravel())
     return _of_corners(comm, facet_sizes.corners(space.mesh, own))
 
 
-def _summed(comm: Any, points: Array, weights: Array) -> SideMoments:
-    """The moments of weighted points of all ranks. Collective."""
+def of_points(comm: Any, points: Array, weights: Array) -> SideMoments:
+    """The moments of weighted points of all ranks. Collective.
+
+    Args:
+        comm: the ranks.
+        points: m, (p, d).
+        weights: the area that each of them stands for, m² (m in 2D), (p,).
+    """
     area = float(comm.allreduce(float(weights.sum())))
     centroid = comm.allreduce(weights @ points) / area
     r = points - centroid

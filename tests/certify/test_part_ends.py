@@ -1,4 +1,4 @@
-"""A load whose part ends within a facet: the mesh loads another part, and the estimate sees by how much."""
+"""A part that ends within a facet: on the mesh it ends elsewhere, and the estimate sees what that costs."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dolfinx import fem, geometry
 from runs import hvi, summary, write_scene
 from scenes import Table
 
@@ -61,6 +62,109 @@ def test_a_pressure_counts_as_the_traction_that_it_is() -> None:
     assert estimates[0] is not None
     assert estimates[1] is not None
     assert estimates[1].total == pytest.approx(estimates[0].total, rel=1e-6)
+
+
+LEFT: Table = {"on": "left", "displacement": [0.0, "free"]}
+ROLLER: Table = {"on": "bottom", "displacement": ["free", 0.0]}
+PRESS: Table = {"on": "top", "traction": [0.0, -LOAD]}
+PULL: Table = {"on": "right", "traction": [2.0 * LOAD, 0.0]}
+PARTS: dict[str, tuple[Table, Table]] = {
+    "support": ({"on": "bottom", "displacement": [0.0, 0.0]}, {"press": {"on": "top", "traction": [3e5, -LOAD]}}),
+    "contact": ({"on": "bottom", "contact": {"gap": 0.0}}, {"press": PRESS, "left": LEFT}),
+    "friction": (
+        {"on": "bottom", "friction": {"law": "tresca", "yield_traction": 0.5 * LOAD}},
+        {"floor": ROLLER, "pull": PULL, "left": LEFT},
+    ),
+    "spring": (
+        {"on": "bottom", "friction": {"law": "linear_spring", "stiffness": 1e10}},
+        {"floor": ROLLER, "pull": PULL},
+    ),
+    "force": ({"on": "top", "force": [0.0, -LOAD]}, {"base": {"on": "bottom", "displacement": [0.0, 0.0]}}),
+    "moment": ({"on": "top", "moment": LOAD}, {"base": {"on": "bottom", "displacement": [0.0, 0.0]}}),
+}
+"""The part that ends, and the others."""
+
+
+def piece(kind: str, end: float, cells: int, degree: int) -> Table:
+    """A square on which one part is where x is smaller than its end."""
+    part, others = PARTS[kind]
+    return {**square(cells, degree), "boundary": {**others, "part": {**part, "where": f"x < {end}"}}}
+
+
+def difference(coarse: ModelSolution, fine: ModelSolution) -> float:
+    """|||u_h - u||| of solutions on nested meshes, J^½ (J/m in 2D)."""
+    space, mesh = fine.u.function_space, coarse.u.function_space.mesh
+    x = space.tabulate_dof_coordinates()
+    tree = geometry.bb_tree(mesh, mesh.topology.dim)
+    near = geometry.compute_colliding_cells(mesh, geometry.compute_collisions_points(tree, x), x)
+    values = coarse.u.eval(x, np.array([near.links(i)[0] for i in range(len(x))], dtype=np.int32))
+    between = fem.Function(space)
+    between.x.array[:] = (values.ravel() - fine.u.x.array) / fine.problem.scales.displacement
+    return float(np.sqrt(fine.problem.bulk.energy_by_cell(between).sum() * fine.problem.scales.energy))
+
+
+def index(coarse: Table, fine: Table) -> float:
+    """Estimated over true error."""
+    found = solved(coarse)
+    assert found.estimate is not None
+    return found.estimate.total * float(np.sqrt(found.problem.scales.energy)) / difference(found, solved(fine))
+
+
+@pytest.mark.parametrize("end", [0.3, pytest.param(0.35, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kind", PARTS)
+def test_the_estimate_is_near_the_error_of_any_part(kind: str, end: float) -> None:
+    """On 8 x 8 cells the part ends at 0.25 or at 0.375."""
+    assert 0.7 < index(piece(kind, end, 8, 2), piece(kind, end, 40, 2)) < 1.4
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("end", [7 / 24, 10 / 24])
+@pytest.mark.parametrize("kind", ["clamped", "touching", "loaded"])
+def test_the_estimate_is_near_the_error_in_space(kind: str, end: float) -> None:
+    part: Table = {
+        "clamped": {"on": "bottom", "displacement": [0.0, 0.0, 0.0]},
+        "touching": {"on": "bottom", "contact": {"gap": 0.0}},
+        "loaded": {"on": "top", "force": [0.0, 0.0, -LOAD]},
+    }[kind]
+    others: Table = {
+        "clamped": {"press": {"on": "top", "traction": [3e5, 0.0, -LOAD]}},
+        "touching": {
+            "press": {"on": "top", "traction": [0.0, 0.0, -LOAD]},
+            "left": {"on": "left", "displacement": [0.0, "free", "free"]},
+            "front": {"on": "front", "displacement": ["free", 0.0, "free"]},
+        },
+        "loaded": {"base": {"on": "bottom", "displacement": [0.0, 0.0, 0.0]}},
+    }[kind]
+
+    def bar(cells: int) -> Table:
+        return {
+            "domain": {"shape": "box", "size": [1.0, 0.25, 0.5], "cells": [cells, cells // 4, cells // 2]},
+            "material": {"model": "three_dimensional", "youngs_modulus": 1e9, "poisson_ratio": 0.3},
+            "boundary": {**others, "part": {**part, "where": f"x < {end}"}},
+            "solver": {"degree": 2},
+        }
+
+    assert 0.65 < index(bar(8), bar(24)) < 1.4
+
+
+@pytest.mark.parametrize("kind", PARTS)
+def test_a_part_that_ends_at_a_vertex_costs_nothing(kind: str) -> None:
+    """Of 8 x 8 cells the same ones are in both parts."""
+    fitting, cutting = (solved(piece(kind, end, 8, 2)).estimate for end in (0.25, 0.23))
+    assert fitting is not None
+    assert cutting is not None
+    assert fitting.total < cutting.total * (1.0 - 1e-6)
+
+
+@pytest.mark.long
+def test_the_accuracy_of_a_contact_is_that_of_the_scene(tmp_path: Path) -> None:
+    """It ended with an error of 5.9 %."""
+    coarse, fine = (solved(piece("contact", END, cells, 2)).energy for cells in (80, 160))
+    table = piece("contact", END, 4, 2)
+    del table["solver"]
+    done = hvi("run", write_scene(tmp_path / "scene.toml", table), "--accuracy", "0.05", "--out", tmp_path / "r")
+    assert done.returncode == 0
+    assert summary(tmp_path / "r")["energy"] == pytest.approx(2.0 * fine - coarse, rel=0.05**2)
 
 
 @pytest.mark.long

@@ -164,3 +164,27 @@ def test_a_mesh_in_words(file: MeshFile) -> None:
     assert found[:2] == ["48 × 16 cells", "mesh size 50 mm"]
     assert found[2:] == ["file, as it is", "file, refined once", "file, refined 2 times"]
     assert [shape.width() for shape in (SQUARE, ROUND, file)] == [0.0625, 0.05, None]
+
+
+SCALED: dict[str, dict[str, Any]] = {
+    "disk": {"radius": 0.3, "mesh_size": 0.04, "mesh_size_below": 0.01},
+    "half_disk": {"radius": 0.7, "mesh_size": 0.1, "mesh_size_below": 0.02},
+    "l_shape": {"size": [1.0, 0.9], "cut": [0.37, 0.4], "mesh_size": 0.07},
+    "notched_strip": {"size": [0.3, 0.1], "notch": [0.04, 0.03], "mesh_size": 0.01},
+}
+
+
+@pytest.mark.parametrize("factor", [2.0**-10, 1e-3, 1e3, 1 / 3])
+@pytest.mark.parametrize("name", SCALED)
+def test_a_shape_has_the_same_mesh_in_any_units(name: str, factor: float) -> None:
+    def times(value: Any) -> Any:
+        return [factor * v for v in value] if isinstance(value, list) else factor * value
+
+    kind, lengths = DomainShape.registry[name], SCALED[name]
+    one = kind(**lengths).build(MPI.COMM_SELF, 2)
+    other = kind(**{key: times(value) for key, value in lengths.items()}).build(MPI.COMM_SELF, 2)
+    np.testing.assert_array_equal(other.mesh.geometry.dofmap, one.mesh.geometry.dofmap)
+    rounding = 0.0 if factor == 2.0**-10 else 1e-14 * factor * one.length
+    np.testing.assert_allclose(other.mesh.geometry.x, factor * one.mesh.geometry.x, rtol=0.0, atol=rounding)
+    assert one.sides.keys() == other.sides.keys()
+    assert all(np.array_equal(facets, other.sides[side]) for side, facets in one.sides.items())

@@ -95,7 +95,7 @@ def estimate(
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
-    cells += part_ends.squares(problem, traces.bubbles, inverse, thresholds)
+    cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse, thresholds)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.left_tolerance)

@@ -1,71 +1,207 @@
-"""Loads whose part ends within a facet: the mesh loads this facet as a whole, or not at all.
+"""Parts with `where` that end within a facet: the mesh counts this facet as a whole, or not at all.
 
-What is too much there, or too little, is a load of its own. The displacement that it causes is found in u_h's space,
-and counts in the cells at these facets: smaller ones make it smaller, wherever the body gives way.
+A load that is too much there, or too little, is a load of its own, and so is the traction of a law that gives way. The
+displacement that they cause is found in u_h's space, and counts in the cells at these facets: smaller ones make it
+smaller, wherever the body gives way. What holds the body firmly is singular at its end (:mod:`.support_ends`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
 
+from ...effects import SideMoments
 from ...effects.base import SurfaceLoad
-from ...problem import spaces
+from ...mesh.boundary_part import Inequalities
+from ...problem import side_moments, spaces
 from ...problem.problem import Problem
 from ...runtime.mpi import total
 from ...typing import Array, Entities, Mask
+from .. import placed_forces
+from ..certificate import Examination
+from . import support_ends
 from .block_forces import gathered, summed
-from .boundary_data import FacetSamples, sample
 from .dual_norm import DualNorm
+from .facet_modes import FacetModes, facet_modes
 from .thresholds import Thresholds
 
 
-def squares(problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thresholds: Thresholds) -> Array:
-    """η_K² of the owned cells that the ends of loaded parts add. Collective.
+@dataclass(frozen=True)
+class _Piece:
+    """Facets of a side (f of them) that a part has as a whole, or not at all, with q sample points in each.
+
+    Attributes:
+        on: the facets.
+        share: 1 at the sample points that are in the part, else 0, (f, q).
+        meshed: the same as the mesh has it, (f, q).
+    """
+
+    on: FacetModes
+    share: Array
+    meshed: Array
+
+    @property
+    def missing(self) -> Array:
+        """1 at the sample points where the mesh lacks the part, -1 beyond its end, (f, q)."""
+        return np.asarray(self.share - self.meshed)
+
+    @property
+    def sizes(self) -> Array:
+        """What the sample points stand for, over L^(d-1), (f, q)."""
+        return np.asarray(self.on.facets.areas[:, None] * self.on.weights)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part with `where`.
+
+    Attributes:
+        name: of the part.
+        facets: its local facets.
+        beyond: the other local facets of its sides.
+        pieces: both, sampled.
+    """
+
+    name: str
+    facets: Entities
+    beyond: Entities
+    pieces: Sequence[_Piece]
+
+
+_Lacking = tuple[_Piece, Array]
+"""Facets, and the tractions that the mesh lacks at their sample points, nondimensional, (f, q, d)."""
+
+
+def squares(
+    problem: Problem,
+    bubbles: fem.FunctionSpace,
+    u: fem.Function,
+    examination: Examination,
+    inverse: DualNorm,
+    thresholds: Thresholds,
+) -> Array:
+    """η_K² of the owned cells that the ends of parts add. Collective.
 
     Args:
         problem: what was solved.
         bubbles: the space of bubbles.
+        u: the solution, ghosts updated.
+        examination: of the same u.
         inverse: of the system's stiffness.
         thresholds: how finely facets are sampled.
     """
+    cells = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
+    parts = list(_parts(problem, bubbles, thresholds))
+    if not parts:
+        return cells
+    holding = placed_forces.reactions(problem, u, examination.forces, examination.states)
+    lacking: list[_Lacking] = []
+    for part in parts:
+        lacking += [*_loads(problem, part), *_sums(problem, part)]
+        if part.name in holding:
+            held = holding[part.name].at(np.arange(len(examination.forces.reaction), dtype=np.int32))
+            lacking += _held(problem, part, held, examination, cells)
+    return np.asarray(cells + _of_loads(problem, inverse, lacking))
+
+
+def _held(problem: Problem, part: _Part, forces: Array, examination: Examination, cells: Array) -> list[_Lacking]:
+    """Add η_K² of what holds the body firmly on a part; the tractions that the mesh lacks of what gives way there.
+
+    Collective.
+
+    Args:
+        problem: what was solved.
+        part: which one.
+        forces: all that holds the body there, owned blocks (n, d).
+        examination: of the solution.
+        cells: η_K², changed in place.
+    """
+    giving, rates = support_ends.yielding(problem, part.name, examination.states)
+    reaction = examination.forces.reaction
+    firm, soft, rising = (
+        support_ends.at_ends(problem, part.facets, part.beyond, *one)
+        for one in ((forces - giving, reaction), (giving, reaction), (rates, np.zeros_like(rates)))
+    )
+    lacking: list[_Lacking] = []
+    for piece in part.pieces:
+        on, lost = piece.on, support_ends.mean(piece.on, soft)
+        stiff = support_ends.firmness(on, support_ends.mean(on, rising))
+        for tractions in (support_ends.mean(on, firm), np.sqrt(stiff) * lost):
+            np.add.at(cells, on.facets.cells, support_ends.energies(on, piece.missing, tractions))
+        lacking.append((piece, np.asarray(piece.missing[:, :, None] * ((1.0 - stiff) * lost)[:, None])))
+    return lacking
+
+
+def _parts(problem: Problem, bubbles: fem.FunctionSpace, thresholds: Thresholds) -> Iterator[_Part]:
+    """The parts with `where`. Collective."""
+    for name, piece in problem.pieces.items():
+        if piece.where is not None:
+            facets = problem.part_facets[name]
+            beyond = np.setdiff1d(problem.domain.facets(piece.on), facets).astype(np.int32)
+            on = [facet_modes(problem, bubbles, some, thresholds) for some in (facets, beyond)]
+            shares = [_share(one, piece.where) for one in on]
+            meshed = np.ones_like(shares[0]), np.zeros_like(shares[1])
+            yield _Part(name, facets, beyond, [_Piece(*one) for one in zip(on, shares, meshed, strict=True)])
+
+
+def _share(on: FacetModes, where: Inequalities) -> Array:
+    return where.at(on.points.reshape(-1, 3)).reshape(on.points.shape[:2]).astype(np.float64)
+
+
+def _loads(problem: Problem, part: _Part) -> Iterator[_Lacking]:
+    """The tractions that the mesh lacks of the loads on a part."""
+    loads = (effect.surface_load() for where, effect, _ in problem.contributions if where == part.name)
+    for load, piece in itertools.product((load for load in loads if load is not None), part.pieces):
+        there = _tractions(problem, piece.on, load, piece.missing != 0.0)
+        yield piece, np.asarray(piece.missing[:, :, None] * there)
+
+
+def _sums(problem: Problem, part: _Part) -> Iterator[_Lacking]:
+    """The same of sums over a part: spread over more than it, they are less everywhere. Collective."""
+    spread = [effect for where, effect, _ in problem.contributions if where == part.name and effect.is_sum]
+    if not spread:
+        return
+    true, meshed = _moments(problem, part, "share"), _moments(problem, part, "meshed")
+    for effect in spread:
+        for piece in part.pieces:
+            at, shape = piece.on.points.reshape(-1, 3), (*piece.share.shape, problem.scales.dimension)
+            wanted, given = (effect.spread_at(moments, at).reshape(shape) for moments in (true, meshed))
+            lacking = piece.share[:, :, None] * wanted - piece.meshed[:, :, None] * given
+            yield piece, np.asarray(lacking / problem.scales.stress)
+
+
+def _moments(problem: Problem, part: _Part, which: str) -> SideMoments:
+    """Area, centroid and second moments of the part, in truth (``share``) or as ``meshed``. Collective."""
+    d = problem.scales.dimension
+    points = np.concatenate([piece.on.points.reshape(-1, 3)[:, :d] for piece in part.pieces])
+    sizes = np.concatenate([(piece.sizes * getattr(piece, which)).ravel() for piece in part.pieces])
+    return side_moments.of_points(problem.domain.mesh.comm, points, sizes * problem.scales.length ** (d - 1))
+
+
+def _of_loads(problem: Problem, inverse: DualNorm, lacking: Sequence[_Lacking]) -> Array:
+    """η_K² of the owned cells that lacking tractions add. Collective."""
     d = problem.scales.dimension
     cells = np.zeros(problem.domain.mesh.topology.index_map(d).size_local)
     forces: list[tuple[Entities, Array]] = []
-    for on, missing in _missing(problem, bubbles, thresholds):
-        functions = spaces.simplex_functions(on.facets.degree, on.barycentric, spaces.edge_share(problem.space))
-        weighted = on.facets.areas[:, None, None] * on.weights[:, None] * missing
-        forces.append((on.facets.nodes.ravel(), np.einsum("fqd,qn->fnd", weighted, functions).reshape(-1, d)))
-        np.add.at(cells, on.facets.cells, np.sum(np.abs(weighted), axis=(1, 2)) ** 2)
+    for piece, tractions in lacking:
+        facets = piece.on.facets
+        functions = spaces.simplex_functions(facets.degree, piece.on.barycentric, spaces.edge_share(problem.space))
+        weighted = piece.sizes[:, :, None] * tractions
+        forces.append((facets.nodes.ravel(), np.einsum("fqd,qn->fnd", weighted, functions).reshape(-1, d)))
+        np.add.at(cells, facets.cells, np.sum(np.abs(weighted), axis=(1, 2)) ** 2)
     whole = total(problem.domain.mesh.comm, float(cells.sum()))
     if whole == 0.0:
         return cells
-    lacking = gathered(problem.space, summed(forces, d)).everywhere(problem.space.dofmap.index_map.size_local)
-    _, norm = inverse.solve(problem.combined(lacking))
-    return np.asarray(norm**2 * cells / whole)
+    missing = gathered(problem.space, summed(forces, d)).everywhere(problem.space.dofmap.index_map.size_local)
+    energy = problem.bulk.energy_by_cell(inverse.solve(problem.combined(missing))[0])
+    return np.asarray(total(problem.domain.mesh.comm, float(energy.sum())) * cells / whole)
 
 
-def _missing(
-    problem: Problem, bubbles: fem.FunctionSpace, thresholds: Thresholds
-) -> Iterator[tuple[FacetSamples, Array]]:
-    """Facets of each side of which a piece is loaded, and the traction that they lack, nondimensional, (f, q, d).
-
-    The others lack the load where they reach into the piece; those that the mesh loads have too much of it beyond.
-    """
-    for where, effect, _ in problem.contributions:
-        load, piece = effect.surface_load(), problem.pieces.get(where or "")
-        if where is None or load is None or piece is None or piece.where is None:
-            continue
-        loaded = problem.part_facets[where]
-        for facets, given in ((loaded, 1.0), (np.setdiff1d(problem.domain.facets(piece.on), loaded), 0.0)):
-            on = sample(problem, bubbles, facets, thresholds)
-            share = piece.where.at(on.points.reshape(-1, 3)).reshape(on.points.shape[:2]) - given
-            yield on, share[:, :, None] * _tractions(problem, on, load, share != 0.0)
-
-
-def _tractions(problem: Problem, on: FacetSamples, load: SurfaceLoad, where: Mask) -> Array:
+def _tractions(problem: Problem, on: FacetModes, load: SurfaceLoad, where: Mask) -> Array:
     """A load, as far as it is known between nodes, at chosen ones of the sample points, nondimensional, (f, q, d)."""
     found = np.zeros((*where.shape, problem.scales.dimension))
     for axis, value in enumerate(load.components):
@@ -77,7 +213,7 @@ def _tractions(problem: Problem, on: FacetSamples, load: SurfaceLoad, where: Mas
     return np.asarray(found / problem.scales.stress)
 
 
-def _outward(problem: Problem, on: FacetSamples) -> Array:
+def _outward(problem: Problem, on: FacetModes) -> Array:
     """The outward unit normals of facets, (f, d)."""
     corners, d = on.corners[:, :, : problem.scales.dimension], problem.scales.dimension
     sides = corners[:, 1:] - corners[:, :1]
