@@ -164,7 +164,7 @@ class ExactFollower(Follower):
 
     def _orient(self, aim: float) -> None:
         wanted = np.sign(aim - self.tracer.factor)
-        if not self._is_under_way() and self.tracer.factor_rate * wanted < 0.0:
+        if not self._is_under_way() and (self.tracer.trend or self.tracer.factor_rate) * wanted < 0.0:
             self.tracer.turn()
 
     @override

@@ -41,7 +41,7 @@ class Follower(ABC):
         self._problem, self._options = problem, options
         self._resume, self._watcher = resume, watch or Watch()
         self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
-        self._floats = problem.elastic.is_singular(np.ones(problem.size, dtype=bool), np.zeros(problem.size))
+        self._floats = len(problem.elastic.rigid) > 0
         self._adrift = False
         self.end: End | None = None
         self.reason, self.is_closed = "", False

@@ -61,6 +61,7 @@ class Equations:
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
         values = sites.values(z)
+        self._pins = np.zeros_like(z)
         left = (sites.stiffness @ values.x + values.force - constant - factor * rate) / sites.forces
         self.here = Place(y=y, tangent=np.zeros_like(y), values=values, left=left)
         self._factors: Bordered | None = None
@@ -106,8 +107,8 @@ class Equations:
 
     def _factorise(self, values: Values, row: Array) -> Bordered:
         n = len(values.x)
-        matrix = np.empty((n + 1, n + 1), order="F")
-        matrix[:n, :n] = self.sites.jacobian(values) / self.sites.forces[:, None]
+        matrix, self._pins = np.empty((n + 1, n + 1), order="F"), self.sites.pins(values, self._rate)
+        matrix[:n, :n] = self.sites.jacobian(values, self._pins) / self.sites.forces[:, None]
         matrix[:n, n] = -self.unit * self._rate / self.sites.forces
         matrix[n] = row
         self._factors = None
@@ -119,7 +120,8 @@ class Equations:
         sites, moved, risen = self.sites, self.sites.moved(values), self.sites.risen(values)
 
         def change(direction: Array) -> Array:
-            found = sites.stiffness @ (moved @ direction[:-1])
+            way = moved @ direction[:-1]
+            found = sites.stiffness @ way + self._pins * way
             found += risen @ direction[:-1] - direction[-1] * self.unit * self._rate
             return np.asarray(found / sites.forces)
 
@@ -257,8 +259,8 @@ class Equations:
         last = self._factor_row
         return lambda y: float(y[-1]) - aim / self.unit, lambda y: last
 
-    def place(self, y: Array, tangent: Array, passed: int | None = None) -> None:
-        """Go to a point, where sites may be on other segments than before.
+    def place(self, y: Array, tangent: Array, passed: int | None = None) -> bool:
+        """Go to a point, where sites may be on other segments than before; whether what was pinned there is so still.
 
         Args:
             y: coordinates and factor, (n + 1,).
@@ -266,8 +268,10 @@ class Equations:
             passed: the only site that is; None: any site may be.
         """
         self.here = self._at_place(y, tangent, self.sites.values(y[:-1]))
-        if self._factors is not None and (passed is None or not self._exchanged(self._factors, passed)):
+        same = np.array_equal(self.sites.pins(self.here.values, self._rate), self._pins)
+        if self._factors is not None and (passed is None or not same or not self._exchanged(self._factors, passed)):
             self._factors = None
+        return same
 
     def _exchanged(self, factors: Bordered, k: int) -> bool:
         """Exchange the columns of a site in the factors; whether that went well."""
@@ -293,12 +297,15 @@ class Equations:
         self.here = replace(self.here, tangent=self.tangent(self.here.values, row, sign))
 
     def set_out(self, sign: float = 1.0) -> None:
-        """Set out from the present point in the direction in which the factor grows.
+        """Set out from the present point where the load takes the body as the factor grows.
 
         Args:
-            sign: -1: in which it falls.
+            sign: -1: as it falls.
 
         Raises:
-            numpy.linalg.LinAlgError: the factor stands along the curve.
+            numpy.linalg.LinAlgError: the factor stands along the curve, and no rigid motion is free.
         """
-        self.head(self._factor_row, sign)
+        values = self.here.values
+        driven = self.sites.unresisted(values, self._rate).driven
+        along = np.append(self.sites.moved(values).sparse.T @ driven, 0.0)
+        self.head(along if np.any(driven) else self._factor_row, sign)

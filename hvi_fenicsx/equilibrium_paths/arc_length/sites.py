@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 
 from ...system.spectrum import negative_directions
 from ...typing import Array, Mask
+from ..neutral import Unresisted, unresisted
 from .blocks import Blocks
 from .site_graphs import SiteGraphs
 
@@ -192,13 +193,40 @@ class Sites(SiteGraphs):
             right=(rates[p] - across)[owner] * e,
         )
 
-    def jacobian(self, values: Values) -> Array:
+    def unresisted(self, values: Values, rate: Array) -> Unresisted:
+        """The rigid motions that nothing resists; none while something else holds the body back.
+
+        A length whose traction vanishes resists its own turning less and less: that is nothing before it is rounding.
+
+        Args:
+            values: at the point.
+            rate: the load that grows, (n,).
+        """
+        elastic = self.stiffness is self._problem.stiffness
+        rigid = self.rigid if elastic else np.empty((0, len(self.forces)))
+        none = self.thresholds.curve.unresisted * float(np.max(self.forces, initial=0.0)) / self.length
+        resists = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
+        return unresisted(rigid, (self._axes(values.directions).sparse[resists] @ rigid.T).T, rate)
+
+    def pins(self, values: Values, rate: Array) -> Array:
+        """The springs that pin the motions which nothing resists and no load drives, by unknown, (n,).
+
+        Args:
+            values: at the point.
+            rate: the load that grows, (n,).
+        """
+        found, pinned = np.zeros(len(self.forces)), self.unresisted(values, rate).pins
+        found[pinned] = self.forces[pinned] / self.length
+        return found
+
+    def jacobian(self, values: Values, pins: Array) -> Array:
         """The derivative of S x + r by the coordinates, (n, n).
 
         Args:
             values: at the point.
+            pins: springs beside S, by unknown, (n,).
         """
-        moved = self.moved(values).sparse @ self.stiffness
+        moved = self.moved(values).sparse @ (self.stiffness + np.diag(pins))
         return np.asarray(moved.T + self.risen(values).sparse.toarray())  # S and the first blocks are symmetric
 
     def along(self, values: Values, motion: Array) -> Array:

@@ -1,0 +1,80 @@
+"""Rigid motions that nothing resists in a cell: neither elasticity nor laws and bounds.
+
+Where the load that grows works on such a motion, it drives the body along it at once, until something resists. Where it
+does not, as on a body that rolls, or that contact alone holds and that may slide, the body is in equilibrium all along
+the motion, with the same energy and the same forces. The equations of the cell are then singular. They become regular
+with a spring at one unknown for each motion: the body stays where it has come to, and the springs carry nothing, so
+that the solution is one without them. They belong to one cell: in the next one something else may resist.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..typing import Array, Integers
+
+_NONE = 1e-9
+"""A part of a motion, or of the loads' work on it, that is none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unresisted:
+    """The rigid motions that nothing resists.
+
+    Attributes:
+        motions: orthonormal rows, (k, n).
+        rate: the load that grows, (n,).
+    """
+
+    motions: Array
+    rate: Array
+
+    @property
+    def _works(self) -> Array:
+        """Of the load on the motions, (k,); 0 where they are none."""
+        works = self.motions @ self.rate
+        none = _NONE * float(np.linalg.norm(self.rate))
+        return np.asarray(np.where(np.linalg.norm(works) > none, works, 0.0))
+
+    @cached_property
+    def driven(self) -> Array:
+        """The motion along which the load drives the body, (n,); 0 where it drives it along none."""
+        return np.asarray(self._works @ self.motions)
+
+    @cached_property
+    def pins(self) -> Integers:
+        """Unknowns to hold, one for each motion along which no load drives the body."""
+        return _pins(_without(self.motions, self._works[:, None], 0.0))
+
+
+def unresisted(rigid: Array, resisted: Array, rate: Array) -> Unresisted:
+    """The rigid motions that nothing resists.
+
+    Args:
+        rigid: the displacements that elasticity does not resist, as orthonormal rows, (k, n).
+        resisted: their parts where laws or bounds resist, (k, m).
+        rate: the load that grows, (n,).
+    """
+    return Unresisted(motions=_without(rigid, resisted, _NONE), rate=rate)
+
+
+def _without(motions: Array, parts: Array, none: float) -> Array:
+    """The combinations of motions whose parts are none."""
+    if not len(motions) or not parts.size:
+        return motions
+    left, values, _ = np.linalg.svd(parts)
+    return np.asarray(left[:, np.count_nonzero(values > none) :].T @ motions)
+
+
+def _pins(motions: Array) -> Integers:
+    """Unknowns at which the motions are far from dependent: always that of the largest remaining row."""
+    rows, found = motions.T.copy(), np.zeros(len(motions), dtype=np.int64)
+    for k in range(len(motions)):
+        sizes = np.linalg.norm(rows, axis=1)
+        found[k] = np.argmax(sizes)
+        way = rows[found[k]] / sizes[found[k]]
+        rows -= np.outer(rows @ way, way)
+    return found
