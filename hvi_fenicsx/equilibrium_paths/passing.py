@@ -73,8 +73,8 @@ def go_on(tracer: Tracer, bonds: BondTable, step: Step) -> Passing:
 def _turn_back(tracer: Tracer, bonds: BondTable, i: int, *, forward: bool) -> None:
     """On to the secant of where the bonds have been."""
     cells = tracer.cells
-    x, force = float(cells.x[i]), float(cells.bond_force[i])
-    bonds.remember(i, x, force)
+    force = float(cells.bond_force[i])
+    x = bonds.remember(i, float(cells.x[i]), force)
     chain = bonds.chain(i)
     number = piece_at(chain, x, bonds.thresholds.at_end, forward=forward)
     tracer.enter(i, number, chain[number].coordinate(x, force), chain)

@@ -204,7 +204,8 @@ class Certifier:
         for vector in (reaction, spread):
             vector.destroy()
         size = max(self._norm(f) for f in (forces.load, forces.reaction))
-        size = max(size, self._whole_load if self._is_unloaded(state) else 0.0) or 1.0
+        nothing = self._is_unloaded(state) or size <= self._tolerance * self._whole_load
+        size = max(size, self._whole_load if nothing else 0.0) or 1.0
         problem = self._factored.at(state.factor)
         return left <= self._tolerance * size or self._is_rounding(left / size, problem, u, forces, given, size)
 

@@ -219,14 +219,14 @@ class Sites(SiteGraphs):
         found[pinned] = self.forces[pinned] / self.length
         return found
 
-    def jacobian(self, values: Values, pins: Array) -> Array:
+    def jacobian(self, values: Values, pins: Array | None = None) -> Array:
         """The derivative of S x + r by the coordinates, (n, n).
 
         Args:
             values: at the point.
-            pins: springs beside S, by unknown, (n,).
+            pins: springs beside S, by unknown, (n,); None for none.
         """
-        moved = self.moved(values).sparse @ (self.stiffness + np.diag(pins))
+        moved = self.moved(values).sparse @ (self.stiffness if pins is None else self.stiffness + np.diag(pins))
         return np.asarray(moved.T + self.risen(values).sparse.toarray())  # S and the first blocks are symmetric
 
     def along(self, values: Values, motion: Array) -> Array:
