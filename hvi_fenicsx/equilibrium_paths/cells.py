@@ -12,7 +12,7 @@ import numpy as np
 from ..system.condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
 from ..system.spectrum import ZERO
 from ..typing import Array, Integers, Mask
-from .neutral import Unresisted, unresisted
+from .neutral import Unresisted, are_same, pins, unresisted
 from .segments import Kind, Segment
 
 
@@ -34,7 +34,8 @@ class Cells:
         high: greatest coordinates, (n,).
         outward: directions in which bonds with memory go on, (n,).
         bound: whether the unknown is at a bound, (n,).
-        pins: springs that carry nothing, at unknowns of rigid motions that nothing resists, (n,).
+        held: rigid motions that nothing resists and no load drives, as orthonormal rows, (d, n).
+        pins: springs that hold them and carry nothing, by unknown, (n,).
     """
 
     def __init__(
@@ -49,7 +50,7 @@ class Cells:
         self._x, self._force = np.zeros(n), np.zeros(n)
         self.slope, self.rise, self.low, self.high = (np.zeros(n) for _ in range(4))
         self.outward, self.bound = np.zeros(n), np.zeros(n, dtype=bool)
-        self.pins = np.zeros(n)
+        self.held, self.pins = np.empty((0, n)), np.zeros(n)
         for i in range(n):
             self.enter(i, int(numbers[i]), float(coordinates[i]))
 
@@ -146,19 +147,24 @@ class Cells:
         Args:
             rate: the load that grows, (n,).
         """
+        if not len(self._stiffness.rigid):
+            return Unresisted.none(rate)
         rigid, stiffest = self._stiffness.rigid, float(np.max(self._stiffness.diagonal, initial=0.0))
         resists = ~self.moving | (np.abs(self.slope) > ZERO * stiffest)
         return unresisted(rigid, rigid[:, resists], rate)
 
-    def pin(self, rate: Array) -> bool:
-        """Pin the motions that nothing resists and no load drives; whether that changes the equations.
+    def hold(self, rate: Array) -> bool:
+        """Hold the motions that nothing resists and no load drives; whether they are others than before.
 
         Args:
             rate: the load that grows, (n,).
         """
-        before, self.pins = self.pins, np.zeros(len(self))
-        self.pins[self.unresisted(rate).pins] = float(np.max(self._stiffness.diagonal, initial=0.0)) or 1.0
-        return not np.array_equal(self.pins, before)
+        held = self.unresisted(rate).held
+        if are_same(held, self.held):
+            return False
+        self.held, self.pins = held, np.zeros(len(self))
+        self.pins[pins(held)] = float(np.max(self._stiffness.diagonal, initial=0.0)) or 1.0
+        return True
 
     def columns(self, driver: int | None, factor: Array) -> CellColumns:
         """The columns of the cell's equations.

@@ -3,14 +3,15 @@
 Where the load that grows works on such a motion, it drives the body along it at once, until something resists. Where it
 does not, as on a body that rolls, or that contact alone holds and that may slide, the body is in equilibrium all along
 the motion, with the same energy and the same forces. The equations of the cell are then singular. They become regular
-with a spring at one unknown for each motion: the body stays where it has come to, and the springs carry nothing, so
-that the solution is one without them. They belong to one cell: in the next one something else may resist.
+with springs against the motions: the body stays where it has come to along them, and the springs carry nothing, so that
+the solution is one without them. They belong to one cell: in the next one something else may resist.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from ..typing import Array, Integers
 
 _NONE = 1e-9
 """A part of a motion, or of the loads' work on it, that is none."""
+
+_SAME = 1e-6
+"""A difference of motions that is none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +36,16 @@ class Unresisted:
     motions: Array
     rate: Array
 
+    @classmethod
+    def none(cls, rate: Array) -> Self:
+        """There are none."""
+        return cls(motions=np.empty((0, len(rate))), rate=rate)
+
+    @property
+    def balanced(self) -> Array:
+        """The part of the load that works on none of the motions, (n,)."""
+        return np.asarray(self.rate - (self.motions @ self.rate) @ self.motions)
+
     @property
     def _works(self) -> Array:
         """Of the load on the motions, (k,); 0 where they are none."""
@@ -45,9 +59,9 @@ class Unresisted:
         return np.asarray(self._works @ self.motions)
 
     @cached_property
-    def pins(self) -> Integers:
-        """Unknowns to hold, one for each motion along which no load drives the body."""
-        return _pins(_without(self.motions, self._works[:, None], 0.0))
+    def held(self) -> Array:
+        """The motions along which no load drives the body, as orthonormal rows, (d, n)."""
+        return _without(self.motions, self._works[:, None], 0.0)
 
 
 def unresisted(rigid: Array, resisted: Array, rate: Array) -> Unresisted:
@@ -69,8 +83,24 @@ def _without(motions: Array, parts: Array, none: float) -> Array:
     return np.asarray(left[:, np.count_nonzero(values > none) :].T @ motions)
 
 
-def _pins(motions: Array) -> Integers:
-    """Unknowns at which the motions are far from dependent: always that of the largest remaining row."""
+def are_same(motions: Array, others: Array) -> bool:
+    """Whether combinations of some motions are those of others.
+
+    Args:
+        motions: orthonormal rows, (d, n).
+        others: likewise.
+    """
+    if len(motions) != len(others):
+        return False
+    return bool(np.max(np.abs(others - (others @ motions.T) @ motions), initial=0.0) <= _SAME)
+
+
+def pins(motions: Array) -> Integers:
+    """Unknowns, one for each motion: where they are held, none is left. Always that of the largest remaining row.
+
+    Args:
+        motions: orthonormal rows, (d, n).
+    """
     rows, found = motions.T.copy(), np.zeros(len(motions), dtype=np.int64)
     for k in range(len(motions)):
         sizes = np.linalg.norm(rows, axis=1)

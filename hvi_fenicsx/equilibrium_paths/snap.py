@@ -56,7 +56,8 @@ def snap(
         inverse = path.inverse() or cells.inverse()
     except np.linalg.LinAlgError:
         return None
-    for restraint in _restraints(bonds, cells, inverse, moved, direction):
+    for tried in _restraints(bonds, cells, inverse, moved, direction):
+        restraint = cells.unresisted(tried).balanced
         held = _held_back(bonds, load, cells, restraint, inverse)
         if held is None or held.rates[moved] * direction <= 0.0:
             continue

@@ -74,7 +74,7 @@ class Tracer:
         self._perturb()
         if small is not None:
             self.small = np.array(small)
-        cells.pin(rate)
+        cells.hold(rate)
         self.trend = 0
         if driver == FACTOR:
             driver = self._setting_out()
@@ -120,7 +120,8 @@ class Tracer:
         else:
             self.factor_rate = float(rates[self.driver])
             rates[self.driver] = self.heading
-        self.rates: Array = rates
+        held = self.cells.held
+        self.rates: Array = rates - held.T @ (held @ rates)
         self.stands = self._factor_stands()
         if not self.stands:
             self.trend = int(np.sign(self.factor_rate))
@@ -253,7 +254,7 @@ class Tracer:
             self.cells.enter(i, number, coordinate)
         else:
             self.cells.replace_chain(i, chain, number, coordinate)
-        if self.cells.pin(self._rate):
+        if self.cells.hold(self._rate):
             self._set_out()
         else:
             self.heading = self._heading_on(i, direction)
@@ -262,7 +263,7 @@ class Tracer:
         self.refine()
 
     def _set_out(self) -> None:
-        """Set out anew with the factor, as it went: other motions are pinned."""
+        """Set out anew with the factor, as it went: other motions are held."""
         self.heading = self.trend or 1
         self._basis = Basis(self._stiffness, self._rate, self.cells, self._setting_out(), None, self._thresholds)
 

@@ -24,10 +24,8 @@ from typing_extensions import override
 from ..typing import Array, Integers, Mask
 from . import spectrum
 
-_SHIFT = 1e-8
-"""Of an inverse iteration, beside the largest diagonal entry."""
-_ROUNDS = 3
-"""Of an inverse iteration: each leaves of what is stiff about the shift over its stiffness."""
+_ROUNDS = 4
+"""Of an inverse iteration: each leaves of what is stiff the shift over its stiffness."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +143,7 @@ class CondensedStiffness(ABC):
         count = self.negative_directions(np.ones(n, dtype=bool), none, -spectrum.ZERO)
         found = np.eye(n, count)
         if 0 < count < n:
-            shifted = self.raised(_SHIFT * float(np.max(diagonal)))
+            shifted = self.raised(spectrum.ZERO * float(np.max(diagonal)))
             inverse = shifted.inverse(CellColumns(slope=none, rise=none, driver=None, factor=none))
             found = np.random.default_rng(0).standard_normal((n, count))
             for _ in range(_ROUNDS):

@@ -206,6 +206,24 @@ def test_a_body_falls_on_a_point_on_which_it_rocks(
     assert states[-1].dissipated == pytest.approx(2.0 * area if remember else 0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("remember", [(), (0,)])
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_bar_whose_bond_on_a_length_fades_may_turn_about_its_other_end(angle: float, remember: Sequence[int]) -> None:
+    """By hand: a bar of stiffness 1, stretched by λ; the weaker end slides from λ = 0.1 on, and is free from 0.4 on.
+
+    Across its way the bond resists by its traction over its length, and so by nothing at last.
+    """
+    along = np.array([np.cos(angle), np.sin(angle)])
+    stretch = np.r_[along, -along]
+    law = lengths(graph([(0, 0), (0, 0.1), (0.4, 0)]), 2, weights=[1.0, 2.0])
+    follower, states = path(problem(np.outer(stretch, stretch), stretch, law), programme=(1.0,), remember=remember)
+    assert follower.end is End.REACHED
+    for state in states:
+        moved = min(max((state.factor - 0.1) / 0.75, 0.0), 0.4) if state.factor < 0.4 else state.factor
+        np.testing.assert_allclose(state.x, np.r_[moved * along, 0.0, 0.0], atol=1e-8)
+    assert states[-1].energy == pytest.approx(-0.5 + (0.0 if remember else 0.02), abs=1e-9)
+
+
 @pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
 @pytest.mark.parametrize(("aim", "wanted"), [(0.5, (-1.5, -2.0)), (2.0, (-2.0, -2.0)), (-0.5, (3.0, 2.5))])
 def test_loads_in_balance_leave_a_body_free_until_another_presses_it_down(

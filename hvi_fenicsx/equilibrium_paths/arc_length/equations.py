@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...typing import Array
+from ..neutral import are_same
 from .bordered import Bordered
 from .sites import Sites, Values
 
@@ -61,7 +62,7 @@ class Equations:
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
         values = sites.values(z)
-        self._pins = np.zeros_like(z)
+        self._held = np.empty((0, len(z)))
         left = (sites.stiffness @ values.x + values.force - constant - factor * rate) / sites.forces
         self.here = Place(y=y, tangent=np.zeros_like(y), values=values, left=left)
         self._factors: Bordered | None = None
@@ -107,21 +108,26 @@ class Equations:
 
     def _factorise(self, values: Values, row: Array) -> Bordered:
         n = len(values.x)
-        matrix, self._pins = np.empty((n + 1, n + 1), order="F"), self.sites.pins(values, self._rate)
-        matrix[:n, :n] = self.sites.jacobian(values, self._pins) / self.sites.forces[:, None]
+        matrix, self._held = np.empty((n + 1, n + 1), order="F"), self._resting(values)
+        matrix[:n, :n] = self.sites.jacobian(values, self._held) / self.sites.forces[:, None]
         matrix[:n, n] = -self.unit * self._rate / self.sites.forces
         matrix[n] = row
         self._factors = None
         self._factors = Bordered(matrix, self.limits)
         return self._factors
 
+    def _resting(self, values: Values) -> Array:
+        """The motions that nothing resists and no load drives: springs hold them, and carry nothing, (d, n)."""
+        return self.sites.unresisted(values, self._rate).held
+
     def _changes(self, values: Values) -> Callable[[Array], Array]:
         """How what is left of the forces changes along a direction of all variables, in their units, (n,)."""
         sites, moved, risen = self.sites, self.sites.moved(values), self.sites.risen(values)
+        stiffness = sites.stiffness + sites.springs(self._held) if len(self._held) else sites.stiffness
 
         def change(direction: Array) -> Array:
             way = moved @ direction[:-1]
-            found = sites.stiffness @ way + self._pins * way
+            found = stiffness @ way
             found += risen @ direction[:-1] - direction[-1] * self.unit * self._rate
             return np.asarray(found / sites.forces)
 
@@ -260,7 +266,7 @@ class Equations:
         return lambda y: float(y[-1]) - aim / self.unit, lambda y: last
 
     def place(self, y: Array, tangent: Array, passed: int | None = None) -> bool:
-        """Go to a point, where sites may be on other segments than before; whether what was pinned there is so still.
+        """Go to a point, where sites may be on other segments than before; whether the same motions are held.
 
         Args:
             y: coordinates and factor, (n + 1,).
@@ -268,7 +274,7 @@ class Equations:
             passed: the only site that is; None: any site may be.
         """
         self.here = self._at_place(y, tangent, self.sites.values(y[:-1]))
-        same = np.array_equal(self.sites.pins(self.here.values, self._rate), self._pins)
+        same = are_same(self._resting(self.here.values), self._held)
         if self._factors is not None and (passed is None or not same or not self._exchanged(self._factors, passed)):
             self._factors = None
         return same

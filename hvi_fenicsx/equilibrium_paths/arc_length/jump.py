@@ -92,6 +92,7 @@ class Jump:
     def _followed(self, restraint: Array, row: Array, most: int, tried: list[Array]) -> Landing | None:
         """Along the curve of one restraint in a direction that was not tried; None where it leads to no end."""
         sites = self.sites
+        restraint = sites.unresisted(self.here.values, restraint).balanced
         curve = Curve(self.load, restraint * float(np.mean(sites.forces)), sites, self.here.y[:-1].copy(), 0.0)
         curve.head(row)
         tangent = curve.here.tangent

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from ...system.spectrum import negative_directions
+from ...system.spectrum import negative_directions, rounding_of
 from ...typing import Array, Mask
 from ..neutral import Unresisted, unresisted
 from .blocks import Blocks
@@ -202,31 +202,29 @@ class Sites(SiteGraphs):
             values: at the point.
             rate: the load that grows, (n,).
         """
-        elastic = self.stiffness is self._problem.stiffness
-        rigid = self.rigid if elastic else np.empty((0, len(self.forces)))
+        if not len(self.rigid) or self.stiffness is not self._problem.stiffness:
+            return Unresisted.none(rate)
         none = self.thresholds.curve.unresisted * float(np.max(self.forces, initial=0.0)) / self.length
         resists = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
-        return unresisted(rigid, (self._axes(values.directions).sparse[resists] @ rigid.T).T, rate)
+        return unresisted(self.rigid, (self._axes(values.directions).sparse[resists] @ self.rigid.T).T, rate)
 
-    def pins(self, values: Values, rate: Array) -> Array:
-        """The springs that pin the motions which nothing resists and no load drives, by unknown, (n,).
+    def springs(self, held: Array) -> Array:
+        """The stiffness of springs against motions, as stiff as the body, (n, n).
 
         Args:
-            values: at the point.
-            rate: the load that grows, (n,).
+            held: the motions, as orthonormal rows, (d, n).
         """
-        found, pinned = np.zeros(len(self.forces)), self.unresisted(values, rate).pins
-        found[pinned] = self.forces[pinned] / self.length
-        return found
+        return np.asarray(held.T @ held * (np.max(self.forces, initial=0.0) / self.length))
 
-    def jacobian(self, values: Values, pins: Array | None = None) -> Array:
+    def jacobian(self, values: Values, held: Array | None = None) -> Array:
         """The derivative of S x + r by the coordinates, (n, n).
 
         Args:
             values: at the point.
-            pins: springs beside S, by unknown, (n,); None for none.
+            held: motions that springs hold, as orthonormal rows, (d, n); None for none.
         """
-        moved = self.moved(values).sparse @ (self.stiffness if pins is None else self.stiffness + np.diag(pins))
+        stiffness = self.stiffness if held is None or not len(held) else self.stiffness + self.springs(held)
+        moved = self.moved(values).sparse @ stiffness
         return np.asarray(moved.T + self.risen(values).sparse.toarray())  # S and the first blocks are symmetric
 
     def along(self, values: Values, motion: Array) -> Array:
@@ -260,8 +258,9 @@ class Sites(SiteGraphs):
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
         motions = self.motions(values)
-        sizes = np.sqrt(np.diag(motions.elastic) + np.abs(motions.slopes))
-        sizes[sizes == 0.0] = 1.0  # else what is stiff, as a length that has just left 0 is across, would hide the rest
+        stiff = np.diag(motions.elastic) + np.abs(motions.slopes)
+        stiff = np.where(stiff > rounding_of(self.stiffness), stiff, np.max(stiff, initial=1e-300))
+        sizes = np.sqrt(stiff)  # else what is stiff, as a length that has just left 0 is across, would hide the rest
         return negative_directions(motions.matrix / np.outer(sizes, sizes), negligible) + len(self.on_drops())
 
     def motions(self, values: Values) -> Motions:
