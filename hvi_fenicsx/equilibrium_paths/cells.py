@@ -50,7 +50,8 @@ class Cells:
         self._x, self._force = np.zeros(n), np.zeros(n)
         self.slope, self.rise, self.low, self.high = (np.zeros(n) for _ in range(4))
         self.outward, self.bound = np.zeros(n), np.zeros(n, dtype=bool)
-        self.held, self.pins = np.empty((0, n)), np.zeros(n)
+        self.held: Array = np.empty((0, n))
+        self.pins = np.zeros(n)
         for i in range(n):
             self.enter(i, int(numbers[i]), float(coordinates[i]))
 

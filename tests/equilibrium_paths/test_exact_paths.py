@@ -217,6 +217,15 @@ def comes_back_to_where_it_was(states: Sequence[PathState]) -> None:
     assert max(s.factor for s in states) < 5.0
 
 
+def test_a_bond_that_has_moved_by_rounding_remembers_nothing() -> None:
+    table = BondTable(problem(1.0, 1.0, bonds(graph(SOFTENING), 0)), (0,))
+    fresh = table.chain(0)
+    table.remember(0, 1e-16, 1.1e-16)
+    assert table.chain(0) == fresh
+    table.remember(0, 1.2, 0.6)
+    assert table.chain(0) != fresh
+
+
 @pytest.mark.parametrize("follow", Follow)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_energies_balance_where_bonds_remember(seed: int, follow: Follow) -> None:

@@ -62,7 +62,7 @@ class Equations:
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
         values = sites.values(z)
-        self._held = np.empty((0, len(z)))
+        self._held: Array = np.empty((0, len(z)))
         left = (sites.stiffness @ values.x + values.force - constant - factor * rate) / sites.forces
         self.here = Place(y=y, tangent=np.zeros_like(y), values=values, left=left)
         self._factors: Bordered | None = None

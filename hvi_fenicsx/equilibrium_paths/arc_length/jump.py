@@ -106,7 +106,8 @@ class Jump:
 
     def _to_its_end(self, curve: Curve, most: int) -> Landing | None:
         for move in advancing(curve, 0.0, self.lag, self.step, most):
-            if move.outcome is Outcome.FACTOR:
+            anywhere = move.outcome is Outcome.AWAY and abs(curve.here.y[-1]) <= 1e-9
+            if move.outcome is Outcome.FACTOR or anywhere:
                 stable = curve.sites.unstable_directions(curve.here.values) == 0
                 return self._landed(curve.here.y[:-1]) if stable else None
             if move.outcome is Outcome.AWAY:
