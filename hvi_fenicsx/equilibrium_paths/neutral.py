@@ -48,7 +48,7 @@ class Unresisted:
 
     @property
     def _works(self) -> Array:
-        """Of the load on the motions, (k,); 0 where they are none."""
+        """What the load does on the motions, (k,); 0 where that is rounding."""
         works = self.motions @ self.rate
         none = _NONE * float(np.linalg.norm(self.rate))
         return np.asarray(np.where(np.linalg.norm(works) > none, works, 0.0))

@@ -25,7 +25,7 @@ from ..typing import Array, Integers, Mask
 from . import spectrum
 
 _ROUNDS = 4
-"""Of an inverse iteration: each leaves of what is stiff the shift over its stiffness."""
+"""Steps of an inverse iteration: each leaves of what is stiff the shift over its stiffness."""
 
 
 @dataclass(frozen=True, kw_only=True)

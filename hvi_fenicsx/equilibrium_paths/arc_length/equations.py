@@ -123,11 +123,10 @@ class Equations:
     def _changes(self, values: Values) -> Callable[[Array], Array]:
         """How what is left of the forces changes along a direction of all variables, in their units, (n,)."""
         sites, moved, risen = self.sites, self.sites.moved(values), self.sites.risen(values)
-        stiffness = sites.stiffness + sites.springs(self._held) if len(self._held) else sites.stiffness
+        stiffness = sites.held_stiffness(self._held)
 
         def change(direction: Array) -> Array:
-            way = moved @ direction[:-1]
-            found = stiffness @ way
+            found = stiffness @ (moved @ direction[:-1])
             found += risen @ direction[:-1] - direction[-1] * self.unit * self._rate
             return np.asarray(found / sites.forces)
 

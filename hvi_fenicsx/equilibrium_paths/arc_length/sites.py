@@ -208,13 +208,15 @@ class Sites(SiteGraphs):
         resists = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
         return unresisted(self.rigid, (self._axes(values.directions).sparse[resists] @ self.rigid.T).T, rate)
 
-    def springs(self, held: Array) -> Array:
-        """The stiffness of springs against motions, as stiff as the body, (n, n).
+    def held_stiffness(self, held: Array | None) -> Array:
+        """The stiffness with springs against motions that are as stiff as the body, (n, n).
 
         Args:
-            held: the motions, as orthonormal rows, (d, n).
+            held: the motions, as orthonormal rows, (d, n); None for none.
         """
-        return np.asarray(held.T @ held * (np.max(self.forces, initial=0.0) / self.length))
+        if held is None or not len(held):
+            return self.stiffness
+        return np.asarray(self.stiffness + held.T @ held * (np.max(self.forces) / self.length))
 
     def jacobian(self, values: Values, held: Array | None = None) -> Array:
         """The derivative of S x + r by the coordinates, (n, n).
@@ -223,8 +225,7 @@ class Sites(SiteGraphs):
             values: at the point.
             held: motions that springs hold, as orthonormal rows, (d, n); None for none.
         """
-        stiffness = self.stiffness if held is None or not len(held) else self.stiffness + self.springs(held)
-        moved = self.moved(values).sparse @ stiffness
+        moved = self.moved(values).sparse @ self.held_stiffness(held)
         return np.asarray(moved.T + self.risen(values).sparse.toarray())  # S and the first blocks are symmetric
 
     def along(self, values: Values, motion: Array) -> Array:
