@@ -170,7 +170,7 @@ class ExactFollower(Follower):
     @override
     def _is_off(self) -> bool:
         tracer = self.tracer
-        return tracer.at_rest(self._peak) and tracer.cells.is_singular()
+        return tracer.at_rest(self._peak) and bool(np.any(tracer.cells.unresisted(self._problem.force_rate).driven))
 
     def _noted(self, state: PathState, aim: float) -> PathState:
         """The state after an event; where the path comes back to one, another way is taken, or the path ends."""

@@ -134,7 +134,7 @@ class Follower(ABC):
 
     @abstractmethod
     def _is_off(self) -> bool:
-        """Whether no load, law or bound acts any more, and nothing would hold a body that floats."""
+        """Whether no load, law or bound acts any more, and nothing would resist the next load."""
 
     def _is_under_way(self) -> bool:
         """Whether the path has been resumed on its way just now: it goes on as it went."""
