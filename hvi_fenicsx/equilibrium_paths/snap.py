@@ -118,7 +118,8 @@ def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array, going: 
         step_fall = -0.5 * (t + tracer.factor) * float(c @ (tracer.cells.x - x))
         fall, turnover = fall + step_fall, turnover + abs(step_fall)
         if step.variable == FACTOR or for_ever:
-            lower = fall > 1e-9 * turnover and tracer.cells.is_stable()
-            return Snap(cells=tracer.cells, inverse=tracer.inverse()) if lower else None
+            other = for_ever or fall > 1e-9 * turnover
+            landed = other and tracer.cells.is_stable()
+            return Snap(cells=tracer.cells, inverse=tracer.inverse()) if landed else None
         go_on(tracer, bonds, step)
     return None

@@ -122,11 +122,12 @@ class Jump:
         if float(np.max(np.abs(z - self.here.y[:-1]), initial=0.0)) <= 1e-9:
             return None
         kept = self.sites.kept()
-        curve = Curve(self.load, self.heading * self.problem.force_rate, self.sites, z.copy(), 0.0)
-        leads_on = False
+        rate, leads_on = self.heading * self.problem.force_rate, False
+        curve = Curve(self.load, rate, self.sites, z.copy(), 0.0)
         with suppress(Refused, np.linalg.LinAlgError):
             set_out(curve, 1.0, self.lag, self.step)
-            leads_on = curve.factor_rate >= 0.0
+            driven = self.sites.unresisted(curve.here.values, rate).driven
+            leads_on = curve.factor_rate >= 0.0 and not np.any(driven)
         self.sites.restore(kept)
         return Landing(z=z) if leads_on else None
 
