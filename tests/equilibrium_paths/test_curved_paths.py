@@ -206,6 +206,22 @@ def test_a_body_falls_on_a_point_on_which_it_rocks(
     assert states[-1].dissipated == pytest.approx(2.0 * area if remember else 0.0, abs=1e-9)
 
 
+def test_bonds_pull_a_body_off_its_floor_once_they_alone_carry_the_load() -> None:
+    """By hand: three bonds at a plateau of 0.03 hold a beam from 2 λ = 0.09 on; with less it leaves the floor and jumps.
+
+    It does not jump back to the floor, where at that load it could stand anywhere above.
+    """
+    bent, law = np.array([1.0, -2.0, 1.0]), graph([(0, 0), (0.05, 0.1), (0.2, 0.03)])
+    floor = [-0.5, -np.inf, -0.5]
+    given = problem(np.outer(bent, bent), [-0.6, -0.8, -0.6], bonds(law, [0, 1, 2]), lower=floor)
+    follower, states = path(given, programme=(1.0, 0.0))
+    assert follower.end is End.REACHED
+    turn = next(n for n, state in enumerate(states) if state.event is Event.TURN)
+    found = [(state.event, state.factor) for state in states[turn + 1 :]]
+    assert [event for event, _ in found] == [Event.RELEASE, Event.FOLD, Event.JUMP, Event.END]
+    assert [factor for _, factor in found] == pytest.approx([0.045, 0.045, 0.045, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize("remember", [(), (0,)])
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_a_bar_whose_bond_on_a_length_fades_may_turn_about_its_other_end(angle: float, remember: Sequence[int]) -> None:
