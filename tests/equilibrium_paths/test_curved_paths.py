@@ -207,7 +207,7 @@ def test_a_body_falls_on_a_point_on_which_it_rocks(
 
 
 def test_bonds_pull_a_body_off_its_floor_once_they_alone_carry_the_load() -> None:
-    """By hand: three bonds at a plateau of 0.03 hold a beam from 2 λ = 0.09 on; with less it leaves the floor and jumps.
+    """By hand: three bonds at a plateau of 0.03 carry 2 λ = 0.09; with less load the beam leaves the floor and jumps.
 
     It does not jump back to the floor, where at that load it could stand anywhere above.
     """
