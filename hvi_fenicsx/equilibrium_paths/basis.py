@@ -85,7 +85,7 @@ class Basis:
         if driver != FACTOR:
             coordinates[driver] = 0.0
         found = self._stiffness @ np.where(moving, coordinates, 0.0)
-        found += np.where(moving, cells.slope, cells.rise) * coordinates
+        found += np.where(moving, cells.tangent, cells.rise) * coordinates
         return np.asarray(found if driver == FACTOR else found - values[driver] * self._rate)
 
     def replace(self, changed: int) -> int:

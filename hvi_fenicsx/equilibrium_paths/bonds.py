@@ -15,6 +15,9 @@ from .graphs import Passed, graph_of, on_corner, remembering, turned
 from .segments import Component, Segment, chain
 from .thresholds import DEFAULT, ExactThresholds
 
+_ROUNDING = 1e-12
+"""A displacement so small beside the length scale of a law is none."""
+
 
 def is_piecewise_linear(problem: CondensedProblem) -> bool:
     """Whether all equilibria form a piecewise linear curve: each law acts on one unknown and has a graph."""
@@ -32,6 +35,7 @@ class Bond:
         weight: lumped area.
         even: whether its law is.
         passed: what it remembers; None without memory.
+        none: a displacement that is rounding; 0 where the traction jumps at 0, and no side is like the other.
         present: traction along the unknown, with memory.
     """
 
@@ -41,6 +45,7 @@ class Bond:
     weight: float
     even: bool
     passed: Passed | None
+    none: float
     present: TractionGraph
 
     @property
@@ -163,16 +168,18 @@ class BondTable:
         share = 0.0 if jump == 0.0 else min(max((force - float(weights @ left)) / jump, 0.0), 1.0)
         return list(left + share * (right - left))
 
-    def remember(self, unknown: int, x: float, force: float) -> None:
-        """Note where an unknown's bonds have been.
+    def remember(self, unknown: int, x: float, force: float) -> float:
+        """Note where an unknown's bonds have been; the displacement, 0 where it is rounding, at which they are then.
 
         Args:
             unknown: its number.
             x: its displacement.
             force: the force of all its bonds.
         """
+        x = x if any(abs(x) > bond.none for bond in self._at[unknown]) else 0.0
         for bond, traction in zip(self._at[unknown], self.tractions(unknown, x, force), strict=True):
             bond.remember(x, traction)
+        return x
 
     def recoverable(self, x: Array, force: Array) -> float:
         """What the bonds give back on the way to zero: Σ w j, or the triangle under the secant of one with memory.
@@ -231,6 +238,9 @@ def _on_break(x: float, bonds: list[Bond]) -> float:
 
 def _bonds(number: int, group: Bonds, ways: dict[float, TractionGraph], *, remembers: bool) -> list[Bond]:
     """The bonds of one law."""
+    zero = np.zeros(1)
+    jumps = bool(group.law.left(zero)[0] != group.law.right(zero)[0])
+    none = 0.0 if jumps else _ROUNDING * group.law.length_scale
     rows = zip(group.unknowns[:, 0], np.sign(group.signs[:, 0]), group.weights, strict=True)
     return [
         Bond(
@@ -240,6 +250,7 @@ def _bonds(number: int, group: Bonds, ways: dict[float, TractionGraph], *, remem
             weight=float(weight),
             even=group.law.even,
             passed=Passed() if remembers else None,
+            none=none,
             present=ways[float(sign)],
         )
         for unknown, sign, weight in rows

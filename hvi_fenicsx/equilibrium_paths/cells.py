@@ -10,7 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..system.condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
+from ..system.spectrum import ZERO
 from ..typing import Array, Integers, Mask
+from .neutral import Unresisted, are_same, pins, unresisted
 from .segments import Kind, Segment
 
 
@@ -32,6 +34,8 @@ class Cells:
         high: greatest coordinates, (n,).
         outward: directions in which bonds with memory go on, (n,).
         bound: whether the unknown is at a bound, (n,).
+        held: rigid motions that nothing resists and no load drives, as orthonormal rows, (d, n).
+        pins: springs that hold them and carry nothing, by unknown, (n,).
     """
 
     def __init__(
@@ -46,6 +50,8 @@ class Cells:
         self._x, self._force = np.zeros(n), np.zeros(n)
         self.slope, self.rise, self.low, self.high = (np.zeros(n) for _ in range(4))
         self.outward, self.bound = np.zeros(n), np.zeros(n, dtype=bool)
+        self.held: Array = np.empty((0, n))
+        self.pins = np.zeros(n)
         for i in range(n):
             self.enter(i, int(numbers[i]), float(coordinates[i]))
 
@@ -128,8 +134,38 @@ class Cells:
         if self.rise[i]:
             return np.asarray(self.rise[i] * np.eye(1, len(self), i)[0])
         found = self._stiffness.column(i)
-        found[i] += self.slope[i]
+        found[i] += self.tangent[i]
         return found
+
+    @property
+    def tangent(self) -> Array:
+        """The slopes of the forces of laws and of what pins the body, (n,)."""
+        return np.asarray(self.slope + self.pins)
+
+    def unresisted(self, rate: Array) -> Unresisted:
+        """The rigid motions that nothing resists.
+
+        Args:
+            rate: the load that grows, (n,).
+        """
+        if not len(self._stiffness.rigid):
+            return Unresisted.none(rate)
+        rigid, stiffest = self._stiffness.rigid, float(np.max(self._stiffness.diagonal, initial=0.0))
+        resists = ~self.moving | (np.abs(self.slope) > ZERO * stiffest)
+        return unresisted(rigid, rigid[:, resists], rate)
+
+    def hold(self, rate: Array) -> bool:
+        """Hold the motions that nothing resists and no load drives; whether they are others than before.
+
+        Args:
+            rate: the load that grows, (n,).
+        """
+        held = self.unresisted(rate).held
+        if are_same(held, self.held):
+            return False
+        self.held, self.pins = held, np.zeros(len(self))
+        self.pins[pins(held)] = float(np.max(self._stiffness.diagonal, initial=0.0)) or 1.0
+        return True
 
     def columns(self, driver: int | None, factor: Array) -> CellColumns:
         """The columns of the cell's equations.
@@ -138,7 +174,7 @@ class Cells:
             driver: the unknown in whose place is the factor; None: all are in their own places.
             factor: the factor's column, (n,).
         """
-        return CellColumns(slope=self.slope.copy(), rise=self.rise.copy(), driver=driver, factor=factor)
+        return CellColumns(slope=self.tangent, rise=self.rise.copy(), driver=driver, factor=factor)
 
     def inverse(self) -> CellInverse:
         """The inverse of the cell's equations.
@@ -159,7 +195,7 @@ class Cells:
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
         drops = np.count_nonzero((self.rise < 0.0) & ~self.bound)
-        return self._stiffness.negative_directions(self.moving, self.slope, negligible) + int(drops)
+        return self._stiffness.negative_directions(self.moving, self.tangent, negligible) + int(drops)
 
     def is_stable(self, negligible: float = 1e-12) -> bool:
         """Whether the energy falls in no direction at constant loads.

@@ -227,6 +227,7 @@ class Descent:
 
     def _solved(self, cells: Cells) -> Array | None:
         residual = self._stiffness @ cells.x + cells.force - self._load
+        cells.hold(np.zeros(self._n))
         if cells.unstable_directions(0.0):
             return None
         try:

@@ -164,13 +164,13 @@ class ExactFollower(Follower):
 
     def _orient(self, aim: float) -> None:
         wanted = np.sign(aim - self.tracer.factor)
-        if not self._is_under_way() and self.tracer.factor_rate * wanted < 0.0:
+        if not self._is_under_way() and (self.tracer.trend or self.tracer.factor_rate) * wanted < 0.0:
             self.tracer.turn()
 
     @override
     def _is_off(self) -> bool:
         tracer = self.tracer
-        return tracer.at_rest(self._peak) and tracer.cells.is_singular()
+        return tracer.at_rest(self._peak) and bool(np.any(tracer.cells.unresisted(self._problem.force_rate).driven))
 
     def _noted(self, state: PathState, aim: float) -> PathState:
         """The state after an event; where the path comes back to one, another way is taken, or the path ends."""

@@ -84,7 +84,7 @@ def on_corner(graph: TractionGraph, x: float, traction: float, rounding: float =
     if abs(nearest - x) > rounding * abs(x):
         return x, traction
     ends = (_limit(graph, nearest, "left"), _limit(graph, nearest, "right"))
-    size = max(abs(end) for end in ends)
+    size = float(np.max(np.abs([graph.left, graph.right])))  # where a bond is broken, both ends are zero
     return nearest, next((end for end in ends if abs(end - traction) <= rounding * size), traction)
 
 

@@ -21,7 +21,7 @@ class Passing:
         before: the segment that it leaves.
         after: the one on which it goes on.
         folds: whether the factor turns; where it stands between rising and falling, at the end of that.
-        neutral: whether the factor stands now or stood before.
+        neutral: whether the factor stands now or stood before, or other motions are held than before.
         unstable_change: by how many directions more the energy falls, unless neutral.
         bifurcation: whether there are other ways to go on.
     """
@@ -51,7 +51,7 @@ def go_on(tracer: Tracer, bonds: BondTable, step: Step) -> Passing:
     """
     assert step.variable is not None
     assert step.before is not None
-    trend, stood, i = tracer.trend, tracer.stands, step.variable
+    trend, stood, held, i = tracer.trend, tracer.stands, tracer.cells.held, step.variable
     forward = bool(tracer.rates[i] > 0.0)
     if step.reversed:
         _turn_back(tracer, bonds, i, forward=forward)
@@ -64,7 +64,7 @@ def go_on(tracer: Tracer, bonds: BondTable, step: Step) -> Passing:
         before=step.before,
         after=after,
         folds=folds,
-        neutral=stood or tracer.stands,
+        neutral=stood or tracer.stands or tracer.cells.held is not held,
         unstable_change=_change(step.before, after) if folds else 0,
         bifurcation=step.tied > 1 and folds,
     )
@@ -73,8 +73,8 @@ def go_on(tracer: Tracer, bonds: BondTable, step: Step) -> Passing:
 def _turn_back(tracer: Tracer, bonds: BondTable, i: int, *, forward: bool) -> None:
     """On to the secant of where the bonds have been."""
     cells = tracer.cells
-    x, force = float(cells.x[i]), float(cells.bond_force[i])
-    bonds.remember(i, x, force)
+    force = float(cells.bond_force[i])
+    x = bonds.remember(i, float(cells.x[i]), force)
     chain = bonds.chain(i)
     number = piece_at(chain, x, bonds.thresholds.at_end, forward=forward)
     tracer.enter(i, number, chain[number].coordinate(x, force), chain)

@@ -41,7 +41,7 @@ class Follower(ABC):
         self._problem, self._options = problem, options
         self._resume, self._watcher = resume, watch or Watch()
         self._leg, self._events, self._unstable, self._peak = 0, 0, 0, 0.0
-        self._floats = problem.elastic.is_singular(np.ones(problem.size, dtype=bool), np.zeros(problem.size))
+        self._floats = len(problem.elastic.rigid) > 0
         self._adrift = False
         self.end: End | None = None
         self.reason, self.is_closed = "", False
@@ -134,7 +134,7 @@ class Follower(ABC):
 
     @abstractmethod
     def _is_off(self) -> bool:
-        """Whether no load, law or bound acts any more, and nothing would hold a body that floats."""
+        """Whether no load, law or bound acts any more, and nothing would resist the next load."""
 
     def _is_under_way(self) -> bool:
         """Whether the path has been resumed on its way just now: it goes on as it went."""

@@ -23,10 +23,6 @@ class Nowhere(Enum):
 
     AWAY = "nothing holds the body at rest"
     UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
-    NEUTRAL = (
-        "nothing holds the body at rest, and where a small load takes it, it may still move without a force, as one "
-        'that rolls; a support, or weak friction such as law = "linear_spring" where it touches, gives it a path'
-    )
 
 
 def settled(bonds: BondTable, problem: CondensedProblem, rest: Array, limits: SettlingThresholds) -> Cells | Nowhere:
@@ -73,9 +69,7 @@ def no_load(problem: CondensedProblem, x: Array, first: float, limits: SettlingT
     return max(limits.no_load * abs(first), limits.roundings * rounding / load)
 
 
-def _unloaded(cells: Cells, load: Array) -> Cells | Nowhere:
+def _unloaded(cells: Cells, load: Array) -> Cells:
     """The cell without its last load: to events at no load rounding would give an order."""
-    if cells.is_singular():
-        return Nowhere.NEUTRAL
     cells.tau -= cells.inverse().solve(load)
     return cells

@@ -2,8 +2,8 @@
 
 A force t c holds it back, against the unstable direction, while it goes: the loads f(λ) + t c, t < 0, give a curve of
 equilibria that begins at the state with t = 0 (:mod:`.tracer`). The energy falls along it, dE = t cᵀdx, and where t is
-0 again is an equilibrium of the loads alone. Where the curve goes on for ever with t < 0 a body comes off. Bonds
-remember on the way.
+0 again is an equilibrium of the loads alone. Where the curve goes on for ever with t < 0 a body comes off; with t = 0
+it is in equilibrium wherever it goes. Bonds remember on the way.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ def snap(
         inverse = path.inverse() or cells.inverse()
     except np.linalg.LinAlgError:
         return None
-    for restraint in _restraints(bonds, cells, inverse, moved, direction):
+    for tried in _restraints(bonds, cells, inverse, moved, direction):
+        restraint = cells.unresisted(tried).balanced
         held = _held_back(bonds, load, cells, restraint, inverse)
         if held is None or held.rates[moved] * direction <= 0.0:
             continue
@@ -100,6 +101,7 @@ def _held_back(bonds: BondTable, load: Array, cells: Cells, restraint: Array, in
 
 
 def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array, going: Callable[[], None]) -> Snap | None:
+    none = bonds.thresholds.balanced * float(np.max(np.abs(load), initial=0.0))
     fall, turnover, standing = 0.0, 1e-3 * float(np.abs(tracer.cells.x) @ np.abs(load)), 0
     for _ in range(1_000 + 100 * len(tracer.cells)):
         going()
@@ -108,13 +110,16 @@ def _to_its_end(tracer: Tracer, bonds: BondTable, load: Array, c: Array, going: 
         standing = standing + 1 if np.allclose(tracer.cells.x, x, rtol=1e-12, atol=0.0) else 0
         if standing > bonds.thresholds.standing + 4 * len(x):
             return None
-        if step.variable is None:
-            free = tracer.factor < 0.0 and tracer.stands
-            return Snap(cells=None) if free else None
+        for_ever = step.variable is None
+        if for_ever and not (tracer.stands and tracer.factor <= none):
+            return None
+        if for_ever and tracer.factor < -none:
+            return Snap(cells=None)
         step_fall = -0.5 * (t + tracer.factor) * float(c @ (tracer.cells.x - x))
         fall, turnover = fall + step_fall, turnover + abs(step_fall)
-        if step.variable == FACTOR:
-            lower = fall > 1e-9 * turnover and tracer.cells.is_stable()
-            return Snap(cells=tracer.cells, inverse=tracer.inverse()) if lower else None
+        if step.variable == FACTOR or for_ever:
+            other = for_ever or fall > 1e-9 * turnover
+            landed = other and tracer.cells.is_stable()
+            return Snap(cells=tracer.cells, inverse=tracer.inverse()) if landed else None
         go_on(tracer, bonds, step)
     return None

@@ -69,6 +69,7 @@ class CurveThresholds:
         reach: a step changes the argument of a curved law by this part of its length scale and of the argument at most.
         no_length: a length that is 0, but for rounding, in units of s.
         agreed: by how much the work along a step may miss what the energies say, relative to the energies.
+        unresisted: a slope of a law's force that is none, beside the greatest stiffness.
         rank: singular values so small beside the greatest are zero: a body that slides takes any place.
         near_break: a displacement this near to a break of a law, or to a bound, may be there, relative to itself and to
             lengths.
@@ -96,6 +97,7 @@ class CurveThresholds:
     reach: float = 0.25
     no_length: float = 1e-12
     agreed: float = 3e-10
+    unresisted: float = 1e-8
     rank: float = 1e-12
     near_break: float = 1e-10
 

@@ -46,7 +46,7 @@ class Tracer:
         rates: how all coordinates change with the driving variable, (n,).
         factor_rate: how the factor does.
         stands: whether the factor stands still while unknowns move.
-        trend: the sign of the factor's rate where it last did not stand; 0 before that.
+        trend: the sign of the factor's rate where it last did not stand, or with which the path set out; 0 before that.
 
     Raises:
         numpy.linalg.LinAlgError: the tangent is singular.
@@ -74,9 +74,21 @@ class Tracer:
         self._perturb()
         if small is not None:
             self.small = np.array(small)
-        self._basis = Basis(stiffness, rate, cells, driver, inverse, thresholds)
+        cells.hold(rate)
         self.trend = 0
+        if driver == FACTOR:
+            driver = self._setting_out()
+        self._basis = Basis(stiffness, rate, cells, driver, inverse, thresholds)
         self._find_direction()
+
+    def _setting_out(self) -> int:
+        """What drives where the path sets out with the factor: along a motion that nothing resists, the body does."""
+        driven = self.cells.unresisted(self._rate).driven
+        if not np.any(driven):
+            return FACTOR
+        first = int(np.argmax(np.abs(driven)))
+        self.trend, self.heading = self.heading, self.heading * int(np.sign(driven[first]))
+        return first
 
     # -- the perturbation
 
@@ -108,7 +120,8 @@ class Tracer:
         else:
             self.factor_rate = float(rates[self.driver])
             rates[self.driver] = self.heading
-        self.rates: Array = rates
+        held = self.cells.held
+        self.rates: Array = rates - held.T @ (held @ rates)
         self.stands = self._factor_stands()
         if not self.stands:
             self.trend = int(np.sign(self.factor_rate))
@@ -241,10 +254,18 @@ class Tracer:
             self.cells.enter(i, number, coordinate)
         else:
             self.cells.replace_chain(i, chain, number, coordinate)
-        self.heading = self._heading_on(i, direction)
+        if self.cells.hold(self._rate):
+            self._set_out()
+        else:
+            self.heading = self._heading_on(i, direction)
         self.small[i] = 0.0
         self._behind[i] = self._lag[i]
         self.refine()
+
+    def _set_out(self) -> None:
+        """Set out anew with the factor, as it went: other motions are held."""
+        self.heading = self.trend or 1
+        self._basis = Basis(self._stiffness, self._rate, self.cells, self._setting_out(), None, self._thresholds)
 
     def _heading_on(self, i: int, direction: int) -> int:
         """Choose what drives from an unknown's new segment on; its direction for the unknown to go in a given one.

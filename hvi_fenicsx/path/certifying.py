@@ -3,8 +3,8 @@
 On Γc: each unknown must be on the graph of its laws and bounds, with the force that the body leaves there; S and f come
 from the factorised body. The certificate of the whole body (:mod:`.certify`) reassembles all forces from the forms;
 where bonds remember, what was judged on Γc must be what these forces leave there. So it must at states where loads and
-what moves the body are nothing beside those of the whole programme, as where an obstacle just touches it: there is
-nothing else by which to measure what is left of forces.
+what moves the body are nothing beside those of the whole programme, as where an obstacle just touches it, or where no
+force acts: there is nothing else by which to measure what is left of forces.
 
 Where rounding alone may speak against a state, its displacement is corrected as that of a single run
 (:mod:`.certify.correction`) or, with what bonds remember, along the graphs (:mod:`.refinement`); the corrected one is
@@ -204,7 +204,8 @@ class Certifier:
         for vector in (reaction, spread):
             vector.destroy()
         size = max(self._norm(f) for f in (forces.load, forces.reaction))
-        size = max(size, self._whole_load if self._is_unloaded(state) else 0.0) or 1.0
+        nothing = self._is_unloaded(state) or size <= self._tolerance * self._whole_load
+        size = max(size, self._whole_load if nothing else 0.0) or 1.0
         problem = self._factored.at(state.factor)
         return left <= self._tolerance * size or self._is_rounding(left / size, problem, u, forces, given, size)
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -22,6 +23,9 @@ from typing_extensions import override
 
 from ..typing import Array, Integers, Mask
 from . import spectrum
+
+_ROUNDS = 4
+"""Steps of an inverse iteration: each leaves of what is stiff the shift over its stiffness."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +134,21 @@ class CondensedStiffness(ABC):
             slope: of the laws' forces, (n,).
             negligible: an eigenvalue that is zero, relative to the largest sum of a row.
         """
+
+    @cached_property
+    def rigid(self) -> Array:
+        """The displacements that S does not resist, as orthonormal rows, (k, n): by inverse iteration. Collective."""
+        diagonal = self.diagonal
+        n, none = len(diagonal), np.zeros(len(diagonal))
+        count = self.negative_directions(np.ones(n, dtype=bool), none, -spectrum.ZERO)
+        found = np.eye(n, count)
+        if 0 < count < n:
+            shifted = self.raised(spectrum.ZERO * float(np.max(diagonal)))
+            inverse = shifted.inverse(CellColumns(slope=none, rise=none, driver=None, factor=none))
+            found = np.random.default_rng(0).standard_normal((n, count))
+            for _ in range(_ROUNDS):
+                found = np.linalg.qr(np.stack([inverse.solve(column) for column in found.T], axis=1))[0]
+        return np.asarray(found.T)
 
     @abstractmethod
     def free(self) -> None:

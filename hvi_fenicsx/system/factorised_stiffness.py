@@ -51,6 +51,7 @@ class FactorisedStiffness(CondensedStiffness):
     def _add(self, added: float) -> None:
         """Let so much be added to the diagonal; nothing is known of this one yet."""
         self._added = added
+        self.__dict__.pop("rigid", None)
         self._products: OrderedDict[bytes, Array] = OrderedDict()
         self._counts: OrderedDict[bytes, int] = OrderedDict()
 

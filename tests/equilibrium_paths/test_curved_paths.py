@@ -161,14 +161,101 @@ def test_a_curved_law_presses_on_its_bound_with_its_own_traction(remember: tuple
 
 
 @pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
-def test_a_body_that_rolls_on_its_floor_has_no_first_state_and_is_not_said_to_come_off(kind: type[Follower]) -> None:
-    """A beam of three points that rests on its middle one, where the load is: in balance at any inclination."""
+@pytest.mark.parametrize("gaps", [(np.inf, np.inf), (0.2, 0.3), (0.3, 0.2), (0.1, np.inf)])
+def test_a_body_that_rocks_is_in_balance_at_any_inclination(kind: type[Follower], gaps: tuple[float, float]) -> None:
+    """By hand: a beam of three points on its middle one, bent by loads of its ends, until both these are on the floor.
+
+    With ends that sink by λ together, E = λ²/2 - λ(2 + λ), whatever the inclination, until 1 + λ = 1 + g1 + g2; from
+    there on the floor takes what more the ends get. Back again, the ends leave it at the same factor.
+    """
     bent = np.array([1.0, -2.0, 1.0])
-    given = problem(np.outer(bent, bent), [0.0, -1.0, 0.0], lower=[-np.inf, -0.5, -np.inf])
-    follower = kind(given, PathOptions(programme=(1.0,)))
-    assert list(follower.states()) == []
-    assert follower.end is End.LOST
-    assert follower.reason.startswith("nothing holds the body at rest, and")
+    lower = [-0.5 - gaps[0], -0.5, -0.5 - gaps[1]]
+    given = problem(np.outer(bent, bent), [-1.0, -2.0, -1.0], lower=lower)
+    follower = kind(given, PathOptions(programme=(1.0, 0.1)))
+    states = list(follower.states())
+    assert follower.end is End.REACHED
+    assert min(state.unstable for state in states) == max(state.unstable for state in states) == 0
+    for state in states:
+        sunk = min(state.factor, sum(gaps))
+        np.testing.assert_allclose(state.x[1], -0.5, atol=1e-9)
+        assert state.x[0] + state.x[2] == pytest.approx(-1.0 - sunk, abs=1e-9)
+        assert np.all(state.x >= given.lower - 1e-9)
+        assert state.energy == pytest.approx(0.5 * sunk**2 - state.factor * (2.0 + sunk), abs=1e-9)
+    assert max(state.factor for state in states) == 1.0
+
+
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+@pytest.mark.parametrize("remember", [(), (0,)])
+@pytest.mark.parametrize("broken", [0.1, 0.3])
+def test_a_body_falls_on_a_point_on_which_it_rocks(
+    kind: type[Follower], remember: Sequence[int], broken: float
+) -> None:
+    """By hand: the beam hangs on bonds of its ends, which break together at 2 λ = 0.05; the middle falls on the floor.
+
+    There its ends sink as those of the beam that rocks, until both are on the floor as well; the bonds' area is lost.
+    """
+    bent, area = np.array([1.0, -2.0, 1.0]), 0.025 * broken
+    law = bonds(graph([(0, 0), (0.1, 0.05), (broken, 0)]), [0, 2])
+    given = problem(np.outer(bent, bent), [-1.0, -2.0, -1.0], law, lower=[-0.7, -0.5, -0.8])
+    follower = kind(given, PathOptions(programme=(1.0,), held=(-9.0, 9.0), remember=remember))
+    states = list(follower.states())
+    assert follower.end is End.REACHED
+    assert next(state.factor for state in states if state.event is Event.JUMP) == pytest.approx(0.025, rel=1e-9)
+    np.testing.assert_allclose(states[-1].x, given.lower, atol=1e-9)
+    assert states[-1].energy == pytest.approx(0.5 * 0.5**2 - 2.5 + (0.0 if remember else 2.0 * area), abs=1e-9)
+    assert states[-1].dissipated == pytest.approx(2.0 * area if remember else 0.0, abs=1e-9)
+
+
+def test_bonds_pull_a_body_off_its_floor_once_they_alone_carry_the_load() -> None:
+    """By hand: three bonds at a plateau of 0.03 carry 2 λ = 0.09; with less load the beam leaves the floor and jumps.
+
+    It does not jump back to the floor, where at that load it could stand anywhere above.
+    """
+    bent, law = np.array([1.0, -2.0, 1.0]), graph([(0, 0), (0.05, 0.1), (0.2, 0.03)])
+    floor = [-0.5, -np.inf, -0.5]
+    given = problem(np.outer(bent, bent), [-0.6, -0.8, -0.6], bonds(law, [0, 1, 2]), lower=floor)
+    follower, states = path(given, programme=(1.0, 0.0))
+    assert follower.end is End.REACHED
+    turn = next(n for n, state in enumerate(states) if state.event is Event.TURN)
+    found = [(state.event, state.factor) for state in states[turn + 1 :]]
+    assert [event for event, _ in found] == [Event.RELEASE, Event.FOLD, Event.JUMP, Event.END]
+    assert [factor for _, factor in found] == pytest.approx([0.045, 0.045, 0.045, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("remember", [(), (0,)])
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_bar_whose_bond_on_a_length_fades_may_turn_about_its_other_end(angle: float, remember: Sequence[int]) -> None:
+    """By hand: a bar of stiffness 1, stretched by λ; the weaker end slides from λ = 0.1 on, and is free from 0.4 on.
+
+    Across its way the bond resists by its traction over its length, and so by nothing at last. It stays broken.
+    """
+    along = np.array([np.cos(angle), np.sin(angle)])
+    stretch = np.r_[along, -along]
+    law = lengths(graph([(0, 0), (0, 0.1), (0.4, 0)]), 2, weights=[1.0, 2.0])
+    given, programme = problem(np.outer(stretch, stretch), stretch, law), (1.0, 0.2) if remember else (1.0,)
+    follower, states = path(given, programme=programme, remember=remember)
+    assert follower.end is End.REACHED
+    for state in states:
+        slides = state.position.leg == 0 and state.factor < 0.4
+        moved = max((state.factor - 0.1) / 0.75, 0.0) if slides else state.factor
+        np.testing.assert_allclose(state.x, np.r_[moved * along, 0.0, 0.0], atol=1e-8)
+        assert state.event in (Event.START, Event.STEP, Event.KINK, Event.TURN, Event.END)
+    assert next(s.energy for s in states if s.factor == 1.0) == pytest.approx(-0.48 - (0.02 if remember else 0.0))
+
+
+@pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])
+@pytest.mark.parametrize(("aim", "wanted"), [(0.5, (-1.5, -2.0)), (2.0, (-2.0, -2.0)), (-0.5, (3.0, 2.5))])
+def test_loads_in_balance_leave_a_body_free_until_another_presses_it_down(
+    kind: type[Follower], aim: float, wanted: tuple[float, float]
+) -> None:
+    """By hand: a spring of stiffness 1, stretched by 1, between -2 and 3, that a load then drives to one of them."""
+    given = problem(chain(2, 1.0), [-1.0, -1.0], force=[1.0, -1.0], lower=-2.0, upper=3.0)
+    follower = kind(given, PathOptions(programme=(aim,), held=(-9.0, 9.0)))
+    states = list(follower.states())
+    assert follower.end is End.REACHED
+    assert states[0].x[0] - states[0].x[1] == pytest.approx(1.0, abs=1e-9)
+    assert (states[1].event, states[1].factor) == (Event.CONTACT, 0.0)
+    np.testing.assert_allclose(states[-1].x, wanted, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", [ExactFollower, ArcLengthFollower])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.equilibrium_paths.arc_length.vertex_laws import vertex_laws
 from hvi_fenicsx.equilibrium_paths.bonds import BondTable
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.segments import Segment
@@ -215,6 +216,23 @@ def comes_back_to_where_it_was(states: Sequence[PathState]) -> None:
     meets = [np.allclose([s.factor, *s.x], [last.factor, *last.x], rtol=1e-9, atol=1e-9) for s in earlier]
     assert any(meets[:-1])
     assert max(s.factor for s in states) < 5.0
+
+
+def test_a_bond_that_has_moved_by_rounding_remembers_nothing() -> None:
+    table = BondTable(problem(1.0, 1.0, bonds(graph(SOFTENING), 0)), (0,))
+    fresh = table.chain(0)
+    table.remember(0, 1e-16, 1.1e-16)
+    assert table.chain(0) == fresh
+    table.remember(0, 1.2, 0.6)
+    assert table.chain(0) != fresh
+
+
+@pytest.mark.parametrize("kind", [BondTable, vertex_laws])
+def test_a_bond_that_breaks_at_a_traction_of_rounding_remembers_none(kind: Callable[..., Any]) -> None:
+    given = kind(problem(1.0, 1.0, bonds(graph(SOFTENING), 0)), (0,))
+    bond = given.bonds[0] if isinstance(given, BondTable) else given[0]
+    bond.remember(1.5 * (1.0 - 1e-13), 3e-14)
+    assert bond.passed.row == [-1.5, 1.5, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("follow", Follow)

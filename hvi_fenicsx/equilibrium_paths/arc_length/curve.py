@@ -160,7 +160,8 @@ class Curve(Events):
     def settle_at_factor(self) -> None:
         """The same with the factor as it is."""
         with suppress(Refused):
-            y = self.correct(self.here.y, self.at_factor(self.factor))
+            standing = self.factor_rate == 0.0  # then it fixes no point of the curve
+            y = self.correct(self.here.y, self.plane(0.0) if standing else self.at_factor(self.factor))
             self._settle_at(np.append(y[:-1], self.here.y[-1]))
 
     def _settle_at(self, y: Array) -> None:

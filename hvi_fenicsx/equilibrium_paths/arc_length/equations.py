@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...typing import Array
+from ..neutral import are_same
 from .bordered import Bordered
 from .sites import Sites, Values
 
@@ -61,6 +62,7 @@ class Equations:
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
         values = sites.values(z)
+        self._held: Array = np.empty((0, len(z)))
         left = (sites.stiffness @ values.x + values.force - constant - factor * rate) / sites.forces
         self.here = Place(y=y, tangent=np.zeros_like(y), values=values, left=left)
         self._factors: Bordered | None = None
@@ -106,20 +108,25 @@ class Equations:
 
     def _factorise(self, values: Values, row: Array) -> Bordered:
         n = len(values.x)
-        matrix = np.empty((n + 1, n + 1), order="F")
-        matrix[:n, :n] = self.sites.jacobian(values) / self.sites.forces[:, None]
+        matrix, self._held = np.empty((n + 1, n + 1), order="F"), self._resting(values)
+        matrix[:n, :n] = self.sites.jacobian(values, self._held) / self.sites.forces[:, None]
         matrix[:n, n] = -self.unit * self._rate / self.sites.forces
         matrix[n] = row
         self._factors = None
         self._factors = Bordered(matrix, self.limits)
         return self._factors
 
+    def _resting(self, values: Values) -> Array:
+        """The motions that nothing resists and no load drives: springs hold them, and carry nothing, (d, n)."""
+        return self.sites.unresisted(values, self._rate).held
+
     def _changes(self, values: Values) -> Callable[[Array], Array]:
         """How what is left of the forces changes along a direction of all variables, in their units, (n,)."""
         sites, moved, risen = self.sites, self.sites.moved(values), self.sites.risen(values)
+        stiffness = sites.held_stiffness(self._held)
 
         def change(direction: Array) -> Array:
-            found = sites.stiffness @ (moved @ direction[:-1])
+            found = stiffness @ (moved @ direction[:-1])
             found += risen @ direction[:-1] - direction[-1] * self.unit * self._rate
             return np.asarray(found / sites.forces)
 
@@ -257,8 +264,8 @@ class Equations:
         last = self._factor_row
         return lambda y: float(y[-1]) - aim / self.unit, lambda y: last
 
-    def place(self, y: Array, tangent: Array, passed: int | None = None) -> None:
-        """Go to a point, where sites may be on other segments than before.
+    def place(self, y: Array, tangent: Array, passed: int | None = None) -> bool:
+        """Go to a point, where sites may be on other segments than before; whether the same motions are held.
 
         Args:
             y: coordinates and factor, (n + 1,).
@@ -266,8 +273,10 @@ class Equations:
             passed: the only site that is; None: any site may be.
         """
         self.here = self._at_place(y, tangent, self.sites.values(y[:-1]))
-        if self._factors is not None and (passed is None or not self._exchanged(self._factors, passed)):
+        same = are_same(self._resting(self.here.values), self._held)
+        if self._factors is not None and (passed is None or not same or not self._exchanged(self._factors, passed)):
             self._factors = None
+        return same
 
     def _exchanged(self, factors: Bordered, k: int) -> bool:
         """Exchange the columns of a site in the factors; whether that went well."""
@@ -293,12 +302,15 @@ class Equations:
         self.here = replace(self.here, tangent=self.tangent(self.here.values, row, sign))
 
     def set_out(self, sign: float = 1.0) -> None:
-        """Set out from the present point in the direction in which the factor grows.
+        """Set out from the present point where the load takes the body as the factor grows.
 
         Args:
-            sign: -1: in which it falls.
+            sign: -1: as it falls.
 
         Raises:
-            numpy.linalg.LinAlgError: the factor stands along the curve.
+            numpy.linalg.LinAlgError: the factor stands along the curve, and no rigid motion is free.
         """
-        self.head(self._factor_row, sign)
+        values = self.here.values
+        driven = self.sites.unresisted(values, self._rate).driven
+        along = np.append(self.sites.moved(values).sparse.T @ driven, 0.0)
+        self.head(along if np.any(driven) else self._factor_row, sign)

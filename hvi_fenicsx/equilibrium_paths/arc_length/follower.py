@@ -22,7 +22,7 @@ from .events import Move, Outcome
 from .felt import factors, felt
 from .jump import Jump
 from .passage import Crossing, Passage, event_of, order
-from .rest import at_rest, is_held
+from .rest import at_rest
 from .settling import settled
 from .sites import Sites
 from .vertex_laws import vertex_laws
@@ -222,8 +222,9 @@ class ArcLengthFollower(Follower):
 
     @override
     def _is_off(self) -> bool:
-        curve = self._curve
-        return curve.at_rest(1e-9 * self._peak) and not is_held(self._sites, curve.here.y[:-1])
+        curve, rate = self._curve, self._problem.force_rate
+        driven = self._sites.unresisted(curve.here.values, rate).driven
+        return curve.at_rest(1e-9 * self._peak) and bool(np.any(driven))
 
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""

@@ -92,6 +92,7 @@ class Jump:
     def _followed(self, restraint: Array, row: Array, most: int, tried: list[Array]) -> Landing | None:
         """Along the curve of one restraint in a direction that was not tried; None where it leads to no end."""
         sites = self.sites
+        restraint = sites.unresisted(self.here.values, restraint).balanced
         curve = Curve(self.load, restraint * float(np.mean(sites.forces)), sites, self.here.y[:-1].copy(), 0.0)
         curve.head(row)
         tangent = curve.here.tangent
@@ -105,7 +106,8 @@ class Jump:
 
     def _to_its_end(self, curve: Curve, most: int) -> Landing | None:
         for move in advancing(curve, 0.0, self.lag, self.step, most):
-            if move.outcome is Outcome.FACTOR:
+            anywhere = move.outcome is Outcome.AWAY and abs(curve.here.y[-1]) <= 1e-9
+            if move.outcome is Outcome.FACTOR or anywhere:
                 stable = curve.sites.unstable_directions(curve.here.values) == 0
                 return self._landed(curve.here.y[:-1]) if stable else None
             if move.outcome is Outcome.AWAY:
@@ -120,11 +122,12 @@ class Jump:
         if float(np.max(np.abs(z - self.here.y[:-1]), initial=0.0)) <= 1e-9:
             return None
         kept = self.sites.kept()
-        curve = Curve(self.load, self.heading * self.problem.force_rate, self.sites, z.copy(), 0.0)
-        leads_on = False
+        rate, leads_on = self.heading * self.problem.force_rate, False
+        curve = Curve(self.load, rate, self.sites, z.copy(), 0.0)
         with suppress(Refused, np.linalg.LinAlgError):
             set_out(curve, 1.0, self.lag, self.step)
-            leads_on = curve.factor_rate >= 0.0
+            driven = self.sites.unresisted(curve.here.values, rate).driven
+            leads_on = curve.factor_rate >= 0.0 and not np.any(driven)
         self.sites.restore(kept)
         return Landing(z=z) if leads_on else None
 

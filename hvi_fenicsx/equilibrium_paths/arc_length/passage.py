@@ -247,8 +247,8 @@ class Crossing:
             y = self._turned_back(k, forward=forward)
         else:
             sites.enter_next(k, forward=forward)
-        curve.place(y, curve.here.tangent, passed=k)
-        curve.head(curve.here.tangent if slow else curve.row(k), 1.0 if slow or forward else -1.0)
+        as_before = curve.place(y, curve.here.tangent, passed=k) and not slow
+        curve.head(curve.row(k) if as_before else curve.here.tangent, 1.0 if forward or not as_before else -1.0)
         self._rests[k] = slow and any(passage.site == k for passage in self.passages)
         self.passages.append(Passage(site=k, before=before, after=sites.segment(k)))
 

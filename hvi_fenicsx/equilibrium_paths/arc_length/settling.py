@@ -13,7 +13,6 @@ from .equations import Refused
 from .events import Outcome
 from .passage import advancing, set_out
 from .relaxation import Relaxation
-from .rest import is_held
 from .sites import Sites
 
 
@@ -42,9 +41,7 @@ def settled(
         found = _unloaded(curve, no_load(problem, curve.here.values.x, first, sites.thresholds.settling), lag, watch)
     except (Refused, np.linalg.LinAlgError):
         found = None
-    if found is None:
-        return Nowhere.UNKNOWN
-    return found if is_held(sites, found) else Nowhere.NEUTRAL
+    return Nowhere.UNKNOWN if found is None else found
 
 
 def _unloaded(curve: Curve, none: float, lag: Array, watch: Watch) -> Array | None:

@@ -56,6 +56,7 @@ class SiteGraphs(SiteLaws):
         high: greatest s, (m,).
         outward: where bonds with memory go on, 1 or -1; else 0, (m,).
         stiffness: S, or another one while a body moves, (n, n).
+        rigid: the displacements that S does not resist, as orthonormal rows, (k, n).
 
     Raises:
         InputError: a law on a length shares an unknown with another law or a bound.
@@ -63,7 +64,7 @@ class SiteGraphs(SiteLaws):
 
     def __init__(self, problem: CondensedProblem, laws: Sequence[VertexLaw], thresholds: Thresholds = DEFAULT) -> None:
         super().__init__(problem, laws, thresholds)
-        self.stiffness = problem.stiffness
+        self.stiffness, self.rigid = problem.stiffness, problem.elastic.rigid
         self._deviations = Deviations(self.laws, thresholds.curve)
         m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from ...system.spectrum import negative_directions
+from ...system.spectrum import negative_directions, rounding_of
 from ...typing import Array, Mask
+from ..neutral import Unresisted, unresisted
 from .blocks import Blocks
 from .site_graphs import SiteGraphs
 
@@ -192,13 +193,39 @@ class Sites(SiteGraphs):
             right=(rates[p] - across)[owner] * e,
         )
 
-    def jacobian(self, values: Values) -> Array:
+    def unresisted(self, values: Values, rate: Array) -> Unresisted:
+        """The rigid motions that nothing resists; none while something else holds the body back.
+
+        A length whose traction vanishes resists its own turning less and less: that is nothing before it is rounding.
+
+        Args:
+            values: at the point.
+            rate: the load that grows, (n,).
+        """
+        if not len(self.rigid) or self.stiffness is not self._problem.stiffness:
+            return Unresisted.none(rate)
+        none = self.thresholds.curve.unresisted * float(np.max(self.forces, initial=0.0)) / self.length
+        resists = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
+        return unresisted(self.rigid, (self._axes(values.directions).sparse[resists] @ self.rigid.T).T, rate)
+
+    def held_stiffness(self, held: Array | None) -> Array:
+        """The stiffness with springs against motions that are as stiff as the body, (n, n).
+
+        Args:
+            held: the motions, as orthonormal rows, (d, n); None for none.
+        """
+        if held is None or not len(held):
+            return self.stiffness
+        return np.asarray(self.stiffness + held.T @ held * (np.max(self.forces) / self.length))
+
+    def jacobian(self, values: Values, held: Array | None = None) -> Array:
         """The derivative of S x + r by the coordinates, (n, n).
 
         Args:
             values: at the point.
+            held: motions that springs hold, as orthonormal rows, (d, n); None for none.
         """
-        moved = self.moved(values).sparse @ self.stiffness
+        moved = self.moved(values).sparse @ self.held_stiffness(held)
         return np.asarray(moved.T + self.risen(values).sparse.toarray())  # S and the first blocks are symmetric
 
     def along(self, values: Values, motion: Array) -> Array:
@@ -232,8 +259,9 @@ class Sites(SiteGraphs):
             negligible: an eigenvalue that is zero, relative to the greatest.
         """
         motions = self.motions(values)
-        sizes = np.sqrt(np.diag(motions.elastic) + np.abs(motions.slopes))
-        sizes[sizes == 0.0] = 1.0  # else what is stiff, as a length that has just left 0 is across, would hide the rest
+        stiff = np.diag(motions.elastic) + np.abs(motions.slopes)
+        stiff = np.where(stiff > rounding_of(self.stiffness), stiff, np.max(stiff, initial=1e-300))
+        sizes = np.sqrt(stiff)  # else what is stiff, as a length that has just left 0 is across, would hide the rest
         return negative_directions(motions.matrix / np.outer(sizes, sizes), negligible) + len(self.on_drops())
 
     def motions(self, values: Values) -> Motions:

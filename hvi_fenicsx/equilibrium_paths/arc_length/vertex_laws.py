@@ -10,7 +10,7 @@ import numpy as np
 from ...laws import Mixity, Superpotential, TractionGraph
 from ...system.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
-from ..graphs import Passed, graph_of, remembering, turned, was_passed
+from ..graphs import Passed, graph_of, on_corner, remembering, turned, was_passed
 
 
 @dataclass(slots=True, kw_only=True)
@@ -50,9 +50,13 @@ class VertexLaw:
 
     def graph(self) -> TractionGraph:
         """Traction over the coordinate, with memory; of a curved law the chords between its breaks."""
-        plain = self.polyline if self.polyline is not None else chords(self.law, self.sign * self._ends)
-        graph = plain if self.sign > 0.0 else turned(plain)
-        return graph if self.passed is None else remembering(graph, self.passed)
+        return self._plain if self.passed is None else remembering(self._plain, self.passed)
+
+    @property
+    def _plain(self) -> TractionGraph:
+        """The same without memory."""
+        graph = self.polyline if self.polyline is not None else chords(self.law, self.sign * self._ends)
+        return graph if self.sign > 0.0 else turned(graph)
 
     @property
     def _ends(self) -> Array:
@@ -87,8 +91,7 @@ class VertexLaw:
             traction: along it.
         """
         if self.passed is not None:
-            near = self.sign * self.law.breaks
-            x = next((float(b) for b in near if abs(b - x) <= 1e-11 * abs(x)), x)
+            x, traction = on_corner(self._plain, x, traction, 1e-11)
             self.passed = self.passed.reached(x, traction, even=self.law.even)
 
     def memory(self) -> list[float]:

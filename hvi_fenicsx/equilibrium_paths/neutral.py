@@ -1,0 +1,110 @@
+"""Rigid motions that nothing resists in a cell: neither elasticity nor laws and bounds.
+
+Where the load that grows works on such a motion, it drives the body along it at once, until something resists. Where it
+does not, as on a body that rolls, or that contact alone holds and that may slide, the body is in equilibrium all along
+the motion, with the same energy and the same forces. The equations of the cell are then singular. They become regular
+with springs against the motions: the body stays where it has come to along them, and the springs carry nothing, so that
+the solution is one without them. They belong to one cell: in the next one something else may resist.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from ..typing import Array, Integers
+
+_NONE = 1e-9
+"""A part of a motion, or of the loads' work on it, that is none."""
+
+_SAME = 1e-6
+"""A difference of motions that is none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unresisted:
+    """The rigid motions that nothing resists.
+
+    Attributes:
+        motions: orthonormal rows, (k, n).
+        rate: the load that grows, (n,).
+    """
+
+    motions: Array
+    rate: Array
+
+    @classmethod
+    def none(cls, rate: Array) -> Self:
+        """There are none."""
+        return cls(motions=np.empty((0, len(rate))), rate=rate)
+
+    @property
+    def balanced(self) -> Array:
+        """The part of the load that works on none of the motions, (n,)."""
+        return np.asarray(self.rate - (self.motions @ self.rate) @ self.motions)
+
+    @property
+    def _works(self) -> Array:
+        """What the load does on the motions, (k,); 0 where that is rounding."""
+        works = self.motions @ self.rate
+        none = _NONE * float(np.linalg.norm(self.rate))
+        return np.asarray(np.where(np.linalg.norm(works) > none, works, 0.0))
+
+    @cached_property
+    def driven(self) -> Array:
+        """The motion along which the load drives the body, (n,); 0 where it drives it along none."""
+        return np.asarray(self._works @ self.motions)
+
+    @cached_property
+    def held(self) -> Array:
+        """The motions along which no load drives the body, as orthonormal rows, (d, n)."""
+        return _without(self.motions, self._works[:, None], 0.0)
+
+
+def unresisted(rigid: Array, resisted: Array, rate: Array) -> Unresisted:
+    """The rigid motions that nothing resists.
+
+    Args:
+        rigid: the displacements that elasticity does not resist, as orthonormal rows, (k, n).
+        resisted: their parts where laws or bounds resist, (k, m).
+        rate: the load that grows, (n,).
+    """
+    return Unresisted(motions=_without(rigid, resisted, _NONE), rate=rate)
+
+
+def _without(motions: Array, parts: Array, none: float) -> Array:
+    """The combinations of motions whose parts are none."""
+    if not len(motions) or not parts.size:
+        return motions
+    left, values, _ = np.linalg.svd(parts)
+    return np.asarray(left[:, np.count_nonzero(values > none) :].T @ motions)
+
+
+def are_same(motions: Array, others: Array) -> bool:
+    """Whether combinations of some motions are those of others.
+
+    Args:
+        motions: orthonormal rows, (d, n).
+        others: likewise.
+    """
+    if len(motions) != len(others):
+        return False
+    return bool(np.max(np.abs(others - (others @ motions.T) @ motions), initial=0.0) <= _SAME)
+
+
+def pins(motions: Array) -> Integers:
+    """Unknowns, one for each motion: where they are held, none is left. Always that of the largest remaining row.
+
+    Args:
+        motions: orthonormal rows, (d, n).
+    """
+    rows, found = motions.T.copy(), np.zeros(len(motions), dtype=np.int64)
+    for k in range(len(motions)):
+        sizes = np.linalg.norm(rows, axis=1)
+        found[k] = np.argmax(sizes)
+        way = rows[found[k]] / sizes[found[k]]
+        rows -= np.outer(rows @ way, way)
+    return found
