@@ -52,7 +52,7 @@ def at_rest(
     x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
     force = _nearest(bonds, x, problem.force - problem.elastic @ x)
     held = problem.elastic @ x + force
-    constant = constant_alone(problem, held)
+    constant = constant_alone(problem, x, force)
     cells = place(problem.elastic, chains, x, force)
     if cells.is_singular():
         next_loads = constant or replace(problem, force=held, force_rate=aim * problem.force_rate)

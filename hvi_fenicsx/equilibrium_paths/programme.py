@@ -220,16 +220,20 @@ class Follower(ABC):
             self._finish(End.LOST, reason)
 
 
-def constant_alone(problem: CondensedProblem, held: Array) -> CondensedProblem | None:
+def constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> CondensedProblem | None:
     """The path from rest to the constant loads, its factor from 0 to 1; None where there are none.
+
+    Rounding of the elastic forces at rest, where a bound lifts the body as a whole, is no load.
 
     Args:
         problem: the problem.
-        held: the loads that rest bears, (n,).
+        x: the displacement at rest, (n,).
+        forces: of bonds and bounds there, (n,).
     """
-    away = problem.force - held
-    size = float(np.max(np.abs(held), initial=0.0)) + float(np.max(np.abs(problem.force), initial=0.0))
-    if np.max(np.abs(away), initial=0.0) <= 1e-14 * size:
+    held = problem.elastic @ x + forces
+    away, stiffest = problem.force - held, float(np.max(problem.elastic.diagonal, initial=0.0))
+    sizes = held, problem.force, stiffest * x
+    if np.max(np.abs(away), initial=0.0) <= 1e-14 * sum(float(np.max(np.abs(f), initial=0.0)) for f in sizes):
         return None
     return replace(problem, force=held, force_rate=away)
 

@@ -48,7 +48,7 @@ def at_rest(problem: CondensedProblem, sites: Sites) -> Rest:
         sites.enter(k, number)
         if i is not None:
             z[i], force[i] = sites.coordinate(k, at, s_force), s_force
-    return Rest(z=z, held=is_held(sites, z), constant=constant_alone(problem, problem.stiffness @ x + force))
+    return Rest(z=z, held=is_held(sites, z), constant=constant_alone(problem, x, force))
 
 
 def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:
