@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from petsc4py import PETSc
@@ -18,22 +21,24 @@ from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.petsc_errors import raise_python_error
 
 
+def failing_at(number: int, function: Callable[..., object], raised: BaseException) -> Callable[..., object]:
+    """The function, but for one call of it, counted from 1."""
+    calls = itertools.count(1)
+
+    def failing(*arguments: object) -> object:
+        if next(calls) == number:
+            raise raised
+        return function(*arguments)
+
+    return failing
+
+
 @pytest.mark.parametrize("method", ["auto", "tao", "ssls", "condensed"])
 @pytest.mark.parametrize("raised", [ValueError("of a law"), KeyboardInterrupt()])
 def test_an_error_in_a_residual_ends_the_run(
     method: str, raised: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    calls = 0
-    residual = Equations.residual
-
-    def failing(*arguments: object) -> object:
-        nonlocal calls
-        calls += 1
-        if calls == 3:
-            raise raised
-        return residual(*arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(Equations, "residual", failing)
+    monkeypatch.setattr(Equations, "residual", failing_at(3, Equations.residual, raised))
     with pytest.raises(type(raised)) as error:
         solved(model(4, P, friction=quadratic_linear(1e3), epsilon=0.01, method=method))
     assert not isinstance(error.value, PETSc.Error)
@@ -58,18 +63,9 @@ def test_what_a_solve_itself_fails_by_is_no_error_of_a_function(raised: Exceptio
 def test_a_solve_that_petsc_gives_up_tells_its_linear_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
     """One Newton step by a factorisation; the second finds no tangent."""
     system = prepare(Scene.model_validate(model(4, 10 * P, friction=quadratic_linear(3e6), epsilon=0.01))).system
-    tangents, steps = Equations.tangents, 0
-
-    def failing(*arguments: object) -> object:
-        nonlocal steps
-        steps += 1
-        if steps == 2:
-            raise FloatingPointError
-        return tangents(*arguments)  # type: ignore[arg-type]
-
     solver = ActiveSetSolver(system, (), LinearSettings("lu"), Timer())
     x, _ = resting_start(solver, [term.law for term in system.terms])
-    monkeypatch.setattr(Equations, "tangents", failing)
+    monkeypatch.setattr(Equations, "tangents", failing_at(2, Equations.tangents, FloatingPointError()))
     bounds = {"lower": system.lower, "upper": system.upper}
     ended = solver.solve(x, smooth_models(system), 1e-14, line_search="basic", **bounds)
     assert (ended.converged, ended.newton, ended.linear) == (False, 1, 1)
