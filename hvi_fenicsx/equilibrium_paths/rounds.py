@@ -26,6 +26,7 @@ class Rounds:
 
     Attributes:
         came: the last change of the displacements, (n,).
+        standing: events in a row at one place and factor.
     """
 
     def __init__(self, x: Array, same_place: float) -> None:
@@ -33,7 +34,7 @@ class Rounds:
         self._known: dict[int, tuple[float, float, float]] = {}
         self._x, self.came = x, np.zeros_like(x)
         self._weights = np.random.default_rng(0).uniform(0.5, 1.5, len(x))
-        self._way = 0.0
+        self._way, self._factor, self.standing = 0.0, np.inf, 0
 
     def note(self, state: PathState) -> Round | None:
         """Note a state; says how the path came back to it, or None if it is new.
@@ -46,6 +47,8 @@ class Rounds:
         if length > 1e-9 * size:
             self.came = step
         self._way += length
+        stands = length <= 1e-9 * size and abs(state.factor - self._factor) <= 1e-9 * (1.0 + abs(state.factor))
+        self._factor, self.standing = state.factor, self.standing + 1 if stands else 0
         self._x, key = state.x, _key(state)
         factor, way, place = self._known.get(key, (np.inf, 0.0, 0.0))
         here = float(self._weights @ state.x)

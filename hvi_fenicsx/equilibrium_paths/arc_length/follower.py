@@ -206,6 +206,8 @@ class ArcLengthFollower(Follower):
         state = self._state(event_of(passages, folds=before * self._curve.trend < 0), passages)
         if self._rounds.note(state) is Round.CLOSED:
             self._go_round(Round.CLOSED)
+        elif self._rounds.standing > self._options.thresholds.exact.standing + 4 * len(self._sites):
+            self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
         return state
 
     def _beyond(self, move: Move) -> int:
