@@ -70,13 +70,19 @@ class OutputFolder:
     def _recover(self) -> None:
         """Go on where a killed process was: a whole result is moved in, another one removed."""
         name = self._lock.left or ""
-        if not re.fullmatch(re.escape(f".{self.target.name}.hvi-") + "[0-9a-f]{8}", name):
-            return
-        for left in (self.target.parent / name, self.target / name):
-            if is_folder(left):
-                self._left = True  # until it is done, the next one must find it too
-                self._finish(left)
-                self._left = False
+        if re.fullmatch(re.escape(f".{self.target.name}.hvi-") + "[0-9a-f]{8}", name):
+            for left in (self.target.parent / name, self.target / name):
+                if is_folder(left):
+                    self._left = True  # until it is done, the next one must find it too
+                    self._finish(left)
+                    self._left = False
+        self._remove_half()
+
+    def _remove_half(self) -> None:
+        """Remove a manifest that a killed process did not write whole: with an older one, or in a new folder alone."""
+        half = writing.half_of(self.target / manifest.NAME)
+        if half.exists() and (manifest.read(self.target) is not None or [*self.target.iterdir()] == [half]):
+            half.unlink()
 
     def _finish(self, left: Path) -> None:
         if manifest.read(left) is not None:

@@ -45,6 +45,15 @@ def told(file: Path) -> Iterator[None]:
         raise not_written(file, error.errno) from None
 
 
+def half_of(file: Path) -> Path:
+    """The name under which a file is written until it is whole; a killed process leaves that.
+
+    Args:
+        file: that is to be there in the end.
+    """
+    return file.with_name(f".{file.name}.part")
+
+
 @contextlib.contextmanager
 def whole(file: Path) -> Iterator[Path]:
     """A name beside a file to write to; renamed to the file when all went well, else removed.
@@ -55,7 +64,7 @@ def whole(file: Path) -> Iterator[Path]:
     Raises:
         NotWrittenError: it could not be written.
     """
-    aside = file.with_name(f".{file.name}.part")
+    aside = half_of(file)
     with told(file):
         try:
             yield aside

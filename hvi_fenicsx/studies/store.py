@@ -71,9 +71,10 @@ class Store:
         Raises:
             OSError: it cannot be written.
         """
-        (self.folder / POINTS).mkdir(parents=True, exist_ok=True)
-        if manifest.read(self.folder) is None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if manifest.read(self.folder) is None:  # first of all: without it the folder would be one of others
             manifest.write(self.folder, Manifest(kind="study", files={}))
+        (self.folder / POINTS).mkdir(exist_ok=True)
 
     def announce(self, setting: Setting) -> None:
         """List a point's files as the program's own, before they are there.

@@ -211,7 +211,11 @@ def filled(work: Path) -> None:
 
 
 def killed_at(
-    step: int, out: Path, patch: pytest.MonkeyPatch, fill: Callable[[Path], None] = filled, *, moved: bool = True
+    step: int,
+    out: Path,
+    patch: pytest.MonkeyPatch,
+    fill: Callable[[Path], None] = filled,
+    finish: Callable[[OutputFolder], object] = lambda folder: folder.move_in({}),
 ) -> bool:
     """Replace a result, killed at a system call that changes files, counted from 0; whether there were so many.
 
@@ -220,7 +224,7 @@ def killed_at(
         out: the folder.
         patch: of the calls.
         fill: writes the new files.
-        moved: whether the new result is moved in; else it is given up.
+        finish: what is done with them, in which the process is killed, or when the folder is closed.
     """
     calls = itertools.count()
     folder = OutputFolder(out, "result")
@@ -239,8 +243,7 @@ def killed_at(
         for name in ("rename", "replace", "unlink", "rmdir", "fsync"):
             patched.setattr(os, name, counted(getattr(os, name)))
         try:
-            if moved:
-                folder.move_in({})
+            finish(folder)
             folder.close()
         except Killed:
             pass
@@ -318,9 +321,24 @@ def test_a_result_given_up_is_not_moved_in_by_the_next_run_wherever_its_removal_
     for step in itertools.count():
         out = tmp_path / str(step) / "r"
         written(out, summary="1", a="1", b="1")
-        alive = not killed_at(step, out, monkeypatch, whole, moved=False)
+        alive = not killed_at(step, out, monkeypatch, whole, lambda _: None)
         OutputFolder(out, "result").close()
         assert intact(out)
+        assert names(out.parent) == ["r"]
+        if alive:
+            break
+    assert step > 3
+
+
+def test_killed_while_a_growing_file_is_announced_the_next_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is made then, and its manifest is not whole yet."""
+    for step in itertools.count():
+        out = tmp_path / str(step) / "r"
+        alive = not killed_at(step, out, monkeypatch, filled, lambda folder: folder.announce("rows.csv"))
+        written(out, "resume", summary="1", a="1")
+        assert set(names(out)) == set(RESULT)
         assert names(out.parent) == ["r"]
         if alive:
             break

@@ -43,6 +43,32 @@ def study(folder: Path, *words: object) -> Any:
     return hvi("study", folder / "square.toml", *ASKED, "--out", folder / "out", *words)
 
 
+def test_a_study_that_is_killed_while_its_folder_is_made_leaves_none_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed in the first writing to the disk; the next one may go on there."""
+
+    class Killed(BaseException):
+        pass
+
+    def killed(_: int) -> None:
+        raise Killed
+
+    folder = OutputFolder(tmp_path / "out", "study")
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", killed)
+        patched.setattr(Path, "unlink", lambda *_, **__: None)  # what follows in the killed process
+        with pytest.raises(Killed):
+            Store(folder.target, 1).open()
+    assert names(tmp_path / "out") == [".manifest.json.part"]
+    folder._lock.release(keep=True)  # as the kernel does
+    again = OutputFolder(tmp_path / "out", "study")
+    again.check("resume")
+    Store(again.target, 1).open()
+    again.close()
+    assert names(tmp_path / "out") == ["manifest.json"]
+
+
 @pytest.mark.parametrize("way", ["--force", "--resume"])
 def test_what_the_study_did_not_write_stays(way: str, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And what it wrote once and does not write now goes: no point is run here, they are there after --resume alone."""
