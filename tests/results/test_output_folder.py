@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import json
 import os
 import signal
 import threading
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -253,17 +254,31 @@ def killed_at(
     return True
 
 
+def killed_everywhere(
+    folder: Path, patch: pytest.MonkeyPatch, begin: Callable[[Path], object], **how: Any
+) -> Iterator[Path]:
+    """A folder for each call at which :func:`killed_at` kills its process; that of the last one ends by itself."""
+    for step in itertools.count():
+        out = folder / str(step) / "r"
+        begin(out)
+        alive = not killed_at(step, out, patch, **how)
+        yield out
+        if alive:
+            return
+
+
 def test_killed_at_any_call_the_result_is_the_old_or_the_new_one_and_the_next_run_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each system call that changes files, in turn. In between there is no summary, or all is of one result."""
     kinds = {"1": ["a", "b", "summary"], "2": ["a", "c", "summary"]}
     seen = []
-    for step in itertools.count():
-        out = tmp_path / str(step) / "r"
+
+    def first(out: Path) -> None:
         written(out, summary="1", a="1", b="1")
         (out / "notes.txt").write_text("mine")
-        alive = not killed_at(step, out, monkeypatch)
+
+    for out in killed_everywhere(tmp_path, monkeypatch, first):
         if (out / "summary.json").exists():
             now = (out / "summary.json").read_text()
             assert all((out / f"{name}.json").read_text() == now for name in kinds[now])
@@ -275,8 +290,6 @@ def test_killed_at_any_call_the_result_is_the_old_or_the_new_one_and_the_next_ru
         assert names(out) == sorted([*(f"{n}.json" for n in kinds[now]), "manifest.json", "notes.txt"])
         assert names(out.parent) == ["r"]
         seen.append(now)
-        if alive:
-            break
     assert seen == sorted(seen)
     assert seen[0] == "1"
     assert seen.count("2") > 6
@@ -293,18 +306,13 @@ def test_killed_at_any_call_results_within_a_result_are_those_of_one(
             written(work / name, summary="2")
 
     seen = []
-    for step in itertools.count():
-        out = tmp_path / str(step) / "r"
-        nested(out, "1", "one", "two")
-        alive = not killed_at(step, out, monkeypatch, fill)
+    for out in killed_everywhere(tmp_path, monkeypatch, lambda out: nested(out, "1", "one", "two"), fill=fill):
         OutputFolder(out, "result").close()
         now = (out / "summary.json").read_text()
         inside = ["one", "two"] if now == "1" else ["one", "three"]
         assert names(out) == sorted([*inside, "manifest.json", "summary.json"])
         assert all((out / name / "summary.json").read_text() == now for name in inside)
         seen.append(now)
-        if alive:
-            break
     assert seen == sorted(seen)
     assert seen.count("2") > 6
 
@@ -318,31 +326,27 @@ def test_a_result_given_up_is_not_moved_in_by_the_next_run_wherever_its_removal_
         filled(work)
         manifest.write(work, manifest.Manifest(kind="result", files=manifest.listed(work)))
 
-    for step in itertools.count():
-        out = tmp_path / str(step) / "r"
-        written(out, summary="1", a="1", b="1")
-        alive = not killed_at(step, out, monkeypatch, whole, lambda _: None)
+    begin = functools.partial(written, summary="1", a="1", b="1")
+    outs = [*killed_everywhere(tmp_path, monkeypatch, begin, fill=whole, finish=lambda _: None)]
+    for out in outs:
         OutputFolder(out, "result").close()
         assert intact(out)
         assert names(out.parent) == ["r"]
-        if alive:
-            break
-    assert step > 3
+    assert len(outs) > 4
 
 
 def test_killed_while_a_growing_file_is_announced_the_next_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The folder is made then, and its manifest is not whole yet."""
-    for step in itertools.count():
-        out = tmp_path / str(step) / "r"
-        alive = not killed_at(step, out, monkeypatch, filled, lambda folder: folder.announce("rows.csv"))
+    outs = [
+        *killed_everywhere(tmp_path, monkeypatch, lambda _: None, finish=lambda folder: folder.announce("rows.csv"))
+    ]
+    for out in outs:
         written(out, "resume", summary="1", a="1")
         assert set(names(out)) == set(RESULT)
         assert names(out.parent) == ["r"]
-        if alive:
-            break
-    assert step > 3
+    assert len(outs) > 4
 
 
 def test_a_signal_waits_until_all_is_moved_whichever_thread_gets_it(
