@@ -141,11 +141,6 @@ class Exponential(WeakeningLaw):
     concave_shape = True
 
     @override
-    @property
-    def steepest_fall(self) -> float:
-        return (self.peak_traction - self.residual_traction) / self.delta
-
-    @override
     def shape(self, z: Array) -> tuple[Array, Array, Array]:
         decay = np.exp(-z)
         return z + np.expm1(-z), -np.expm1(-z), decay
