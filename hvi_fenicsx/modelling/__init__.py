@@ -1,7 +1,6 @@
 """Models from Python: a body on any dolfinx mesh, effects on named places, solutions in SI (docs/python.md)."""
 
 from .body import Body
-from .contact_arrays import ContactArrays
 from .following import ModelPath, follow
 from .materials import Anisotropic, Energy, Isotropic, Orthotropic
 from .model import Model
@@ -31,7 +30,6 @@ __all__ = [
     "BodyForce",
     "Cohesion",
     "Contact",
-    "ContactArrays",
     "Displacement",
     "Energy",
     "Equilibria",

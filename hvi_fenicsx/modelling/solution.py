@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..problem import spaces
 from ..problem.cell_stress import cell_stress, space_of_stress
 from ..problem.scaling import Scales
+from ..report.contact_part import ContactPart
 from ..results import ResultFolder, gathering
 from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
@@ -26,11 +27,17 @@ from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
 from . import plotting
-from .contact_arrays import ContactArrays, ContactParts
 
 _LOG = log.logger("modelling")
 GIVEN = {"command": None, "petsc": None}
 """The entries of ``summary.json`` for the command line, which a program has not."""
+
+
+class _ContactParts(dict[str, ContactPart]):
+    """The parts of Γc by name."""
+
+    def __missing__(self, part: str) -> ContactPart:
+        raise KeyError(f"no contact and no law acts on {part!r}; there are: {', '.join(self) or 'none'}")
 
 
 def displacement(u: fem.Function, scales: Scales) -> fem.Function:
@@ -88,16 +95,14 @@ class ModelSolution(Solution):
         return self._examined.energy * self.problem.scales.energy
 
     @cached_property
-    def contact(self) -> Mapping[str, ContactArrays]:
+    def contact(self) -> Mapping[str, ContactPart]:
         """The parts with contact or laws, by name; the same on all ranks. Collective when first used.
 
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
         parts = gathering.part_arrays(self.problem, self._examined.states)
-        made = ContactParts((name, ContactArrays.of(part)) for name, part in parts.items())
-        found: ContactParts = self.problem.domain.mesh.comm.bcast(made, root=0)
-        return found
+        return self.problem.domain.mesh.comm.bcast(_ContactParts(parts), root=0)
 
     @cached_property
     def resultants(self) -> Mapping[str, Array]:

@@ -14,9 +14,10 @@ import numpy as np
 
 from ..errors import HviError
 from ..formula import Formula
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
+from .contact_part import ContactPart
 from .errors import ResultError
 from .rounding import without_noise
 from .solution_arrays import SolutionArrays
@@ -27,75 +28,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 FAR = 10.0
 """A body that was not certified, and moved by so many times its size, is on its way off."""
-
-
-@dataclass(frozen=True)
-class ContactPart:
-    """A part of Γc with m vertices.
-
-    Attributes:
-        name: of its boundary table in the scene.
-        columns: the columns of ``contact.csv`` that it has, (m,) each, in the order of that table.
-        vertices: the vertices of the body, (m,).
-        facets: its facets by the vertices of the body, (k, 2) or (k, 3).
-        normals: outward unit normals, (m, 2) or (m, 3).
-        drops: the slips at which the friction law drops at each vertex, m, (m, j).
-    """
-
-    name: str
-    columns: Mapping[str, Array]
-    vertices: Integers
-    facets: Integers
-    normals: Array
-    drops: Array
-
-    def __getitem__(self, column: str) -> Array:
-        """A column of the table, (m,); NaN where the table is empty."""
-        return self.columns.get(column, np.full(len(self.vertices), np.nan))
-
-    def has(self, column: str) -> bool:
-        """Whether the table has any value in it."""
-        return bool(np.isfinite(self[column]).any())
-
-    @property
-    def points(self) -> Array:
-        """The vertices, m, (m, 3)."""
-        return np.nan_to_num(np.column_stack([self["x"], self["y"], self["z"]]))
-
-    @property
-    def slip(self) -> Array:
-        """Signed slip in the plane, length of the slip in space."""
-        return _tangential(self["u_t1"], self["u_t2"])
-
-    @property
-    def friction(self) -> Array:
-        """-σ_t in the plane, its length in space."""
-        return _tangential(self["friction_t1"], self["friction_t2"])
-
-    @property
-    def pressure(self) -> Array:
-        """-σ_n: positive where the part is pressed."""
-        return -self["sigma_n"]
-
-    @property
-    def idle(self) -> Mask:
-        """Vertices that are lifted and carry nothing; where something adheres, a lifted one may."""
-        stress = np.nan_to_num(np.abs(self["sigma_n"]))
-        return self.lifted & (stress <= 1e-6 * stress.max(initial=0.0))
-
-    @property
-    def lifted(self) -> Mask:
-        """Vertices off the obstacle; none where the part has no contact."""
-        return self["contact"] == 0.0
-
-    @property
-    def largest_gap(self) -> float:
-        """The largest distance of a lifted vertex from the obstacle, m; 0 where none is lifted."""
-        return float(np.nanmax(self["gap"][self.lifted], initial=0.0))
-
-
-def _tangential(first: Array, second: Array) -> Array:
-    return np.hypot(first, second) if np.isfinite(second).any() else first
 
 
 @dataclass(frozen=True)
@@ -138,12 +70,7 @@ class Result:
     def parts(self) -> tuple[ContactPart, ...]:
         """The parts of Γc, in the order of ``contact.csv``; none where the body is carried off."""
         found = {} if self.carried_off else self.arrays.parts
-        return tuple(
-            ContactPart(
-                name, without_noise(part.columns, self.body), part.vertices, part.facets, part.normals, part.drops
-            )
-            for name, part in found.items()
-        )
+        return tuple(replace(part, columns=without_noise(part.columns, self.body)) for part in found.values())
 
     @property
     def sides(self) -> Mapping[str, Integers]:

@@ -28,6 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..typing import Array, Integers
+from .contact_part import ContactPart
 from .errors import ResultError
 
 Singles = npt.NDArray[np.float32]
@@ -35,29 +36,9 @@ Singles = npt.NDArray[np.float32]
 FILE = "solution.npz"
 _PARTS = {(1, 2): 1, (1, 3): 1, (2, 2): 4, (2, 3): 8}
 """Parts of a cell by degree and dimension."""
+_OF_PART = {"vertices": "vertices", "facets": "facets", "weights": "weight", "normals": "normal", "drops": "drops"}
+"""The attributes of a part that are no columns, by their keys."""
 _SIDE, _REGION, _LOAD, _PART = "side:", "region:", "load:", "part:"
-
-
-@dataclass(frozen=True, kw_only=True)
-class PartArrays:
-    """A part of Γc with m vertices and k facets, in d dimensions.
-
-    Attributes:
-        columns: the columns of ``contact.csv`` that the part has, (m,) each, in the order of that table; NaN where the
-            table is empty.
-        vertices: the vertices of the body, (m,).
-        facets: segments or triangles by the vertices of the body, (k, d), each row ascending.
-        weights: lumped lengths or areas of the vertices, m or m², (m,).
-        normals: outward unit normals, (m, d).
-        drops: the slips at which the friction law drops at each vertex, m, (m, j).
-    """
-
-    columns: Mapping[str, Array]
-    vertices: Integers
-    facets: Integers
-    weights: Array
-    normals: Array
-    drops: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +82,7 @@ class SolutionArrays:
     sides: Mapping[str, Integers] = field(default_factory=dict)
     regions: Mapping[str, Integers] = field(default_factory=dict)
     loads: Mapping[str, LoadArrays] = field(default_factory=dict)
-    parts: Mapping[str, PartArrays] = field(default_factory=dict)
+    parts: Mapping[str, ContactPart] = field(default_factory=dict)
 
 
 def members(arrays: SolutionArrays) -> dict[str, Any]:
@@ -117,7 +98,7 @@ def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
     for name, load in arrays.loads.items():
         yield from ((f"{_LOAD}{name}:{key}", value) for key, value in vars(load).items())
     for name, part in arrays.parts.items():
-        own = {key: value for key, value in vars(part).items() if key != "columns"}
+        own = {key: getattr(part, attribute) for key, attribute in _OF_PART.items()}
         yield from ((f"{_PART}{name}:{key}", value) for key, value in {**own, **part.columns}.items())
 
 
@@ -148,7 +129,7 @@ def of_members(members: Mapping[str, Any]) -> SolutionArrays:
         sides=_named(members, _SIDE),
         regions=_named(members, _REGION),
         loads={name: LoadArrays(**own) for name, own in _grouped(members, _LOAD).items()},
-        parts={name: _part(own) for name, own in _grouped(members, _PART).items()},
+        parts={name: _part(name, own) for name, own in _grouped(members, _PART).items()},
     )
 
 
@@ -164,9 +145,9 @@ def _grouped(members: Mapping[str, Any], kind: str) -> dict[str, dict[str, Any]]
     return found
 
 
-def _part(members: dict[str, Any]) -> PartArrays:
-    own = {key: members.pop(key) for key in ("vertices", "facets", "weights", "normals", "drops")}
-    return PartArrays(columns=members, **own)
+def _part(name: str, members: dict[str, Any]) -> ContactPart:
+    own = {attribute: members.pop(key) for key, attribute in _OF_PART.items()}
+    return ContactPart(name=name, columns=members, **own)
 
 
 def _check(arrays: SolutionArrays) -> None:
@@ -182,7 +163,7 @@ def _check(arrays: SolutionArrays) -> None:
     lengths += [(len(arrays.cells), len(arrays.von_mises))] if arrays.von_mises is not None else []
     lengths += [(len(load.vertices), len(v)) for load in arrays.loads.values() for v in (load.traction, load.pressure)]
     for part in arrays.parts.values():
-        lengths += [(len(part.vertices), len(v)) for v in (part.weights, part.normals, *part.columns.values())]
+        lengths += [(len(part.vertices), len(v)) for v in (part.weight, part.normal, *part.columns.values())]
     fits = [(values, n) for values in numbers] + [(cells, len(arrays.cells)) for cells in arrays.regions.values()]
     if any(one != other for one, other in lengths) or any(
         values.size and not 0 <= values.min() <= values.max() < count for values, count in fits

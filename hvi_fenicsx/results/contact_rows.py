@@ -16,13 +16,13 @@ from ..mesh import nodes
 from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
-from ..report.solution_arrays import PartArrays
+from ..report.contact_part import ContactPart
 from ..runtime.row_order import RowOrder, distinct
 from ..typing import Array, Integers
 from . import arc_length, contact_table
 
 
-def of_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
+def of_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str, ContactPart]:
     """This rank's stretch of the rows of each part, by its name and sorted by it. Collective.
 
     So are its facets, those whose vertices all have a row, each once.
@@ -35,7 +35,7 @@ def of_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str, Part
     return {state.surface.part: _of_part(problem, state) for state in ordered}
 
 
-def _of_part(problem: Problem, state: ContactState) -> PartArrays:
+def _of_part(problem: Problem, state: ContactState) -> ContactPart:
     comm, scales, surface = problem.domain.mesh.comm, problem.scales, state.surface
     columns = contact_table.columns(problem, state)
     if scales.dimension == 2:
@@ -44,12 +44,13 @@ def _of_part(problem: Problem, state: ContactState) -> PartArrays:
     else:
         order = RowOrder.of(comm, _rounded(comm, surface.points))
     numbers = spaces.global_numbers(problem.space, surface.blocks)
-    return PartArrays(
+    return ContactPart(
+        name=surface.part,
         columns={name: order.sorted(values) for name, values in columns.items()},
         vertices=order.sorted(numbers),
         facets=_facets(problem, surface),
-        weights=order.sorted(surface.weights * scales.length ** (scales.dimension - 1)),
-        normals=order.sorted(surface.normals),
+        weight=order.sorted(surface.weights * scales.length ** (scales.dimension - 1)),
+        normal=order.sorted(surface.normals),
         drops=order.sorted(_drops(state)) * scales.displacement,
     )
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from ..certify.contact_state import ContactState
 from ..effects import Direction
 from ..problem.problem import Problem
-from ..report.solution_arrays import PartArrays
+from ..report.contact_part import ContactPart
 from ..typing import Array
 from . import table_file
 
@@ -65,7 +65,7 @@ def columns(problem: Problem, state: ContactState) -> dict[str, Array]:
     return found
 
 
-def write(comm: MPI.Comm, path: Path, rows: Mapping[str, PartArrays]) -> None:
+def write(comm: MPI.Comm, path: Path, rows: Mapping[str, ContactPart]) -> None:
     """Write the table. Collective.
 
     Args:
@@ -79,19 +79,15 @@ def write(comm: MPI.Comm, path: Path, rows: Mapping[str, PartArrays]) -> None:
     table_file.write(comm, path, COLUMNS, (cells({name: own}) for name, own in rows.items()))
 
 
-def cells(parts: Mapping[str, PartArrays]) -> Iterator[tuple[str, ...]]:
+def cells(parts: Mapping[str, ContactPart]) -> Iterator[tuple[str, ...]]:
     """The table below its header, as texts.
 
     Args:
         parts: the parts of Γc by name, in the order of the table.
     """
     for name, part in parts.items():
-        size = len(part.vertices)
-        columns = [
-            [name] * size,
-            *([_text(c, v) for v in part.columns[c]] if c in part.columns else [""] * size for c in COLUMNS[1:]),
-        ]
-        yield from zip(*columns, strict=True)
+        columns = ([_text(c, value) for value in part[c]] for c in COLUMNS[1:])
+        yield from zip([name] * len(part), *columns, strict=True)
 
 
 def _text(column: str, value: float) -> str:

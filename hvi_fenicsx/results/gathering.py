@@ -19,7 +19,8 @@ from ..formula import Formula
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
-from ..report.solution_arrays import LoadArrays, PartArrays, Singles, SolutionArrays, members, of_members
+from ..report.contact_part import ContactPart
+from ..report.solution_arrays import LoadArrays, Singles, SolutionArrays, members, of_members
 from ..runtime.mpi import agree, joined
 from ..runtime.row_order import RowOrder, distinct
 from ..solution import Solution
@@ -40,7 +41,7 @@ def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> Sol
     return None if comm.rank else of_members(found)
 
 
-def own_arrays(solution: Solution, von_mises: Singles | None, rows: Mapping[str, PartArrays]) -> SolutionArrays:
+def own_arrays(solution: Solution, von_mises: Singles | None, rows: Mapping[str, ContactPart]) -> SolutionArrays:
     """This rank's rows of each array: those of all ranks, one after the other, are the solution. Collective.
 
     Args:
@@ -67,7 +68,7 @@ def own_arrays(solution: Solution, von_mises: Singles | None, rows: Mapping[str,
     )
 
 
-def rows_of_parts(solution: Solution) -> dict[str, PartArrays]:
+def rows_of_parts(solution: Solution) -> dict[str, ContactPart]:
     """This rank's rows of the parts of Γc, by name; none where nothing was solved. Collective.
 
     Args:
@@ -133,7 +134,7 @@ def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> L
     return LoadArrays(vertices=vertices, traction=order.sorted(traction)[first], pressure=order.sorted(pressure)[first])
 
 
-def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, PartArrays]:
+def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, ContactPart]:
     """The parts of Γc by name, sorted by it, on rank 0; elsewhere this rank's rows of them. Collective.
 
     Args:
@@ -145,7 +146,7 @@ def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, P
     }
 
 
-def _joined(comm: MPI.Comm, rows: PartArrays) -> PartArrays:
+def _joined(comm: MPI.Comm, rows: ContactPart) -> ContactPart:
     columns = {name: joined(comm, values) for name, values in rows.columns.items()}
-    others = {name: joined(comm, values) for name, values in vars(rows).items() if name != "columns"}
-    return PartArrays(columns=columns, **others)
+    others = {name: joined(comm, values) for name, values in vars(rows).items() if isinstance(values, np.ndarray)}
+    return ContactPart(name=rows.name, columns=columns, **others)

@@ -9,10 +9,10 @@ from pathlib import Path
 import basix
 import numpy as np
 
-from ..geometry import tangents
 from ..mesh import nodes
 from ..report import solution_arrays
-from ..report.solution_arrays import PartArrays, SolutionArrays
+from ..report.contact_part import ContactPart
+from ..report.solution_arrays import SolutionArrays
 from ..typing import Array, Integers, Mask
 
 
@@ -96,23 +96,21 @@ def load(path: Path) -> SolutionFields:
     return fields(solution_arrays.load(path))
 
 
-def _part(part: PartArrays, points: Array, ends: Integers) -> PartFields:
+def _part(part: ContactPart, points: Array, ends: Integers) -> PartFields:
     """A part in the order of the body's nodes."""
     order = np.argsort(part.vertices)
     facets, quadratic = _in_order(part.facets, ends)
-    columns = {name: values[order] for name, values in part.columns.items()}
-    normals, bounded = part.normals[order], "contact" in columns
-    slip = _tangential(columns, "u_t", normals)
+    bounded = "contact" in part.columns
     return PartFields(
         facets=np.searchsorted(part.vertices[order], facets),
         quadratic=np.searchsorted(part.vertices[order], quadratic),
         points=points[part.vertices[order]],
-        weights=part.weights[order],
-        normals=normals,
-        slip=slip,
-        friction=_tangential(columns, "friction_t", normals) if "friction_t1" in columns else np.zeros_like(slip),
-        pressure=columns["sigma_n"] * (bounded or "branch_n" in columns),
-        contact=columns["contact"] if bounded else np.zeros(len(order)),
+        weights=part.weight[order],
+        normals=part.normal[order],
+        slip=part.vectors("slip")[order],
+        friction=np.nan_to_num(part.vectors("friction")[order]),
+        pressure=part["sigma_n"][order] * (bounded or "branch_n" in part.columns),
+        contact=np.nan_to_num(part["contact"][order]),
         drops=part.drops[order],
         bounded=bounded,
     )
@@ -158,11 +156,6 @@ def _common(one: Integers, other: Integers) -> Integers:
 def _keys(facets: Integers, count: int) -> Integers:
     """A number for each facet, whatever the order of its nodes, (k,)."""
     return np.asarray(np.sort(facets, axis=1) @ count ** np.arange(facets.shape[1]))
-
-
-def _tangential(columns: Mapping[str, Array], name: str, normals: Array) -> Array:
-    components = np.column_stack([columns[f"{name}{i}"] for i in (1, 2) if f"{name}{i}" in columns])
-    return np.asarray(np.einsum("mk,mkd->md", components, tangents(normals)))
 
 
 def width(points: Array, cells: Integers) -> float:

@@ -9,8 +9,8 @@ import pytest
 
 from hvi_fenicsx import laws
 from hvi_fenicsx.geometry import tangents
+from hvi_fenicsx.report.contact_part import ContactPart
 from hvi_fenicsx.report.pictures.along_curve import along_curve
-from hvi_fenicsx.report.reader import ContactPart
 from hvi_fenicsx.typing import Array
 
 TRESCA = laws.Tresca(yield_traction=1e4)
@@ -36,7 +36,10 @@ def part(points: Array, normals: Array, slips: Array) -> ContactPart:
     s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     columns = {"s": s, "x": points[:, 0], "y": points[:, 1], "u_t1": along, "friction_t1": 3.0 * along}
     facets = np.column_stack([numbers[1:], numbers[:-1]])
-    return ContactPart("bore", columns, numbers, facets, normals, np.empty((len(points), 0)))
+    none = np.empty((len(points), 0))
+    return ContactPart(
+        name="bore", columns=columns, vertices=numbers, facets=facets, weight=none, normal=normals, drops=none
+    )
 
 
 def bore(turn: float = 1.0) -> ContactPart:

@@ -38,6 +38,7 @@ from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.report import png_file, reader, units
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
+from hvi_fenicsx.report.contact_part import ContactPart
 from hvi_fenicsx.report.html import numbers
 from hvi_fenicsx.report.pictures import draw, loads_supports
 from hvi_fenicsx.report.pictures.kinds import (
@@ -51,7 +52,7 @@ from hvi_fenicsx.report.pictures.kinds import (
     stress_plane,
 )
 from hvi_fenicsx.report.pictures.raster import shade, thinned
-from hvi_fenicsx.report.solution_arrays import FILE, PartArrays, SolutionArrays, load, members
+from hvi_fenicsx.report.solution_arrays import FILE, SolutionArrays, load, members
 from hvi_fenicsx.results import array_file, contact_table
 from hvi_fenicsx.runtime import processes
 
@@ -97,7 +98,7 @@ def facets_on(arrays: SolutionArrays, on: npt.NDArray[np.bool_]) -> npt.NDArray[
     return boundary[on[boundary].all(axis=1)]
 
 
-def floor(body: mesh.Mesh, value: Callable[[Array], Array]) -> PartArrays:
+def floor(body: mesh.Mesh, value: Callable[[Array], Array]) -> ContactPart:
     """The floor under the body, as a part of Γc."""
     d, arrays, x = body.geometry.dim, plain(body), body.geometry.x
     low = np.isclose(x[:, d - 1], 0.0)
@@ -113,7 +114,9 @@ def floor(body: mesh.Mesh, value: Callable[[Array], Array]) -> PartArrays:
     columns |= {"friction_t2": zero} if d == 3 else {}
     normals = np.tile(-np.eye(d)[-1], (len(points), 1))
     facets = facets_on(arrays, low)
-    return PartArrays(columns=columns, vertices=vertices, facets=facets, weights=zero, normals=normals, drops=drops)
+    return ContactPart(
+        name="floor", columns=columns, vertices=vertices, facets=facets, weight=zero, normal=normals, drops=drops
+    )
 
 
 def save(path: Path, arrays: SolutionArrays) -> None:

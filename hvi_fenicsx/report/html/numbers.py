@@ -56,9 +56,9 @@ def contact(part: ContactPart) -> dict[str, Any]:
     if part.has("contact"):
         rows.append(("in contact", thousands(int(np.nansum(part["contact"])))))
         rows.append(("largest gap", _largest(part["gap"], "m")))
-    rows += [("largest slip", _largest(np.abs(part.slip), "m"))]
+    rows += [("largest slip", _largest(np.abs(part.size("slip")), "m"))]
     if part.has("branch_t"):
-        rows.append(("largest friction", _largest(np.abs(part.friction), "Pa")))
+        rows.append(("largest friction", _largest(np.abs(part.size("friction")), "Pa")))
         rows.append(("pieces of the friction law in use, from 0", _pieces(part["branch_t"])))
     rows += [("largest pressure", _largest(part.pressure, "Pa"))]
     if part.has("branch_n"):

@@ -8,7 +8,8 @@ import numpy as np
 
 from ...geometry import tangents
 from ...typing import Array, Mask
-from ..reader import ContactPart, Result
+from ..contact_part import ContactPart
+from ..reader import Result
 
 COLUMNS = ("u_t1", "friction_t1")
 
@@ -37,7 +38,7 @@ def _signs(part: ContactPart) -> Array:
     """1 where the tangent looks towards growing s, -1 where it looks back, (m,)."""
     steps = np.where(_joined(part)[:, None], np.diff(part.points[:, :2], axis=0), 0.0)
     way = np.pad(steps, ((1, 0), (0, 0))) + np.pad(steps, ((0, 1), (0, 0)))
-    return np.where(np.sum(tangents(part.normals)[:, 0] * way, axis=1) < 0.0, -1.0, 1.0)
+    return np.where(np.sum(tangents(part.normal)[:, 0] * way, axis=1) < 0.0, -1.0, 1.0)
 
 
 def _joined(part: ContactPart) -> Mask:

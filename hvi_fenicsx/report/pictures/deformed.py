@@ -10,7 +10,8 @@ import numpy as np
 
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
-from ..reader import ContactPart, Result
+from ..contact_part import ContactPart
+from ..reader import Result
 from ..units import round_below, times
 
 VISIBLE = 0.08

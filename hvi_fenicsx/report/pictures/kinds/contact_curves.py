@@ -13,7 +13,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from ....typing import Array, Mask
-from ...reader import ContactPart, Result
+from ...contact_part import ContactPart
+from ...reader import Result
 from ...units import Unit, quantity, unit_for
 from ..along_curve import along_curve
 from ..registry import picture

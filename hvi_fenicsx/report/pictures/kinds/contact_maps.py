@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
-from ....geometry import tangents
 from ....typing import Array
-from ...reader import ContactPart, Result
+from ...contact_part import ContactPart
+from ...reader import Result
 from ...units import Unit, quantity, unit_for
 from ..deformed import part_geometries
 from ..flat_parts import FlatPart, laid_flat
@@ -41,10 +41,10 @@ def draw(result: Result, part: ContactPart) -> Figure:
     geometry = next(geometry for geometry in part_geometries(result) if geometry.part.name == part.name)
     flat = laid_flat(geometry, result.body)
     rows: list[tuple[str, str, Array, Array | None, Colormap | None]] = [
-        ("slip", "m", part.slip, _vectors(part, flat, "u_t"), shades(BLUE))
+        ("slip", "m", part.size("slip"), _vectors(part, flat, "slip"), shades(BLUE))
     ]
     if result.resists(part.name, "slip", "separation"):
-        rows.append(("friction", "Pa", part.friction, _vectors(part, flat, "friction_t"), shades(GREEN)))
+        rows.append(("friction", "Pa", part.size("friction"), _vectors(part, flat, "friction"), shades(GREEN)))
     rows.append(("contact pressure", "Pa", part.pressure, None, None))
     places = layout(flat.ends[1] - flat.ends[0], len(rows))
     fig = figure(places.tall)
@@ -62,16 +62,15 @@ def draw(result: Result, part: ContactPart) -> Figure:
     return fig
 
 
-def _vectors(part: ContactPart, flat: FlatPart, column: str) -> Array:
+def _vectors(part: ContactPart, flat: FlatPart, quantity: str) -> Array:
     """A tangential field of the table along the map's coordinates.
 
     Args:
         part: the part of Γc.
         flat: the part laid flat.
-        column: of the field, without the number of the tangent.
+        quantity: "slip" or "friction".
     """
-    values = np.nan_to_num(np.column_stack([part[f"{column}1"], part[f"{column}2"]]))
-    return flat.along(np.einsum("rk,rkd->rd", values, tangents(part.normals)))
+    return flat.along(np.nan_to_num(part.vectors(quantity)))
 
 
 def _symbol(words: str, unit: Unit) -> str:
@@ -168,7 +167,7 @@ def _notes(fig: Figure, part: ContactPart, flat: FlatPart, places: MapLayout) ->
     """Where the law drops, as a line on the map of the slip, and what grey means; both said there."""
     axes, said = fig.axes[0], list[str]()  # the map of the slip
     for drop in part.drops.T[part.drops[0] > 0.0]:
-        slip, constant = part.slip / drop, np.ptp(drop) == 0.0
+        slip, constant = part.size("slip") / drop, np.ptp(drop) == 0.0
         at = f"at {quantity(float(drop[0]), 'm')}" if constant else "at lengths that change"
         if np.nanmin(slip) < 1.0 < np.nanmax(slip):
             triangles = Triangulation(flat.points[:, 0], flat.points[:, 1], flat.triangles)
