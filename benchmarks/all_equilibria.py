@@ -17,11 +17,11 @@ import common
 import numpy as np
 
 from hvi_fenicsx import Scene, read_scene
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
 from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.workflow import prepare
 
 MODEL = {"law": "quadratic_linear", "gamma1": 3e6, "gamma2": 1.5e6, "delta": 9e-6}
 CHKS, LOG_EXP = {"smoothing": "chks", "epsilon": 0.05}, {"smoothing": "log_exp", "epsilon": 0.02}

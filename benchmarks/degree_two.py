@@ -18,7 +18,6 @@ from mpi4py import MPI
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.mesh.thresholds import Thresholds
-from hvi_fenicsx.preparation import Thresholds as RunThresholds
 from hvi_fenicsx.problem import contact_surface, spaces
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene_model import model_of, options_of
@@ -32,6 +31,7 @@ from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.factorisation import FactorForm, Factorisation, SaddlePointForm
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.workflow import Thresholds as RunThresholds
 
 SHARES = (0.02, 0.05, 0.1, 0.125, 0.2, 0.25)
 OWN = spaces.EDGE_SHARE[3]

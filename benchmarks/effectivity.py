@@ -25,13 +25,13 @@ from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.certify.certificate import examine
 from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.mesh import nodes, refinement
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.problem.spaces import displacement_space
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, refined_levels, solve, solve_from_coarser
 from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.system import System
+from hvi_fenicsx.workflow import prepare
 
 DEMOS = Path(__file__).resolve().parents[1] / "demos"
 STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}

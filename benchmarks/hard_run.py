@@ -19,10 +19,10 @@ from hvi_fenicsx import workflow
 from hvi_fenicsx.certify.certificate import Examination
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.path.following import Control, PathRun
-from hvi_fenicsx.preparation import Preparation
 from hvi_fenicsx.scene import PathTable
 from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
 from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.workflow import Preparation
 
 COMM = MPI.COMM_WORLD
 UNDECIDED = ("metastable", "borderline")

@@ -12,7 +12,7 @@ from covering import Case
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import Scene, preparation
+from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import domain
 
 Array = npt.NDArray[np.float64]
@@ -194,14 +194,14 @@ def _adhesion(f: Frame) -> Plain:
     return {"adhesion": {"law": "graph", "points": points}}
 
 
-def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> preparation.Preparation:
-    """As :func:`hvi_fenicsx.preparation.prepare`, on a mesh whose vertices are moved first. Collective."""
+def prepare(case: Case, data: Mapping[str, Any], method: str, comm: MPI.Comm) -> workflow.Preparation:
+    """As :func:`hvi_fenicsx.workflow.prepare`, on a mesh whose vertices are moved first. Collective."""
     made = scene(case, data, method)
     if case["distortion"] == "none":
-        return preparation.prepare(made, comm)
+        return workflow.prepare(made, comm)
     body = made.domain.build(comm, made.dimension)
     distort(body, case)
-    return preparation.prepare(made, comm, domain=body)
+    return workflow.prepare(made, comm, domain=body)
 
 
 def distort(body: domain.Domain, case: Case) -> None:
@@ -236,7 +236,7 @@ def _noise(points: Array, seed: float) -> Array:
     return 2.0 * (mixed - np.floor(mixed)) - 1.0
 
 
-def branches(case: Case, prepared: preparation.Preparation, data: Mapping[str, Any]) -> PETSc.Vec | None:
+def branches(case: Case, prepared: workflow.Preparation, data: Mapping[str, Any]) -> PETSc.Vec | None:
     """The displacement, in units of u0, whose pieces of the laws a method is to begin on; None for its own start."""
     if case["start"] == "default":
         return None

@@ -24,8 +24,8 @@ from common import DEMOS, ROOT, insert, table
 import hvi_fenicsx as hvi
 from hvi_fenicsx.equilibrium_paths.tracer import Tracer
 from hvi_fenicsx.path.following import Control, PathRun
-from hvi_fenicsx.preparation import DEFAULT, prepare
 from hvi_fenicsx.solvers.thresholds import PathThresholds
+from hvi_fenicsx.workflow import DEFAULT, prepare
 
 PAGE = ROOT / "docs" / "benchmarks" / "paths.md"
 HEAD = ("condensed unknowns", "stiffness", "rows", "events", "largest factor", "certified", "s", "ms per event", "MB")

@@ -21,7 +21,6 @@ from mpi4py import MPI
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.certify.estimate.contact_errors import ratio
 from hvi_fenicsx.mesh.thresholds import Thresholds
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.runtime import timing
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
@@ -34,7 +33,7 @@ from hvi_fenicsx.system import petsc_options
 from hvi_fenicsx.system.assemble import assemble
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.system import System
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import finish, prepare
 
 COMM = MPI.COMM_WORLD
 HYPRE = (

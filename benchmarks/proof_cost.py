@@ -17,8 +17,7 @@ import common
 
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.certify.uniqueness import uniqueness
-from hvi_fenicsx.preparation import prepare
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import finish, prepare
 
 LAWS: dict[str, dict[str, Any]] = {
     "quadratic_linear": {},

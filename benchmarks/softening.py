@@ -23,11 +23,10 @@ from typing import Any
 from typing_extensions import override
 
 from hvi_fenicsx import Scene
-from hvi_fenicsx.preparation import DEFAULT, prepare
 from hvi_fenicsx.runtime.newton_step import NewtonStep
 from hvi_fenicsx.solvers.thresholds import PathThresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import DEFAULT, finish, prepare
 
 Table = dict[str, Any]
 DEMOS = Path(__file__).parent.parent / "demos"

@@ -54,7 +54,7 @@ _HOME = {
     "dump_scene": "scene",
     "equilibria": "modelling",
     "follow": "modelling",
-    "prepare": "preparation",
+    "prepare": "workflow",
     "read_scene": "scene",
     "set_log_level": "runtime.log",
     "solve": "modelling",
@@ -131,11 +131,11 @@ if TYPE_CHECKING:
         solve,
         study,
     )
-    from .preparation import prepare
     from .runtime.log import set_log_level
     from .runtime.newton_step import NewtonStep
     from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
+    from .workflow import prepare
 
 
 def __dir__() -> list[str]:

@@ -11,15 +11,14 @@ from .accuracy.goal import AccuracyResult
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
 from .load_path import LoadPath
-from .preparation import Preparation
 from .problem import effect_summary
 from .rigid import AnyBody, LoadFactors, Mode
 from .runtime.percent import percent
 from .scene import PathTable
-from .solution import Solution
 from .solvers import nested_iteration, registry
 from .solvers.result import Counts
 from .system import loading
+from .workflow import Preparation, Solution
 
 NO_HISTORY = (
     "a single run has none: it finds an equilibrium at this load, and a joint that is unloaded heals; `hvi path` "

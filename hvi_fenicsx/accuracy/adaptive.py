@@ -17,18 +17,16 @@ from ..certify.estimate.estimator import Estimate
 from ..mesh import refinement
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
-from ..preparation import DEFAULT, Preparation, Thresholds, prepare
 from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
-from ..solution import Solution
 from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import refined_levels
 from ..system.levels import Level, Levels
 from ..typing import Entities
-from ..workflow import find_solution
+from ..workflow import DEFAULT, Preparation, Solution, Thresholds, find_solution, prepare
 from . import first_mesh
 from .thresholds import CONTROL, ControlThresholds
 

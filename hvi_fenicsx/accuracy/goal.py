@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import ExitCode
-from ..solution import Solution
+from ..workflow import Solution
 from .adaptive import AdaptiveLevel
 from .cost_forecast import AdaptiveStep, Cost
 

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 from .. import console
 from ..errors import ExitCode
-from ..preparation import Preparation, prepare
 from ..runtime import terminal
 from ..runtime.mpi import on_root
 from ..scene import read_scene
+from ..workflow import Preparation, prepare
 from . import sizes
 from .telling import COMM
 

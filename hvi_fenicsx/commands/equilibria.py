@@ -11,7 +11,6 @@ from typing import Any
 
 from .. import console, results
 from ..errors import ExitCode
-from ..preparation import Preparation, prepare
 from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
 from ..results.whole import made, picture_process, write_whole
@@ -24,6 +23,7 @@ from ..stationary_points.bodies import Equilibria
 from ..stationary_points.found import Found, Saved
 from ..stationary_points.progress_words import Clock, certified_in_words, counted
 from ..system import petsc_options
+from ..workflow import Preparation, prepare
 from . import equilibria_files as files
 from . import search_file, target, telling
 from .search_file import SearchFile

@@ -12,16 +12,15 @@ import numpy as np
 from .. import results
 from ..certify.contact_state import ContactState
 from ..errors import ExitCode
-from ..preparation import Preparation
 from ..results.write import write_record
 from ..runtime import memory, versions, writing
 from ..runtime.mpi import largest, on_root
 from ..scene import Scene, dump_scene
-from ..solution import Solution
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.found import Found
 from ..stationary_points.point_list import StationaryPoint
 from ..stationary_points.search import falls_passed
+from ..workflow import Preparation, Solution
 
 TABLE = "equilibria.csv"
 COLUMNS = ("index", "energy", "kind", "max_slip", "max_opening", "broken", "folder")

@@ -13,13 +13,13 @@ from ..load_path import PathRow
 from ..path import journal
 from ..path.following import Control, PathRun
 from ..path.journal import Journal, Record
-from ..preparation import prepare
 from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
 from ..scene import PathTable, Scene, read_scene
 from ..system import petsc_options
+from ..workflow import prepare
 from . import target, telling
 from .telling import COMM
 

@@ -15,16 +15,14 @@ from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.goal import AccuracyResult, Goal
 from ..errors import ExitCode, InputError
 from ..path import last_borne
-from ..preparation import prepare
 from ..results.whole import BegunResult, begin_whole, picture_process
 from ..runtime import log
 from ..runtime.mpi import on_root
 from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
 from ..scene import Scene, read_scene
-from ..solution import Solution
 from ..system import petsc_options
-from ..workflow import find_solution
+from ..workflow import Solution, find_solution, prepare
 from . import target, telling
 from .telling import COMM
 

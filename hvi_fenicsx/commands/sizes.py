@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..preparation import Preparation
 from ..problem import side_moments
 from ..problem.problem import Problem
 from ..solvers import obstacle_force
 from ..system import existence
+from ..workflow import Preparation
 
 
 @dataclass(frozen=True, kw_only=True)

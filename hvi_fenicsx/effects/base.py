@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict
 
 from ..class_registry import enter
 from ..errors import InputError
+from ..formula import SpatialValue
 from ..laws import Superpotential
-from ..spatial_value import SpatialValue
 from ..typing import Array
 from .contribution import Contribution
 

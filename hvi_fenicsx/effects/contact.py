@@ -11,9 +11,8 @@ import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, SerializationInfo, model_serializer, model_validator
 from typing_extensions import override
 
-from ..formula import Formula
+from ..formula import Formula, SpatialValue
 from ..schema import refusal
-from ..spatial_value import SpatialValue
 from ..typing import Array
 from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove

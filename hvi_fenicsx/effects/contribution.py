@@ -9,9 +9,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..formula import Formula
+from ..formula import Formula, SpatialValue
 from ..laws import Length, Mixity, Superpotential
-from ..spatial_value import SpatialValue
 from ..typing import Array
 
 

@@ -7,9 +7,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, PlainSerializer
 
 from ..errors import InputError
-from ..formula import Formula
+from ..formula import Formula, SpatialValue
 from ..schema import refusal
-from ..spatial_value import SpatialValue
 
 
 def as_formula(value: Any) -> SpatialValue:

@@ -21,9 +21,8 @@ from typing_extensions import override
 
 from .. import laws
 from ..errors import InputError
-from ..formula import Formula
+from ..formula import Formula, SpatialValue
 from ..schema import refusal, shown
-from ..spatial_value import SpatialValue
 from . import law_formulas
 from .base import Effect, Evaluate, FormContext, Place, Sizes
 from .contribution import ONE, BoundaryLaw, Contribution, Direction

@@ -16,10 +16,9 @@ import numpy as np
 
 from .. import laws
 from ..errors import InputError
-from ..formula import Formula
+from ..formula import Formula, SpatialValue
 from ..geometry import spot
 from ..schema import Keys
-from ..spatial_value import SpatialValue
 from ..typing import Array, Mask
 from .contribution import ONE
 

@@ -8,9 +8,8 @@ from pydantic import BeforeValidator, PlainSerializer
 from typing_extensions import override
 
 from ..errors import InputError
-from ..formula import Formula
+from ..formula import Formula, SpatialValue
 from ..schema import refusal
-from ..spatial_value import SpatialValue
 from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad, part_of
 from .contribution import Condition, Contribution
 from .formula_field import FormulaField

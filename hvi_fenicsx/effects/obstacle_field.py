@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, ValidationInfo
 from typing_extensions import override
 
+from ..formula import SpatialValue
 from ..schema import refusal, unknown
-from ..spatial_value import SpatialValue
 from ..typing import Array
 from .obstacles import Obstacle, Plane
 

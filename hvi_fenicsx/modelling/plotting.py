@@ -17,7 +17,7 @@ from ..report.reader import Result
 from ..results import gathering
 from ..results.summary import summary
 from ..runtime.mpi import on_root
-from ..solution import Solution
+from ..workflow import Solution
 
 
 def draw(solution: Solution, picture: str) -> Figure | None:

@@ -23,9 +23,9 @@ from ..results.whole import picture_process, write_whole
 from ..runtime import log, notebook
 from ..runtime.argument_checks import require_kind, require_path
 from ..runtime.percent import percent
-from ..solution import Solution
 from ..solvers.result import SolveResult
 from ..typing import Array
+from ..workflow import Solution
 from . import plotting
 
 _LOG = log.logger("modelling")

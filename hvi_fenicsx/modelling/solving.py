@@ -11,21 +11,20 @@ from dolfinx import fem
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from .. import console, preparation, workflow
+from .. import console, workflow
 from ..errors import InputError
 from ..load_path import LoadPath
 from ..mesh.domain import Domain
 from ..path import last_borne
-from ..preparation import DEFAULT, Preparation, Thresholds
 from ..problem import spaces
 from ..runtime.argument_checks import require_kind, require_switch
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
 from ..scene import Scene, SolverTable
 from ..schema import located_error
-from ..solution import Solution
 from ..solvers.context import Progress
 from ..system import petsc_options
+from ..workflow import DEFAULT, Preparation, Solution, Thresholds
 from . import values
 from .model import Model, is_portable, scene_and_ranks
 from .solution import ModelSolution
@@ -111,7 +110,7 @@ def check(
     domain = _domain(model) if isinstance(model, Model) else None
     scene = _with_options(scene, options)
     with model.tables.naming() if isinstance(model, Model) else nullcontext():
-        prepared = preparation.prepare(scene, ranks, timer, domain, thresholds=thresholds)
+        prepared = workflow.prepare(scene, ranks, timer, domain, thresholds=thresholds)
     return ModelPreparation(**fields_of(prepared))
 
 

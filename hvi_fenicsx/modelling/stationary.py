@@ -12,11 +12,11 @@ from ..runtime import log
 from ..runtime.argument_checks import require_between, require_switch
 from ..runtime.mpi import time_over
 from ..scene import Scene
-from ..solution import Solution
 from ..stationary_points import bodies
 from ..stationary_points.found import Found
 from ..stationary_points.passes import Pass
 from ..stationary_points.progress_words import Clock, certified_in_words
+from ..workflow import Solution
 from .model import Model
 from .solution import ModelSolution
 from .solving import check, fields_of

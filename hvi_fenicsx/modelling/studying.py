@@ -15,12 +15,12 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, NotWrittenError
+from ..formula import SpatialValue
 from ..mesh.shapes import OnlyMesh
 from ..results.output_folder import OutputFolder, existing, placed
 from ..runtime.argument_checks import require_path
 from ..runtime.mpi import on_root
 from ..scene import Scene
-from ..spatial_value import SpatialValue
 from ..studies import axes as study_axes
 from ..studies import plan as study_plan
 from ..studies.here import run_here

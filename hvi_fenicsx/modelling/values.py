@@ -14,9 +14,8 @@ from typing_extensions import override
 
 from .. import compat
 from ..errors import InputError
-from ..formula import Formula
+from ..formula import Formula, SpatialValue
 from ..mesh import nodes
-from ..spatial_value import SpatialValue
 from ..typing import Array
 
 

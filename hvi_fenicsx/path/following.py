@@ -17,13 +17,13 @@ from ..equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from ..equilibrium_paths.watch import Watch
 from ..errors import InputError
 from ..load_path import LoadPath, PathRow
-from ..preparation import Preparation
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..scene import PathTable
 from ..solvers import obstacle_force
 from ..system import existence, loading
 from ..system.condensation import Condensation
+from ..workflow import Preparation
 from . import records
 from .certifying import Certifier, Verdict
 from .journal import Record

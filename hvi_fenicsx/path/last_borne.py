@@ -14,16 +14,15 @@ import numpy as np
 from ..certify import certificate, plausibility
 from ..equilibrium_paths.state import End
 from ..errors import InputError, SolverError
-from ..preparation import Preparation
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..runtime.log import logger
 from ..scene import PathTable
-from ..solution import LastBorne, Solution
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.context import never
 from ..solvers.result import Borne
 from ..system import loading
+from ..workflow import LastBorne, Preparation, Solution
 
 _LOG = logger("path")
 

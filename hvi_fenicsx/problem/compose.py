@@ -16,10 +16,10 @@ from dolfinx import fem
 
 from ..effects import Drive, Evaluate, Place, load_name
 from ..errors import InputError
+from ..formula import SpatialValue
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
-from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from . import bulk, contact_parts, dirichlet, interfaces, part_facets, part_laws, scaling
 from .contact_surface import Surface

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..effects import Effect, NormalBounds, ObstacleForce, Towards, load_name
 from ..errors import InputError
+from ..formula import SpatialValue
 from ..mesh import nodes
 from ..runtime.mpi import agree
-from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from . import contact_normals, contact_surface, facing_sides
 from .contact_surface import Surface

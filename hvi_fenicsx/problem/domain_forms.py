@@ -13,10 +13,10 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..effects import Place, SideMoments
+from ..formula import SpatialValue
 from ..mesh import curved_cells, nodes
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
-from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from . import side_moments
 from .scaling import Placed, Scales

@@ -12,11 +12,11 @@ from mpi4py import MPI
 
 from ..effects import BoundaryLaw
 from ..errors import InputError
+from ..formula import SpatialValue
 from ..laws import Superpotential
 from ..mesh import nodes
 from ..runtime import forms
 from ..runtime.mpi import agree
-from ..spatial_value import SpatialValue
 from ..typing import Array, Entities
 from .contact_surface import Surface
 from .domain_forms import DomainForms, ScaledMeasure

@@ -16,12 +16,12 @@ import numpy.typing as npt
 from dolfinx import fem
 
 from ..effects import Contribution, Effect
+from ..formula import SpatialValue
 from ..mesh import nodes
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
 from ..rigid import AnyBody
 from ..runtime import forms
-from ..spatial_value import SpatialValue
 from ..typing import Array, Entities, Integers
 from . import bodies, contact_surface, coupling, spaces
 from .bodies import MeshBodies

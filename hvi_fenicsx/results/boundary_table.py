@@ -15,8 +15,8 @@ from ..problem import part_areas, spaces
 from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..runtime.row_order import RowOrder
-from ..solution import Solution
 from ..typing import Array, Entities
+from ..workflow import Solution
 from . import table_file
 
 QUANTITIES = ("", "u_", "traction_", "reaction_")

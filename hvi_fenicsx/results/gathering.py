@@ -23,8 +23,8 @@ from ..report.contact_part import ContactPart
 from ..report.solution_arrays import LoadArrays, Singles, SolutionArrays, members, of_members
 from ..runtime.mpi import agree, joined
 from ..runtime.row_order import RowOrder, distinct
-from ..solution import Solution
 from ..typing import Array, Entities, Integers
+from ..workflow import Solution
 from . import contact_rows
 
 

@@ -16,7 +16,7 @@ from ..problem.problem import Problem
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
-from ..solution import Solution
+from ..workflow import Solution
 from . import contact_rows, contact_table, path_table, table_file, vtk_fields
 from .summary import plain, summary
 

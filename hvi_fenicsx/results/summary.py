@@ -11,7 +11,7 @@ from ..problem import effect_summary
 from ..problem.problem import Problem
 from ..runtime import memory, versions
 from ..runtime.mpi import agree, largest
-from ..solution import Solution
+from ..workflow import Solution
 
 
 def summary(solution: Solution) -> dict[str, Any]:

@@ -19,8 +19,8 @@ from ..problem import spaces
 from ..problem.problem import Problem
 from ..problem.stress import von_mises
 from ..rigid import Mode
-from ..solution import Solution
 from ..typing import Array, Entities, Integers
+from ..workflow import Solution
 from . import cell_strain, vtk_files
 from .vtk_files import Grid
 

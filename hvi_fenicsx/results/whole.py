@@ -14,8 +14,8 @@ from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime.mpi import on_root
 from ..runtime.processors import is_processor_free
 from ..runtime.timing import Timer
-from ..solution import Solution
 from ..typing import Array
+from ..workflow import Solution
 from .folder import ResultFolder
 from .summary import summary
 from .write import write_basis, write_fields, write_record

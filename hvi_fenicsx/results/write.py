@@ -13,8 +13,8 @@ from ..report.solution_arrays import FILE, members
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
-from ..solution import Solution
 from ..typing import Array
+from ..workflow import Solution
 from . import array_file, boundary_table, contact_table, gathering, vtk_fields
 
 

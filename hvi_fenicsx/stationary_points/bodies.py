@@ -9,14 +9,12 @@ import numpy as np
 
 from ..certify.uniqueness import is_convex
 from ..errors import SolverError
-from ..preparation import Preparation
 from ..runtime.mpi import agree
-from ..solution import Solution
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.result import SolveResult
 from ..system.condensation import Condensation
 from ..typing import Array
-from ..workflow import certified, finish
+from ..workflow import Preparation, Solution, certified, finish
 from .condensed_form import scalar_problem
 from .curved_laws import CurvedLaws
 from .found import Found, Keep, Saved, Wanted, forget

@@ -21,8 +21,7 @@ from ..runtime import writing
 from ..runtime.mpi import largest, on_root
 from ..runtime.timing import Timer
 from ..scene import Scene
-from ..solution import Solution
-from ..workflow import solve
+from ..workflow import Solution, solve
 from . import cost
 from .solution_fields import fields, width
 from .stiffness import stiffness

@@ -9,8 +9,8 @@ from scipy import sparse
 from ..mesh import nodes
 from ..problem import spaces
 from ..runtime.mpi import joined
-from ..solution import Solution
 from ..typing import Integers
+from ..workflow import Solution
 
 
 def stiffness(solution: Solution) -> sparse.csr_array | None:

@@ -48,8 +48,7 @@ def run(scene_file: Path, limit: float = 60.0) -> Answer:
     """Solve a scene file in this process, with at most so many seconds of processor time for the solve."""
     from hvi_fenicsx import read_scene
     from hvi_fenicsx.errors import InputError, Interrupted
-    from hvi_fenicsx.preparation import prepare
-    from hvi_fenicsx.workflow import finish
+    from hvi_fenicsx.workflow import finish, prepare
 
     began = time.process_time()
     try:

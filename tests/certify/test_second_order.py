@@ -15,8 +15,7 @@ from runs import ROOT
 from scenes import STEEL, Table, displacement, points, solved
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.preparation import DEFAULT
-from hvi_fenicsx.solution import Solution
+from hvi_fenicsx.workflow import DEFAULT, Solution
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "attack"))
 

@@ -13,9 +13,7 @@ from scenes import Table, model
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.certify.supporting_parabolas import needed_falls
 from hvi_fenicsx.certify.thresholds import UNIQUENESS
-from hvi_fenicsx.preparation import prepare
-from hvi_fenicsx.solution import Solution
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import Solution, finish, prepare
 
 DROP = ((0.0, 0.0), (9e-6, 3e6), (9e-6, 1.5e6))
 TEETH = ((0.0, 0.0), (4e-6, 8e5), (4e-6, 3e5), (9e-6, 9e5), (9e-6, 2e5))

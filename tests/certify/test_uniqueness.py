@@ -12,9 +12,7 @@ from hvi_fenicsx import Scene, console, laws
 from hvi_fenicsx.certify import uniqueness
 from hvi_fenicsx.certify.thresholds import UniquenessThresholds
 from hvi_fenicsx.laws import Superpotential
-from hvi_fenicsx.preparation import prepare
-from hvi_fenicsx.solution import Solution
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import Solution, finish, prepare
 
 TRESCA = {"law": "tresca", "yield_traction": 2e6}
 PAPER = {"gamma1": 1e3, "gamma2": 5e2, "delta": 9e-6}

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from runs import RANKS
 from scenes import NESTED
 
-from hvi_fenicsx import Scene, preparation, read_scene, workflow
+from hvi_fenicsx import Scene, read_scene, workflow
 from hvi_fenicsx.mesh import coarsening_2d, gmsh_file, thinned_outline
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
@@ -140,7 +140,7 @@ def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None
     thresholds = replace(NESTED, mesh=COARSER)
     nested = workflow.solve(scene(tmp_path, *convex), thresholds=thresholds)
     alone = scene(tmp_path, *convex, 'solver={linear_solver="lu"}')
-    direct = workflow.finish(preparation.prepare(alone, domain=alone.domain.build(COMM, 2), thresholds=thresholds))
+    direct = workflow.finish(workflow.prepare(alone, domain=alone.domain.build(COMM, 2), thresholds=thresholds))
     assert nested.solve_result is not None
     assert nested.solve_result.levels > 1
     assert nested.converged

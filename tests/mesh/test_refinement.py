@@ -21,7 +21,7 @@ from domains import BODIES, COMM, half_disk, lost, measure, rough, towards, volu
 from runs import LONG_RANKS
 from scenes import model, quadratic_linear, solved_system
 
-from hvi_fenicsx import Scene, preparation, workflow
+from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.mesh import gmsh_file, refinement
 from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
@@ -148,7 +148,7 @@ def test_prolongation_turns_with_the_frames() -> None:
 @pytest.mark.parametrize("scene", [Scene.model_validate(model(8, 3e6, friction=quadratic_linear(1e6))), slanted(0.1)])
 def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
     """The solution of the finest mesh is that of a direct solve from rest; few steps remain from the coarser one."""
-    coarse, options = preparation.prepare(scene, COMM), options_of(scene.solver)
+    coarse, options = workflow.prepare(scene, COMM), options_of(scene.solver)
     options = replace(options, thresholds=SolverThresholds(linear=LinearThresholds(largest_direct={2: 500, 3: 500})))
     control, found = RunControl(timer=Timer()), solved_system(coarse)
     for k in range(3):
@@ -165,7 +165,7 @@ def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
         found = solve_from_coarser(system, start, coarse.solvability, options, control)
     assert found.result.converged
     assert found.result.levels == 4
-    direct = workflow.finish(preparation.prepare(scene, COMM, domain=step.domain)).solve_result
+    direct = workflow.finish(workflow.prepare(scene, COMM, domain=step.domain)).solve_result
     assert direct is not None
     assert np.max(np.abs(found.result.u.x.array - direct.u.x.array)) < 1e-6 * np.max(np.abs(direct.u.x.array))
     assert found.result.counts.newton <= 4 * direct.counts.newton

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scenes import NESTED, solved_system
 
-from hvi_fenicsx import InputError, preparation, read_scene, workflow
+from hvi_fenicsx import InputError, read_scene, workflow
 from hvi_fenicsx.mesh.blocks import block, coarser_cells
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
@@ -86,7 +86,7 @@ def test_multigrid_iterations_do_not_grow_with_the_mesh() -> None:
 def iterations(cells: int) -> int:
     """Of a solve with contact closed, to 1e-8."""
     scene = read_scene(DEMOS / "wall_left.toml", [f"domain.cells=[{cells}, {cells}]", "solver={}"])
-    prepared = preparation.prepare(scene, thresholds=NESTED)
+    prepared = workflow.prepare(scene, thresholds=NESTED)
     levels = solved_system(prepared).levels
     solver = ActiveSetSolver(prepared.system, levels, LinearSettings("mg"), Timer())
     contact = contact_dofs(prepared.system).astype(np.int32)
@@ -117,7 +117,7 @@ def test_a_preconditioner_used_before_is_that_made_anew(kind: Kind) -> None:
 def with_levels(demo: str, cells: int) -> tuple[System, Levels]:
     """A demo on a square of so many cells a side, with its coarser levels."""
     scene = read_scene(DEMOS / f"{demo}.toml", [f"domain.cells=[{cells}, {cells}]"])
-    prepared, control = preparation.prepare(scene, thresholds=NESTED), RunControl(timer=Timer())
+    prepared, control = workflow.prepare(scene, thresholds=NESTED), RunControl(timer=Timer())
     return prepared.system, coarser_levels(prepared.model, prepared.system, prepared.options, control)
 
 
@@ -154,7 +154,7 @@ def test_a_refined_file_is_solved_from_level_to_level(body: str, tmp_path: Path)
         for more, solver in (("refinements=3", []), ("scale=1.0", ['solver={linear_solver="lu"}']))
     )
     mesh = replace(scene.domain.build_hierarchy(MPI.COMM_WORLD, 2, NESTED.mesh), coarsening=None)
-    direct = workflow.finish(preparation.prepare(alone, domain=mesh, thresholds=NESTED))
+    direct = workflow.finish(workflow.prepare(alone, domain=mesh, thresholds=NESTED))
     found = workflow.solve(scene, thresholds=NESTED)
     assert found.solve_result is not None
     assert found.solve_result.levels > 1

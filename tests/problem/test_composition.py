@@ -19,12 +19,11 @@ from runs import hvi, summary, write_scene
 from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.preparation import Preparation, Thresholds
 from hvi_fenicsx.solvers import SolveResult
 from hvi_fenicsx.solvers.registry import choose
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import Preparation, Thresholds, finish
 
 SPRING = {"law": "linear_spring", "stiffness": 1e12}
 LAW = quadratic_linear(1e3)

@@ -8,7 +8,7 @@ from joint_scenes import seam_scene
 from scenes import Table
 
 from hvi_fenicsx import prepare
-from hvi_fenicsx.preparation import Preparation
+from hvi_fenicsx.workflow import Preparation
 
 LENGTH, AREA = 0.6, 0.6 * 0.8
 DROP = {"law": "graph", "points": [[0, 0], [1e-6, 8e5], [1e-6, 5e5]]}

@@ -22,7 +22,6 @@ from scenes import STEEL, Table, model, quadratic_linear, two_blocks
 from hvi_fenicsx import Scene, workflow
 from hvi_fenicsx.errors import HviError, InputError, NotWrittenError
 from hvi_fenicsx.mesh import nodes
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.report.pictures.draw import PictureProcess
 from hvi_fenicsx.report.solution_arrays import SolutionArrays, members
 from hvi_fenicsx.results import (
@@ -38,7 +37,7 @@ from hvi_fenicsx.results.whole import begin_whole
 from hvi_fenicsx.runtime.mpi import in_turn, on_root
 from hvi_fenicsx.runtime.row_order import RowOrder
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solution import Solution
+from hvi_fenicsx.workflow import Solution, prepare
 
 COMM = MPI.COMM_WORLD
 SPRING = {"law": "linear_spring", "stiffness": 1e10}

@@ -14,9 +14,9 @@ from scenes import model, quadratic_linear
 
 from hvi_fenicsx import Scene, solve
 from hvi_fenicsx.errors import NotWrittenError
-from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.runtime import log
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.workflow import Thresholds
 
 NESTED = Thresholds(solvers=SolverThresholds(nested_from=500))
 LAW = quadratic_linear(1.0e6)

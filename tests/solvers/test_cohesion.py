@@ -12,7 +12,7 @@ from runs import contact, run_all, summary
 from scenes import Table, solved
 from scipy.optimize import minimize
 
-from hvi_fenicsx import InputError, Scene, Solution, preparation, solve
+from hvi_fenicsx import InputError, Scene, Solution, solve, workflow
 from hvi_fenicsx.certify.contact_state import ContactState
 from hvi_fenicsx.laws import Length
 
@@ -106,7 +106,7 @@ def test_each_mode_dissipates_its_share_of_the_area_under_the_law(angle: float) 
 def test_the_forces_are_the_derivative_of_the_energy(dimension: int) -> None:
     """At random separations, some of them closed."""
     table = square({"cohesion": law(BOND, beta=0.7)}, {"traction": [1.0e6] * dimension}, 1, dimension)
-    system = preparation.prepare(Scene.model_validate(table)).system
+    system = workflow.prepare(Scene.model_validate(table)).system
     (term,) = system.terms
     rng, n = np.random.default_rng(1), system.load.local_size
     u = rng.normal(size=n) * 2 * term.law.length_scale
@@ -138,7 +138,7 @@ def test_the_strength_under_an_inclined_pull_is_that_of_an_ellipse(beta: float) 
     for tension, shear in ((0.6, 0.3), (0.2, -0.5), (0.0, 0.4)):
         along, up = shear * PEAK, tension * PEAK
         top = {"traction": [along, f"{up} + {12 * along}*(x - 0.5)"]}
-        found = preparation.prepare(
+        found = workflow.prepare(
             Scene.model_validate(square({"cohesion": law(BRITTLE, beta=beta)}, top, 4))
         ).solvability
         strength = 1.0 / np.hypot(tension, shear / beta)
@@ -151,7 +151,7 @@ def test_a_wide_block_takes_all_of_its_strength() -> None:
     floor = {"contact": {"gap": 0.0}, "cohesion": law(BRITTLE, beta=0.5)}
     table = square(floor, {"traction": [0.3 * PEAK, 0.4 * PEAK]}, 4)
     table["domain"]["size"] = [40.0, 1.0]
-    found = preparation.prepare(Scene.model_validate(table)).solvability
+    found = workflow.prepare(Scene.model_validate(table)).solvability
     assert found.lambda_peak == pytest.approx(1.0 / np.hypot(0.4, 0.6), rel=2e-3)
     assert found.state == "metastable"
 
@@ -170,7 +170,7 @@ def test_another_optimiser_ends_where_the_program_does(closes: bool) -> None:
     table = square(floor, {"displacement": [2.4e-6, 1.6e-6]}, 3)
     found = solved(table)
     state, scales = glue(found), found.problem.scales
-    system = preparation.prepare(Scene.model_validate(table)).system
+    system = workflow.prepare(Scene.model_validate(table)).system
     stiffness = system.jacobian.matrix.copy()
     stiffness.convert("dense")
     matrix, load = stiffness.getDenseArray(), system.load.array_r

@@ -20,9 +20,8 @@ from scenes import DELTA, Table, block, context_of, displacement, energy, far, m
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.certify.certificate import Certificate, examine
-from hvi_fenicsx.preparation import Preparation
-from hvi_fenicsx.solution import Solution
 from hvi_fenicsx.solvers import registry
+from hvi_fenicsx.workflow import Preparation, Solution
 
 Array = npt.NDArray[np.float64]
 Graph = list[tuple[float, float]]

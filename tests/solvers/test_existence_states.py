@@ -11,12 +11,12 @@ import pytest
 from runs import hvi, summary, write_scene
 from scenes import DELTA, STEEL, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, preparation, rigid, solve
+from hvi_fenicsx import Scene, rigid, solve, workflow
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.solvers.thresholds import BranchThresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import boundedness, existence
+from hvi_fenicsx.workflow import Thresholds
 
 GAMMA = 1.0e6
 LAW = quadratic_linear(GAMMA)
@@ -162,7 +162,7 @@ def test_a_convex_step_has_a_solution_as_long_as_its_branch_bears_the_push(
     body: Callable[[float], Table], share: float, broken: bool, expected: bool
 ) -> None:
     """Unbroken bonds bear γ1 L, broken ones γ2 L = γ1 L/2; in the plane and in space, where the law is one of |u_t|."""
-    prepared = preparation.prepare(Scene.model_validate(body(share * GAMMA)))
+    prepared = workflow.prepare(Scene.model_validate(body(share * GAMMA)))
     (term,) = prepared.problem.terms
     slip = np.full(len(term.surface.weights), 10 * term.law.length_scale if broken else 0.0)
     xi = [term.law.concave.right(slip)]
@@ -245,7 +245,7 @@ def test_in_space_a_law_that_has_fallen_below_zero_resists_nothing() -> None:
             "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
         },
     }
-    prepared = preparation.prepare(Scene.model_validate(table))
+    prepared = workflow.prepare(Scene.model_validate(table))
     term = prepared.problem.terms[0]
     beyond = term.law.concave.left(np.full(len(term.surface.blocks), 10.0 * term.law.length_scale))
     assert np.all(beyond > term.law.convex.right(np.array([10.0 * term.law.length_scale])))

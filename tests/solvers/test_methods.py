@@ -16,10 +16,9 @@ from scenes import P, Table, block, displacement, energy, far, model, quadratic_
 
 from hvi_fenicsx import NewtonStep, Scene, Solution, prepare
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.solvers.condensed import fischer_burmeister
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import Thresholds, finish
 
 METHODS = ["tao", "ssls", "condensed"]
 LIFTING = [0.0, "-1e6*(1 - 1.8*x)"]

@@ -10,7 +10,6 @@ import pytest
 from petsc4py import PETSc
 from scenes import P, model, quadratic_linear, solved
 
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
@@ -19,6 +18,7 @@ from hvi_fenicsx.solvers.smooth_method import smooth_models
 from hvi_fenicsx.system.equations import Equations
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.petsc_errors import raise_python_error
+from hvi_fenicsx.workflow import prepare
 
 
 def failing_at(number: int, function: Callable[..., object], raised: BaseException) -> Callable[..., object]:

@@ -14,7 +14,6 @@ from test_lengths import glued, random_graph, random_problem
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.laws.traction_graph import TractionGraph
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, chain
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
@@ -24,6 +23,7 @@ from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.workflow import prepare
 
 Array = npt.NDArray[np.float64]
 SOFTENING = ((0.0, 0.0), (1.0, 2.0), (3.0, 0.0))

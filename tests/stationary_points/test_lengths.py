@@ -13,7 +13,6 @@ from scipy.optimize import minimize
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.laws.traction_graph import TractionGraph
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.stationary_points.arcs import FREE, chain
 from hvi_fenicsx.stationary_points.bodies import Equilibria
 from hvi_fenicsx.stationary_points.boxes import fresh_box
@@ -24,6 +23,7 @@ from hvi_fenicsx.stationary_points.motions import divided
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
+from hvi_fenicsx.workflow import prepare
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]

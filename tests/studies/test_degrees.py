@@ -17,7 +17,6 @@ from runs import hvi, write_scene
 from scenes import Table, model, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, Solution
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.results import gathering
 from hvi_fenicsx.runtime.timing import Timer
@@ -27,7 +26,7 @@ from hvi_fenicsx.studies.reference_solution import ReferenceSolution
 from hvi_fenicsx.studies.solution_fields import SolutionFields, fields
 from hvi_fenicsx.studies.stiffness import stiffness
 from hvi_fenicsx.typing import Array
-from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow import finish, prepare
 
 LAW = quadratic_linear(1.0e6)
 

@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hvi_fenicsx import Scene, Solution, solve
-from hvi_fenicsx.preparation import DEFAULT, Preparation, Thresholds
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl, SolveContext
 from hvi_fenicsx.solvers.nested_iteration import LevelSolution
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.workflow import DEFAULT, Preparation, Thresholds
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]

@@ -11,8 +11,8 @@ from mpi4py import MPI
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.load_path import LoadPath
 from hvi_fenicsx.path.following import PathRun
-from hvi_fenicsx.preparation import DEFAULT
 from hvi_fenicsx.solvers.thresholds import PathThresholds
+from hvi_fenicsx.workflow import DEFAULT
 
 
 def path_run(table: dict[str, Any], *, formed: bool, comm: MPI.Comm = MPI.COMM_WORLD) -> PathRun:

@@ -7,7 +7,6 @@ import pytest
 from mpi4py import MPI
 from scenes import model
 
-from hvi_fenicsx.preparation import prepare
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.system import petsc_options
@@ -15,6 +14,7 @@ from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.typing import Array
+from hvi_fenicsx.workflow import prepare
 
 
 @pytest.fixture(scope="module")

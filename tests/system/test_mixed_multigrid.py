@@ -12,7 +12,6 @@ from mpi4py import MPI
 from scenes import NESTED, Table, model, two_blocks
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.preparation import Preparation
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene_model import model_of
 from hvi_fenicsx.solvers import nested_iteration
@@ -20,6 +19,7 @@ from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
 from hvi_fenicsx.system.levels import Levels
 from hvi_fenicsx.system.linear_settings import LinearSettings
+from hvi_fenicsx.workflow import Preparation
 
 
 def rubber(nu: float, kind: str = "plane_strain") -> Table:

@@ -13,7 +13,6 @@ from scenes import DELTA, displacement, model, quadratic_linear, solved
 from schur_ranks import SCENE
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
@@ -26,6 +25,7 @@ from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.workflow import Thresholds
 
 DIRECT = LinearSettings("lu")
 STRONG = quadratic_linear(3e6, DELTA)

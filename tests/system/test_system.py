@@ -19,7 +19,7 @@ from scenes import DELTA, NU, E, P, Q, Table, block, energy, model, quadratic_li
 
 from hvi_fenicsx import Scene, Superpotential, prepare
 from hvi_fenicsx.mesh import blocks, nodes
-from hvi_fenicsx.preparation import Preparation
+from hvi_fenicsx.workflow import Preparation
 
 Array = npt.NDArray[np.float64]
 STRONG = quadratic_linear(3e6)

@@ -23,10 +23,10 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx import Scene, solve
 from hvi_fenicsx.mesh import blocks, nodes, refinement
 from hvi_fenicsx.mesh.transfer import DegreeTransfer
-from hvi_fenicsx.preparation import Thresholds
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.workflow import Thresholds
 
 Array = npt.NDArray[np.float64]
 TRESCA: Table = {"law": "tresca", "yield_traction": 5e5}

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
+from ...formula import SpatialValue
 from ...problem import spaces
 from ...problem.problem import Bounds, Problem
-from ...spatial_value import SpatialValue
 from ...typing import Array, Entities
 from .bubbles import quadrature
 from .contact_facets import ContactFacets, contact_facets

@@ -1,4 +1,4 @@
-"""From a scene to a certified solution: domain, problem, existence, solve, certificate, estimate, in this order."""
+"""A prepared scene solved, certified and estimated."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from dataclasses import dataclass, replace
 from dolfinx import fem
 from mpi4py import MPI
 
-from .certify import certificate, correction, plausibility
-from .certify.certificate import Examination
-from .certify.estimate.estimator import estimate
-from .certify.uniqueness import Uniqueness, uniqueness
-from .errors import SolverError
+from ..certify import certificate, correction, plausibility
+from ..certify.certificate import Examination
+from ..certify.estimate.estimator import estimate
+from ..certify.uniqueness import Uniqueness, uniqueness
+from ..errors import SolverError
+from ..runtime.log import logger, newton_step, warn
+from ..runtime.timing import Timer
+from ..scene import Scene
+from ..solvers import frozen_mixity, nested_iteration, obstacle_force, refinement
+from ..solvers.coarse_start import CoarseStart
+from ..solvers.context import Progress, RunControl, never
+from ..solvers.nested_iteration import LevelSolution
+from ..solvers.obstacle_force import ObstacleBalance
+from ..solvers.result import SolveResult
+from ..system import free_motions
+from ..system.levels import Levels
 from .preparation import DEFAULT, Preparation, Thresholds, prepare
-from .runtime.log import logger, newton_step, warn
-from .runtime.timing import Timer
-from .scene import Scene
 from .solution import Solution
-from .solvers import frozen_mixity, nested_iteration, obstacle_force, refinement
-from .solvers.coarse_start import CoarseStart
-from .solvers.context import Progress, RunControl, never
-from .solvers.nested_iteration import LevelSolution
-from .solvers.obstacle_force import ObstacleBalance
-from .solvers.result import SolveResult
-from .system import free_motions
-from .system.levels import Levels
 
 _LOG = logger("workflow")
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from .certify import placed_forces
-from .certify.certificate import Certificate, Examination
-from .certify.estimate.estimator import Estimate
-from .certify.placed_forces import PlacedForces
-from .certify.uniqueness import Uniqueness
-from .errors import ExitCode
-from .problem.problem import Problem
-from .rigid import Solvability
-from .runtime.timing import Timer
-from .scene import Scene
-from .solvers.obstacle_force import ObstacleBalance
-from .solvers.result import SolveResult
-from .typing import Array
+from ..certify import placed_forces
+from ..certify.certificate import Certificate, Examination
+from ..certify.estimate.estimator import Estimate
+from ..certify.placed_forces import PlacedForces
+from ..certify.uniqueness import Uniqueness
+from ..errors import ExitCode
+from ..problem.problem import Problem
+from ..rigid import Solvability
+from ..runtime.timing import Timer
+from ..scene import Scene
+from ..solvers.obstacle_force import ObstacleBalance
+from ..solvers.result import SolveResult
+from ..typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)

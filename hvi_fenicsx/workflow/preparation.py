@@ -6,22 +6,22 @@ from dataclasses import dataclass, field
 
 from mpi4py import MPI
 
-from .certify import plausible_problem
-from .mesh import nodes
-from .mesh.domain import Domain, check_affordable
-from .mesh.thresholds import Thresholds as MeshThresholds
-from .problem.compose import Model
-from .problem.problem import Problem
-from .rigid import LoadFactors, Solvability
-from .runtime.log import logger, warn
-from .runtime.timing import Timer
-from .scene import Scene
-from .scene_model import model_of, options_of
-from .solvers.options import SolverOptions
-from .solvers.thresholds import Thresholds as SolverThresholds
-from .system import existence
-from .system.assemble import assemble
-from .system.system import System
+from ..certify import plausible_problem
+from ..mesh import nodes
+from ..mesh.domain import Domain, check_affordable
+from ..mesh.thresholds import Thresholds as MeshThresholds
+from ..problem.compose import Model
+from ..problem.problem import Problem
+from ..rigid import LoadFactors, Solvability
+from ..runtime.log import logger, warn
+from ..runtime.timing import Timer
+from ..scene import Scene
+from ..scene_model import model_of, options_of
+from ..solvers.options import SolverOptions
+from ..solvers.thresholds import Thresholds as SolverThresholds
+from ..system import existence
+from ..system.assemble import assemble
+from ..system.system import System
 
 _LOG = logger("preparation")
 

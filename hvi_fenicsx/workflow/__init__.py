@@ -1,0 +1,19 @@
+"""From a scene to a certified solution: domain, problem, existence, solve, certificate, estimate, in this order."""
+
+from .preparation import DEFAULT, Preparation, Thresholds, prepare
+from .solution import LastBorne, Solution
+from .solving import certified, find_solution, finish, solve, unsolved
+
+__all__ = [
+    "DEFAULT",
+    "LastBorne",
+    "Preparation",
+    "Solution",
+    "Thresholds",
+    "certified",
+    "find_solution",
+    "finish",
+    "prepare",
+    "solve",
+    "unsolved",
+]
