@@ -23,7 +23,7 @@ from typing import Any
 from typing_extensions import override
 
 from hvi_fenicsx import Scene
-from hvi_fenicsx.runtime.newton_step import NewtonStep
+from hvi_fenicsx.runtime.log import NewtonStep
 from hvi_fenicsx.solvers.thresholds import PathThresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.workflow import DEFAULT, finish, prepare

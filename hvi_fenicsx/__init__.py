@@ -40,7 +40,7 @@ _HOME = {
     "Isotropic": "modelling",
     "Model": "modelling",
     "Moment": "modelling",
-    "NewtonStep": "runtime.newton_step",
+    "NewtonStep": "runtime.log",
     "On": "modelling",
     "Orthotropic": "modelling",
     "Pressure": "modelling",
@@ -131,8 +131,7 @@ if TYPE_CHECKING:
         solve,
         study,
     )
-    from .runtime.log import set_log_level
-    from .runtime.newton_step import NewtonStep
+    from .runtime.log import NewtonStep, set_log_level
     from .runtime.versions import __version__
     from .scene import Scene, dump_scene, read_scene
     from .workflow import prepare

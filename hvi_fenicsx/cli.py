@@ -13,9 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from .arguments import parser
+from .commands.arguments import parser
 from .errors import ExitCode, HviError, InputError
-from .runtime import log, processes, rank_variables, terminal
+from .runtime import log, processes, terminal
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -82,11 +82,11 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
         return _version()
     if options.command == "study":
         return _study(options, words)
-    if getattr(options, "np", None) and not rank_variables.is_under_mpirun():
+    if getattr(options, "np", None) and not processes.is_under_mpirun():
         from .runtime import mpirun
 
         return mpirun.run(options.np, words)
-    if not rank_variables.is_under_mpirun():
+    if not processes.is_under_mpirun():
         return _run_on_ranks(options)
     from .runtime import mpirun
 
@@ -96,9 +96,7 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
 
 def _run_on_ranks(options: argparse.Namespace) -> int:
     with processes.held(processes.STOP):  # it would end an import with a library's own traceback
-        from .runtime import petsc
-
-        petsc.start()
+        processes.start_petsc()
         from mpi4py import MPI
 
         from .runtime.mpi import ended_together
@@ -132,12 +130,10 @@ def _in_one_line(text: str, options: argparse.Namespace) -> str:
 
 
 def _version() -> int:
-    from .runtime import petsc
-
-    petsc.start()
+    processes.start_petsc()
     from .runtime.versions import versions
 
-    if rank_variables.is_first_rank():
+    if processes.is_first_rank():
         terminal.say("\n".join(f"{name} {version}" for name, version in versions().items()))
     return ExitCode.CERTIFIED
 
@@ -147,10 +143,10 @@ def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
 
     None of them has started MPI yet, so they may end at any time.
     """
-    if rank_variables.is_under_mpirun():
-        if not rank_variables.is_first_rank():
+    if processes.is_under_mpirun():
+        if not processes.is_first_rank():
             return ExitCode.CERTIFIED
-        _become_single_process(options.np or rank_variables.ranks(), words)
+        _become_single_process(options.np or processes.ranks(), words)
     with processes.held(processes.STOP):
         from .studies import run as study
 
@@ -166,5 +162,5 @@ def _become_single_process(ranks: int, words: Sequence[str]) -> NoReturn:
 
 
 def _print_error(message: str) -> None:
-    if rank_variables.is_first_rank():
+    if processes.is_first_rank():
         terminal.complain(message)

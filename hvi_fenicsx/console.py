@@ -13,7 +13,7 @@ from .certify.estimate.estimator import Estimate
 from .load_path import LoadPath
 from .problem import effect_summary
 from .rigid import AnyBody, LoadFactors, Mode
-from .runtime.percent import percent
+from .runtime.terminal import percent
 from .scene import PathTable
 from .solvers import nested_iteration, registry
 from .solvers.result import Counts
@@ -196,7 +196,7 @@ def _part(value: float) -> str:
 
 
 def accuracy(reached: AccuracyResult) -> Iterator[str]:
-    """What was chosen for an accuracy, what it cost, and what this accuracy or a tenth of the error would cost."""
+    """What was chosen for an accuracy, and what it cost."""
     goal, steps = reached.goal, reached.steps
     if reached.why is not None:
         yield f"accuracy not reached: {reached.why}"
@@ -209,12 +209,6 @@ def accuracy(reached: AccuracyResult) -> Iterator[str]:
         f"accuracy: {_part(last.error)}{asked} of {what}, at degree {reached.degree} by {len(steps)} meshes up to "
         f"{last.dofs:,} unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
     )
-    if reached.more is not None:
-        more = reached.more
-        yield (
-            f"{_part(more.accuracy)} would take about {more.dofs:.1e} unknowns, {more.seconds:.3g} s and "
-            f"{more.memory / 1024:.2g} GB"
-        )
 
 
 def as_data(prepared: Preparation, factors: Mapping[str, LoadFactors]) -> dict[str, Any]:

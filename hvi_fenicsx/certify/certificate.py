@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from ..problem import references
 from ..problem.problem import Problem
-from ..runtime import notebook
+from ..runtime import terminal
 from ..runtime.mpi import largest, total
 from ..typing import Array
 from . import balance, between_nodes, contact_state, deviations
@@ -76,7 +76,7 @@ class Certificate:
 
     def _repr_html_(self) -> str:
         values = [(name, value) for name, value in self.as_dict().items() if value is not None]
-        return notebook.table((n.replace("_", " "), f"{v:.1e}" if type(v) is float else str(v)) for n, v in values)
+        return terminal.html_table((n.replace("_", " "), f"{v:.1e}" if type(v) is float else str(v)) for n, v in values)
 
     def __repr__(self) -> str:
         return f"Certificate({'passed' if self.passed else 'not passed'} at {self.tolerance:g}: {self})"

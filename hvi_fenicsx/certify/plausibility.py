@@ -11,7 +11,7 @@ from dolfinx import fem
 from ..effects import Direction
 from ..problem.problem import Problem
 from ..runtime.mpi import largest, total
-from ..runtime.percent import percent
+from ..runtime.terminal import percent
 from ..typing import Array
 from . import scene_keys
 from .certificate import Examination

@@ -1,20 +1,26 @@
-"""``hvi check``: a scene validated, its effects, rigid motions and existence told; nothing is solved."""
+"""``hvi check``: a scene validated, its effects, sizes, rigid motions and existence told; nothing is solved."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
 
 from .. import console
 from ..errors import ExitCode
+from ..problem import side_moments
 from ..runtime import terminal
 from ..runtime.mpi import on_root
 from ..scene import read_scene
+from ..solvers import obstacle_force
+from ..system import existence
 from ..workflow import Preparation, prepare
-from . import sizes
-from .telling import COMM
 
+COMM = MPI.COMM_WORLD
 _CODES = {"escapes": ExitCode.NO_SOLUTION, "undecided": ExitCode.NOT_CONVERGED}
 """What the command ends with, by the state."""
 
@@ -35,16 +41,55 @@ def execute(options: argparse.Namespace) -> int:
 
 def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> str:
     """What ``check`` prints. Collective."""
-    measured = sizes.of(prepared)
+    sizes = _sizes(prepared)
     factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:
-        data = console.as_data(prepared, factors) | {"sizes": measured.as_dict()}
-        return json.dumps(data, indent=2, ensure_ascii=False)
+        return json.dumps(console.as_data(prepared, factors) | {"sizes": sizes}, indent=2, ensure_ascii=False)
     lines = [
         *console.heading(prepared, COMM.size),
-        *measured.lines(),
+        *_size_lines(**sizes),
         *console.load_factors(factors),
         *console.effects(prepared),
         *console.history(prepared),
     ]
     return "\n".join(lines)
+
+
+def _sizes(prepared: Preparation) -> dict[str, Any]:
+    """Sizes in SI, by which mistakes in units are seen: the body's extent, areas, the sum of each load. Collective.
+
+    Raises:
+        InputError: on all ranks alike: forces press several obstacles.
+    """
+    problem, d = prepared.problem, prepared.problem.scales.dimension
+    loads = existence.loads_of_rigid_motions(problem, prepared.system.forces)
+    sums = {name: COMM.allreduce(force.array_r.reshape(-1, d).sum(axis=0)) for name, force in loads.items()}
+    pressed = obstacle_force.pressed(problem)
+    obstacles = {} if pressed is None else {pressed.name: pressed.force * pressed.direction}
+    return {
+        "body": list(map(float, problem.domain.upper - problem.domain.lower)),
+        "parts": {name: side_moments.of(problem.space, facets).area for name, facets in problem.part_facets.items()},
+        "loads": {name: _rounded(force * problem.scales.force) for name, force in sums.items()},
+        "obstacle_forces": {name: _rounded(force * problem.scales.force) for name, force in obstacles.items()},
+    }
+
+
+def _size_lines(
+    body: Sequence[float],
+    parts: Mapping[str, float],
+    loads: Mapping[str, Sequence[float]],
+    obstacle_forces: Mapping[str, Sequence[float]],
+) -> Iterator[str]:
+    """The sizes, a line for each kind."""
+    area, force = ("m", "N/m") if len(body) == 2 else ("m²", "N")
+    yield f"body: {' x '.join(f'{e:.4g}' for e in body)} m"
+    yield f"parts: {', '.join(f'{name} {value:.4g} {area}' for name, value in parts.items())}"
+    for what, forces in (("sum of", loads), ("force on the obstacle of", obstacle_forces)):
+        for name, total in forces.items():
+            yield f"{what} {name}: ({', '.join(f'{component:.4g}' for component in total)}) {force}"
+
+
+def _rounded(force: Any) -> list[float]:
+    """The components; what is only rounding beside the largest is zero."""
+    least = 1e-12 * float(np.max(np.abs(force), initial=0.0))
+    return [float(f) if abs(f) > least else 0.0 for f in force]

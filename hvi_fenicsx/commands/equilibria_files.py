@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from .. import results
 from ..certify.contact_state import ContactState
 from ..errors import ExitCode
-from ..results.write import write_record
-from ..runtime import memory, versions, writing
+from ..results import ResultFolder, plain, tables
+from ..results.summary import common
+from ..results.whole import write_record
+from ..runtime import writing
 from ..runtime.mpi import largest, on_root
-from ..scene import Scene, dump_scene
+from ..scene import dump_scene
 from ..stationary_points.bodies import Equilibria
 from ..stationary_points.found import Found
 from ..stationary_points.point_list import StationaryPoint
 from ..stationary_points.search import falls_passed
+from ..typing import Array
 from ..workflow import Preparation, Solution
 
 TABLE = "equilibria.csv"
@@ -82,16 +83,16 @@ def row(index: int, bodies: Equilibria, point: StationaryPoint, solution: Soluti
     )
 
 
-def _opening(state: ContactState) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _opening(state: ContactState) -> Array:
     return np.where(np.isfinite(state.gap), state.gap, -state.normal)
 
 
-def _largest(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+def _largest(values: Array) -> float:
     return float(np.max(values, initial=0.0))
 
 
 def write(
-    folder: results.ResultFolder, prepared: Preparation, found: Found, rows: list[Row], code: ExitCode, command: str
+    folder: ResultFolder, prepared: Preparation, found: Found, rows: list[Row], code: ExitCode, command: str
 ) -> None:
     """Write table, summary and scene. Collective.
 
@@ -103,70 +104,29 @@ def write(
         code: what the command ends with.
         command: the command line.
     """
-    record = _record(prepared, found, rows, code, command)
-    on_root(folder.comm, lambda: _write(folder, prepared.scene, found, rows, record))
-
-
-def _write(folder: results.ResultFolder, scene: Scene, found: Found, rows: list[Row], record: dict[str, Any]) -> None:
-    with writing.told(folder.work / TABLE), (folder.work / TABLE).open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(COLUMNS)
-        table.writerows([_cell(getattr(r, name)) for name in COLUMNS] for r in rows)
-    writing.text(folder.work / "scene.toml", dump_scene(scene, folder.target))
-    write_record(folder.work, record)
-
-
-def _cell(value: object) -> str:
-    return repr(float(value)) if isinstance(value, float) else str(value)
-
-
-def _record(prepared: Preparation, found: Found, rows: list[Row], code: ExitCode, command: str) -> dict[str, Any]:
-    """``summary.json``. Collective."""
-    scales, comm = prepared.problem.scales, prepared.system.comm
-    bound = math.nan if found.lower_bound is None else found.lower_bound * scales.energy
-    return dict(
-        results.plain(
-            {
-                "scene": prepared.scene.title,
-                "dofs": prepared.system.dofs,
-                "ranks": comm.size,
-                "reason": found.reason,
-                "exit_code": int(code),
-                "equilibria": {
-                    "count": len(rows),
-                    "complete": found.complete,
-                    "lowest_energy": rows[0].energy if rows else None,
-                    "lower_bound": bound,
-                    "gap": found.gap,
-                    "proven": found.proven,
-                    "nodes": found.nodes,
-                    "continua": [r.index for r in rows if not r.isolated],
-                    "barriers": barriers(found, rows),
-                    "uncertified": [r.index for r in rows if not r.certified],
-                },
-                "solvability": prepared.solvability.summary(),
-                "time": {name: largest(comm, value) for name, value in prepared.timer.report().items()},
-                "peak_memory_mb": memory.peak(comm),
-                "versions": versions.versions(),
-                "command": command,
-            }
-        )
+    entry = _entry(found, rows, prepared.problem.scales.energy)
+    record = common(prepared) | plain(
+        {"reason": found.reason, "exit_code": int(code), "equilibria": entry, "command": command}
     )
 
+    def act() -> None:
+        tables.write(folder.work / TABLE, COLUMNS, ([getattr(r, name) for name in COLUMNS] for r in rows))
+        writing.text(folder.work / "scene.toml", dump_scene(prepared.scene, folder.target))
+        write_record(folder.work, record)
 
-def barriers(found: Found, rows: list[Row]) -> list[dict[str, Any]]:
-    """The saddles that join two minimisers, and how far they are above these; by the rows' indices.
+    on_root(folder.comm, act)
 
-    Args:
-        found: by the search.
-        rows: of its equilibria.
-    """
-    return [
-        {
-            "saddle": rows[p.saddle].index,
-            "between": [rows[m].index for m in p.minimisers],
-            "energy": rows[p.saddle].energy,
-            "heights": [rows[p.saddle].energy - rows[m].energy for m in p.minimisers],
-        }
-        for p in found.passes
-    ]
+
+def _entry(found: Found, rows: list[Row], unit: float) -> dict[str, Any]:
+    """The entry ``equilibria`` of the summary."""
+    return {
+        "count": len(rows),
+        "complete": found.complete,
+        "lowest_energy": rows[0].energy if rows else None,
+        "lower_bound": math.nan if found.lower_bound is None else found.lower_bound * unit,
+        "gap": found.gap,
+        "proven": found.proven,
+        "nodes": found.nodes,
+        "continua": [r.index for r in rows if not r.isolated],
+        "uncertified": [r.index for r in rows if not r.certified],
+    }

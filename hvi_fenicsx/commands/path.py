@@ -3,53 +3,21 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from .. import console, path_output, results
+from .. import console
 from ..equilibrium_paths.state import End
 from ..load_path import PathRow
-from ..path import journal
 from ..path.following import Control, PathRun
-from ..path.journal import Journal, Record
-from ..runtime import log
+from ..results import path_files
+from ..runtime import journal
+from ..runtime.journal import Journal
 from ..runtime.mpi import on_root
-from ..runtime.signals import Interrupt
 from ..runtime.timing import Timer
-from ..scene import PathTable, Scene, read_scene
-from ..system import petsc_options
+from ..scene import PathTable
 from ..workflow import prepare
-from . import target, telling
-from .telling import COMM
-
-
-@dataclass(frozen=True, kw_only=True)
-class PathRequest:
-    """What ``hvi path`` is asked for.
-
-    Attributes:
-        scene: what to follow; it has the table.
-        wanted: the table.
-        folder: where the result goes.
-        known: the records of a path that was begun.
-        timer: where time goes.
-        given: the command line and PETSc's options, for ``summary.json``.
-        draw: whether to make a picture.
-    """
-
-    scene: Scene
-    wanted: PathTable
-    folder: results.ResultFolder
-    known: Sequence[Record]
-    timer: Timer
-    given: dict[str, str]
-    draw: bool
-
-    @property
-    def identity(self) -> str:
-        """What the journal says that it is of."""
-        return target.identity(self.scene, self.folder.target)
+from . import session
+from .session import COMM, LOG, Command, Session, say, tell_moving
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -58,31 +26,9 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         InputError: on all ranks alike.
     """
-    timer = Timer()
-    petsc_options.insert(options.petsc)
-    read = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
-    wanted = read.path or PathTable()
-    scene = read.changed(path=wanted)
-    goes_to = target.path_of(options, "-path")
-    if options.resume and (code := target.finished(goes_to, scene, "the path is followed again", _done)) is not None:
-        return code
-    with target.opened(options, goes_to) as folder:
-        known = on_root(COMM, lambda: _known(folder, scene) if options.resume else [])
-        request = PathRequest(
-            scene=scene,
-            wanted=wanted,
-            folder=folder,
-            known=known,
-            timer=timer,
-            given=target.given(options),
-            draw=not options.no_pictures,
-        )
-        return _run(request)
-
-
-def _known(folder: results.ResultFolder, scene: Scene) -> list[Record]:
-    """The records of a path that was begun. Rank 0 only."""
-    return journal.read(folder.target / journal.NAME, target.identity(scene, folder.target))
+    timer, scene = Timer(), session.scene_of(options)
+    command = Command(suffix="-path", again="the path is followed again", done=_done)
+    return session.execute(options, scene.changed(path=scene.path or PathTable()), command, timer, _run)
 
 
 def _done(record: dict[str, Any]) -> bool:
@@ -90,68 +36,62 @@ def _done(record: dict[str, Any]) -> bool:
     return record.get("path") is not None and record["path"]["end"] != End.INTERRUPTED
 
 
-def _run(request: PathRequest) -> int:
+def _run(call: Session) -> int:
     """Follow, write and tell; the exit code. Collective."""
-    interrupt = Interrupt(COMM)
-    interrupt.watch()
-    folder, run_logs = request.folder, telling.on_first_rank(lambda: log.RunLog(request.folder.work / "run.log"))
-    with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
-        with log.Handlers(*run_logs):
-            record = _followed(request, interrupt)
-        on_root(COMM, lambda: telling.finish(run_logs))
-        folder.commit(request.scene)
-        telling.say([*console.warnings(folder.kept), target.where(folder.target, request.timer)])
-    return int(record["exit_code"])
+    assert call.scene.path is not None
+    kept = _StateFile(call)
+    known = on_root(COMM, kept.known)
+    prepared = prepare(call.scene, COMM, call.timer)
+    say(console.heading(prepared, COMM.size))
+    run = PathRun(prepared, call.scene.path, call.interrupted)
+    say(console.path_wanted(call.scene.path, run.scaled))
+    if known:
+        say([f"{len(known)} rows are there already; on from factor {known[-1]['factor']:.6g}"])
+    control = Control(keep=kept.keep, progress=_tell, interrupted=call.interrupted, jumping=_tell_jump)
+    path = run.follow(control, known)
+    on_root(COMM, kept.close)
+    say(console.path_outcome(path))
+    draw = not call.options.no_pictures
+    return int(path_files.write(call.folder, run, path, call.given, LOG.info, draw=draw)["exit_code"])
 
 
-def _followed(request: PathRequest, interrupt: Interrupt) -> dict[str, Any]:
-    """The summary of the path that was followed and written. Collective."""
-    prepared = prepare(request.scene, COMM, request.timer)
-    telling.say(console.heading(prepared, COMM.size))
-    run = PathRun(prepared, request.wanted, interrupt.requested)
-    telling.say(console.path_wanted(request.wanted, run.scaled))
-    if request.known:
-        telling.say([f"{len(request.known)} rows are there already; on from factor {request.known[-1]['factor']:.6g}"])
-    writer = _JournalWriter(request)
-    control = Control(keep=writer.keep, progress=_tell, interrupted=interrupt.requested, jumping=_tell_jump)
-    path = run.follow(control, request.known)
-    on_root(COMM, writer.close)
-    telling.say(console.path_outcome(path))
-    return path_output.write(request.folder, run, path, request.given, telling.LOG.info, draw=request.draw)
-
-
-class _JournalWriter:
+class _StateFile:
     """Keeps each new state in the folder of the result; the file is opened with the first of them."""
 
-    def __init__(self, request: PathRequest) -> None:
-        self._request = request
-        self._journal: Journal | None = None
+    def __init__(self, call: Session) -> None:
+        self._call, self._journal, self._known = call, list[Journal](), list[journal.Record]()
 
-    def keep(self, record: Record) -> None:
-        """Keep a record. Collective."""
+    def known(self) -> list[journal.Record]:
+        """The states of a path that was begun and shall go on. Rank 0 only."""
+        if self._call.options.resume:
+            self._known = journal.read(self._call.folder.target / path_files.JOURNAL, self._call.identity)
+        return self._known
+
+    def keep(self, record: journal.Record) -> None:
+        """Keep a state. Collective."""
         on_root(COMM, lambda: self._append(record))
 
-    def _append(self, record: Record) -> None:
-        if self._journal is None:
-            file = self._request.folder.announce(journal.NAME)
-            if not self._request.known:
+    def _append(self, record: journal.Record) -> None:
+        if not self._journal:
+            file = self._call.folder.announce(path_files.JOURNAL)
+            if not self._known:
                 file.unlink(missing_ok=True)
-            self._journal = Journal(file, self._request.identity)
-        self._journal.append(record)
+            self._journal.append(Journal(file, self._call.identity))
+        self._journal[0].append(record)
 
     def close(self) -> None:
         """Close the file, if there is one. Rank 0 only."""
-        if self._journal is not None:
-            self._journal.close()
+        for opened in self._journal:
+            opened.close()
 
 
 def _tell_jump(factor: float, steps: int) -> None:
     """The moving line in the middle of a long jump."""
-    telling.LOG.debug("jump at the factor %.6g, step %d", factor, steps, extra={"moving": True})
+    tell_moving("jump at the factor %.6g, step %d", factor, steps)
 
 
 def _tell(number: int, row: PathRow) -> None:
     """The moving line."""
     place = f" on {row.part}" if row.part else ""
     kind = "" if row.stable else ", unstable"
-    telling.LOG.debug("row %d, factor %.6g%s: %s%s", number, row.factor, kind, row.event, place, extra={"moving": True})
+    tell_moving("row %d, factor %.6g%s: %s%s", number, row.factor, kind, row.event, place)

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..runtime import helper_process, memory
 from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
-from . import gmsh_checks, gmsh_model, gmsh_script
+from . import gmsh_checks, gmsh_model
 from .curved_facets import CurvedFacets
 from .domain import Domain, check_affordable
 from .gmsh_arrays import MeshArrays
@@ -118,12 +118,11 @@ def _is_script(path: Path) -> bool:
     """Whether the file is a script, and not a mesh.
 
     Raises:
-        InputError: it is neither, or a script that does more than to describe a mesh.
+        InputError: it is neither.
     """
     if not path.is_file():
         raise InputError(f"mesh file {path}: there is no such file; give the path from the scene's folder")
     if path.suffix in _SCRIPTS:
-        gmsh_script.check(path)
         return True
     with path.open("rb") as stream:
         if stream.read(len(_HEADER)) != _HEADER:

@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 from pydantic import ValidationError
 
-from .. import console, path_output
+from .. import console
 from ..errors import InputError
 from ..load_path import LoadPath
 from ..path.following import Control, PathRun
 from ..report.path_reader import PathResult
-from ..results import ResultFolder
+from ..results import ResultFolder, path_files
 from ..results.output_folder import existing
 from ..runtime import log
 from ..runtime.argument_checks import require_path
@@ -142,7 +142,7 @@ class ModelPath(LoadPath):
         require_path("folder", folder)
         comm = self.run.prepared.system.comm
         with ResultFolder(comm, Path(folder), existing(force=force)) as target:
-            path_output.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)
+            path_files.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)
             target.commit(self.run.prepared.scene)
 
     def free(self) -> None:

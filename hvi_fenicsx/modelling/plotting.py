@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from types import MethodType
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..problem.cell_stress import stress_of_parts
-from ..problem.stress import von_mises
 from ..report.pictures.xserver import XServer
 from ..report.reader import Result
 from ..results import gathering
-from ..results.summary import summary
 from ..runtime.mpi import on_root
 from ..workflow import Solution
 
@@ -33,17 +28,11 @@ def draw(solution: Solution, picture: str) -> Figure | None:
     Raises:
         InputError: on all ranks alike: there is no such picture of this solution.
     """
-    found = solution.solve_result
-    stress = None
-    if found is not None:
-        stress = von_mises(stress_of_parts(solution.problem.bulk, found.u)).astype(np.float32)
-    arrays, record = gathering.solution_arrays(solution, stress), summary(solution)
-    figures: list[Figure] = []
+    result, figures = gathering.result(solution), list[Figure]()
 
     def make() -> None:
-        assert arrays is not None
-        title = {"title": solution.scene.title}
-        figures.append(_figure(Result(Path("."), title, record, arrays), picture))
+        assert result is not None
+        figures.append(_figure(result, picture))
 
     on_root(solution.problem.domain.mesh.comm, make)
     return figures[0] if figures else None

@@ -17,12 +17,13 @@ from ..problem import spaces
 from ..problem.cell_stress import cell_stress, space_of_stress
 from ..problem.scaling import Scales
 from ..report.contact_part import ContactPart
-from ..results import ResultFolder, gathering
+from ..results import ResultFolder
+from ..results.contact_parts import contact_parts
 from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
-from ..runtime import log, notebook
+from ..runtime import log, terminal
 from ..runtime.argument_checks import require_kind, require_path
-from ..runtime.percent import percent
+from ..runtime.terminal import percent
 from ..solvers.result import SolveResult
 from ..typing import Array
 from ..workflow import Solution
@@ -101,7 +102,7 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
-        parts = gathering.part_arrays(self.problem, self._examined.states)
+        parts = contact_parts(self.problem, self._examined.states)
         return self.problem.domain.mesh.comm.bcast(_ContactParts(parts), root=0)
 
     @cached_property
@@ -201,4 +202,4 @@ class ModelSolution(Solution):
         return "\n".join(f"{name}: {text}" for name, text in self._rows())
 
     def _repr_html_(self) -> str:
-        return notebook.table(self._rows())
+        return terminal.html_table(self._rows())

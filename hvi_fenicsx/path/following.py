@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..load_path import LoadPath, PathRow
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
+from ..runtime.journal import Record
 from ..scene import PathTable
 from ..solvers import obstacle_force
 from ..system import existence, loading
@@ -26,7 +27,6 @@ from ..system.condensation import Condensation
 from ..workflow import Preparation
 from . import records
 from .certifying import Certifier, Verdict
-from .journal import Record
 from .measures import Measures
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..equilibrium_paths.state import Event, PathState, Place, Position
+from ..runtime.journal import Record
 from .certifying import Verdict
-from .journal import Record
 
 
 def record(state: PathState, verdict: Verdict) -> Record:

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..runtime import writing
 from ..typing import Array, Integers
 from .contact_part import ContactPart
 from .errors import ResultError
@@ -100,6 +101,16 @@ def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
     for name, part in arrays.parts.items():
         own = {key: getattr(part, attribute) for key, attribute in _OF_PART.items()}
         yield from ((f"{_PART}{name}:{key}", value) for key, value in {**own, **part.columns}.items())
+
+
+def save(path: Path, arrays: SolutionArrays) -> None:
+    """Write a solution, whole or not at all.
+
+    Raises:
+        NotWrittenError: it cannot be written.
+    """
+    with writing.whole(path) as aside, aside.open("wb") as stream:
+        np.savez(stream, **members(arrays))
 
 
 def load(path: Path) -> SolutionArrays:

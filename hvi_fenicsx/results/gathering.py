@@ -1,87 +1,67 @@
-"""A solution as plain arrays, in SI, by rank or on rank 0; its vertices are numbered as the unknowns are.
+"""A solution as plain arrays, in SI, on rank 0; its vertices are numbered as the unknowns are.
 
 At degree 2 its vertices are the nodes, and its cells and facets the parts of those of the mesh: the once refined mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
-from mpi4py import MPI
 
-from ..certify.contact_state import ContactState
 from ..effects import SurfaceLoad
 from ..formula import Formula
 from ..mesh import nodes
 from ..problem import spaces
+from ..problem.cell_stress import stress_of_parts
 from ..problem.problem import Problem
-from ..report.contact_part import ContactPart
-from ..report.solution_arrays import LoadArrays, Singles, SolutionArrays, members, of_members
+from ..problem.stress import von_mises
+from ..report.reader import Result
+from ..report.solution_arrays import LoadArrays, SolutionArrays
 from ..runtime.mpi import agree, joined
-from ..runtime.row_order import RowOrder, distinct
 from ..typing import Array, Entities, Integers
 from ..workflow import Solution
-from . import contact_rows
+from .contact_parts import contact_parts
+from .summary import summary
 
 
-def solution_arrays(solution: Solution, von_mises: Singles | None = None) -> SolutionArrays | None:
+def result(solution: Solution) -> Result | None:
+    """A solution in memory as a finished result, of which pictures are made, on rank 0; None elsewhere. Collective.
+
+    Args:
+        solution: what was found.
+    """
+    solved = solution.solve_result
+    stress = None if solved is None else stress_of_parts(solution.problem.bulk, solved.u)
+    arrays, record = solution_arrays(solution, stress), summary(solution)
+    return None if arrays is None else Result(Path("."), {"title": solution.scene.title}, record, arrays)
+
+
+def solution_arrays(solution: Solution, stress: Array | None = None) -> SolutionArrays | None:
     """A solution on rank 0; None elsewhere. Collective.
 
     Args:
         solution: what was found.
-        von_mises: of the parts of the cells that this rank owns, N/m², (c,); left out where it is None.
-    """
-    comm = solution.problem.domain.mesh.comm
-    own = members(own_arrays(solution, von_mises, rows_of_parts(solution)))
-    found = {key: joined(comm, values) if values.ndim else values for key, values in own.items()}
-    return None if comm.rank else of_members(found)
-
-
-def own_arrays(solution: Solution, von_mises: Singles | None, rows: Mapping[str, ContactPart]) -> SolutionArrays:
-    """This rank's rows of each array: those of all ranks, one after the other, are the solution. Collective.
-
-    Args:
-        solution: what was found.
-        von_mises: of the parts of the cells that this rank owns, N/m², (c,); left out where it is None.
-        rows: this rank's rows of the parts of Γc.
+        stress: in the parts of the cells that this rank owns, N/m², (c, 3, 3); left out where it is None.
     """
     problem = solution.problem
-    d, owned = problem.scales.dimension, problem.space.dofmap.index_map.size_local
-    fields: dict[str, npt.NDArray[Any]] = {"points": problem.positions[:owned, :d], "cells": _cells(problem)}
+    comm, d, owned = problem.domain.mesh.comm, problem.scales.dimension, problem.space.dofmap.index_map.size_local
+    fields = {"points": problem.positions[:owned, :d], "cells": _cells(problem)}
     if solution.solve_result is not None:
-        fields["displacement"] = _by_node(problem, solution.solve_result.u) * problem.scales.displacement
-    elif solution.solvability.direction is not None:
-        points = np.asarray(problem.points / problem.scales.length)
-        fields["escape_mode"] = problem.bodies.motion(points, solution.solvability.direction)[:owned]
-    return SolutionArrays(
-        **fields,
-        von_mises=von_mises,
-        degree=nodes.degree(problem.space),
-        sides={name: _facets(problem, facets) for name, facets in problem.part_facets.items()},
-        regions=_regions(problem),
-        loads=_loads(problem),
-        parts=rows,
-    )
-
-
-def rows_of_parts(solution: Solution) -> dict[str, ContactPart]:
-    """This rank's rows of the parts of Γc, by name; none where nothing was solved. Collective.
-
-    Args:
-        solution: what was found.
-    """
-    states = () if solution.examination is None else solution.examination.states
-    return contact_rows.of_parts(solution.problem, states)
-
-
-def _by_node(problem: Problem, u: fem.Function) -> Array:
-    """The vectors at the nodes that this rank owns, (n, d)."""
-    owned = problem.space.dofmap.index_map.size_local
-    return np.asarray(spaces.values(problem.space, u.x.array)[:owned], dtype=np.float64)
+        u = spaces.values(problem.space, solution.solve_result.u.x.array)
+        fields["displacement"] = np.asarray(u[:owned], dtype=np.float64) * problem.scales.displacement
+    elif (mode := solution.solvability.direction) is not None:
+        fields["escape_mode"] = problem.bodies.motion(np.asarray(problem.points / problem.scales.length), mode)[:owned]
+    if stress is not None:
+        fields["von_mises"] = von_mises(stress).astype(np.float32)
+    found: dict[str, Any] = {name: joined(comm, values) for name, values in fields.items()}
+    found |= {"sides": {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}}
+    found |= {"regions": _regions(problem), "loads": _loads(problem)}
+    found["parts"] = contact_parts(problem, () if solution.examination is None else solution.examination.states)
+    return None if comm.rank else SolutionArrays(degree=nodes.degree(problem.space), **found)
 
 
 def _cells(problem: Problem) -> Integers:
@@ -90,26 +70,26 @@ def _cells(problem: Problem) -> Integers:
 
 
 def _facets(problem: Problem, facets: Entities) -> Integers:
-    """This rank's stretch of facets by their global nodes, each once and ascending, (k, d). Collective."""
-    corners = nodes.linear_facets(problem.space, facets)
-    return distinct(problem.domain.mesh.comm, np.sort(spaces.global_numbers(problem.space, corners), axis=1))
+    """The facets that ranks know by their global nodes, each once and ascending, (k, d); on rank 0. Collective."""
+    corners = spaces.global_numbers(problem.space, nodes.linear_facets(problem.space, facets))
+    return np.unique(joined(problem.domain.mesh.comm, np.sort(corners, axis=1)), axis=0)
 
 
 def _regions(problem: Problem) -> dict[str, Integers]:
-    """This rank's cells of each region, by their numbers among the cells of all ranks. Collective."""
+    """The cells of each region, by their numbers among the cells of all ranks; on rank 0. Collective."""
     comm, parts = problem.domain.mesh.comm, nodes.parts_of_cell(problem.space)
     owned = problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local
-    first = int(sum(agree(comm, owned)[: comm.rank])) * parts
+    first = int(sum(agree(comm, owned)[: comm.rank]))
 
-    def numbers(cells: Entities) -> Integers:
-        own = np.asarray(cells[cells < owned], dtype=np.int64)
-        return np.asarray((first + own[:, None] * parts + np.arange(parts)).ravel())
+    def numbers(cells: Entities) -> npt.NDArray[Any]:
+        own = first + cells[cells < owned].astype(np.int64)
+        return joined(comm, (own[:, None] * parts + np.arange(parts)).ravel())
 
     return {name: numbers(cells) for name, cells in sorted(problem.domain.regions.items())}
 
 
 def _loads(problem: Problem) -> dict[str, LoadArrays]:
-    """This rank's stretch of the loads that are no formulas, which a reader cannot evaluate, by part. Collective."""
+    """The loads that are no formulas, which a reader cannot evaluate, by part; on rank 0. Collective."""
     found: dict[str, list[SurfaceLoad]] = {}
     for where, effect, _ in problem.contributions:
         load = effect.surface_load()
@@ -119,34 +99,15 @@ def _loads(problem: Problem) -> dict[str, LoadArrays]:
 
 
 def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> LoadArrays:
-    """This rank's stretch of the loads on one part, added up, each vertex once. Collective."""
+    """The loads on one part, added up, each vertex once; on rank 0. Collective."""
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
     local = np.unique(nodes.facet_nodes(problem.space, facets))
-    traction, pressure = np.zeros((len(local), d)), np.zeros(len(local))
+    values = np.zeros((len(local), d + 1))
     for load in loads:
         for i, component in enumerate(load.components):
-            traction[:, i] += component.at(problem.positions[local])
+            values[:, i] += component.at(problem.positions[local])
         if load.pressure is not None:
-            pressure += load.pressure.at(problem.positions[local])
-    numbers = spaces.global_numbers(problem.space, local)
-    order = RowOrder.of(comm, numbers[:, None].astype(np.float64))
-    vertices, first = np.unique(order.sorted(numbers), return_index=True)
-    return LoadArrays(vertices=vertices, traction=order.sorted(traction)[first], pressure=order.sorted(pressure)[first])
-
-
-def part_arrays(problem: Problem, states: Sequence[ContactState]) -> dict[str, ContactPart]:
-    """The parts of Γc by name, sorted by it, on rank 0; elsewhere this rank's rows of them. Collective.
-
-    Args:
-        problem: what was solved.
-        states: of the parts.
-    """
-    return {
-        name: _joined(problem.domain.mesh.comm, own) for name, own in contact_rows.of_parts(problem, states).items()
-    }
-
-
-def _joined(comm: MPI.Comm, rows: ContactPart) -> ContactPart:
-    columns = {name: joined(comm, values) for name, values in rows.columns.items()}
-    others = {name: joined(comm, values) for name, values in vars(rows).items() if isinstance(values, np.ndarray)}
-    return ContactPart(name=rows.name, columns=columns, **others)
+            values[:, d] += load.pressure.at(problem.positions[local])
+    numbers, every = (joined(comm, own) for own in (spaces.global_numbers(problem.space, local), values))
+    vertices, first = np.unique(numbers, return_index=True)
+    return LoadArrays(vertices=vertices, traction=every[first, :d], pressure=every[first, d])

@@ -23,7 +23,7 @@ from ..errors import InputError, NotWrittenError
 from ..runtime import manifest, processes, writing
 from ..runtime.folder_lock import FolderLock
 from ..runtime.manifest import MARKS, Kind, Manifest
-from ..runtime.signals import SIGNALS
+from ..runtime.processes import SIGNALS
 from .moving import discard, is_folder, move_in
 
 Existing = Literal["refuse", "replace", "resume"]

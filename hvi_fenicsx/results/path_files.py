@@ -1,44 +1,32 @@
-"""All files of a load path but its pictures and its log, into a folder that is being written."""
+"""All files of a load path but its log, into a folder that is being written."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from dolfinx import fem
 
 from ..certify import certificate
-from ..equilibrium_paths.state import Event
+from ..equilibrium_paths.state import End, Event
 from ..load_path import LoadPath
-from ..problem.problem import Problem
+from ..path.following import PathRun
+from ..report.html import path_page
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..scene import dump_scene
-from ..workflow import Solution
-from . import contact_rows, contact_table, path_table, table_file, vtk_fields
+from ..workflow import unsolved
+from . import tables, vtk_fields
+from .contact_parts import contact_parts
+from .folder import ResultFolder
 from .summary import plain, summary
+from .whole import made, write_record
 
+JOURNAL = "path.journal"
+"""The file in which the states of a path are kept while it is followed."""
 _SHOWN = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
 """The events whose states a film shows first; limit points come after them."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Crossing:
-    """A state at a factor that was asked for.
-
-    Attributes:
-        row: the last row before it.
-        factor: λ.
-        problem: at that factor; it holds until the next crossing is asked for.
-        u: the displacement, nondimensional.
-    """
-
-    row: int
-    factor: float
-    problem: Problem
-    u: fem.Function
 
 
 def shown_rows(path: LoadPath, most: int) -> list[int]:
@@ -68,59 +56,85 @@ def _evenly(rows: Sequence[int], most: int) -> list[int]:
 
 
 def write(
-    folder: Path,
-    target: Path,
-    solution: Solution,
+    folder: ResultFolder,
+    run: PathRun,
     path: LoadPath,
-    frames: Iterable[tuple[int, fem.Function]],
-    crossings: Iterable[Crossing],
+    given: Mapping[str, Any],
+    tell: Callable[[str], None],
+    *,
+    draw: bool,
 ) -> dict[str, Any]:
-    """Write tables, fields and scene. Collective.
+    """Write all files of a path but ``run.log``. Collective.
 
     Args:
-        folder: where to.
-        target: the folder that the files will be in, from which the scene's paths are given.
-        solution: scene and problem, nothing solved.
+        folder: being written.
+        run: that found the path.
         path: the path.
-        frames: rows with their displacements, nondimensional, for ``displacement.pvd``.
-        crossings: states for ``path_contact.csv``.
+        given: further entries of the summary.
+        tell: is given a line where picture or page cannot be made, on rank 0.
+        draw: whether to make a picture.
 
     Returns:
         The summary, on all ranks.
     """
-    problem, comm = solution.problem, solution.problem.domain.mesh.comm
-    vtk_fields.write_series(folder / "displacement.pvd", problem, _timed(path, frames))
-    tables = [rows for one in crossings for rows in _contact_rows(one, solution.scene.solver.tolerance)]
-    on_root(comm, lambda: _write_tables(folder, target, solution, path))
-    if tables:
-        table_file.write(comm, folder / "path_contact.csv", ("row", "factor", *contact_table.COLUMNS), tables)
-    return {**summary(solution), **_outcome(path)}
+    comm, timer, work = folder.comm, run.prepared.timer, folder.work
+    with timer("output"):
+        frames = _frames(run, path, shown_rows(path, run.wanted.states))
+        vtk_fields.write_series(work / "displacement.pvd", run.prepared.problem, frames)
+        rows = list(_contact_rows(run))
+        record = {**summary(unsolved(run.prepared)), **_outcome(path), **given}
+        on_root(comm, lambda: _write_on_root(folder, run, path, record, rows))
+        on_root(comm, lambda: _write_from_files(folder, path, tell, draw=draw))
+    record["time"] = timer.report()
+    on_root(comm, lambda: write_record(work, record))
+    return record
 
 
-def _timed(path: LoadPath, frames: Iterable[tuple[int, fem.Function]]) -> Iterator[tuple[float, float, fem.Function]]:
+def _frames(run: PathRun, path: LoadPath, rows: Sequence[int]) -> Iterator[tuple[float, float, fem.Function]]:
     """Time is the row: the factor may fall."""
-    return ((float(row), path.rows[row].factor, u) for row, u in frames)
+    return ((float(row), path.rows[row].factor, run.displacement(row)) for row in rows)
 
 
-def _contact_rows(crossing: Crossing, tolerance: float) -> list[list[tuple[str, ...]]]:
-    """This rank's rows of ``path_contact.csv`` of one state, by part. Collective."""
-    found = certificate.examine(crossing.problem, crossing.u, tolerance)
-    start, parts = (str(crossing.row), repr(crossing.factor)), contact_rows.of_parts(crossing.problem, found.states)
-    return [[(*start, *cells) for cells in contact_table.cells({name: rows})] for name, rows in parts.items()]
+def _contact_rows(run: PathRun) -> Iterator[tuple[Any, ...]]:
+    """The rows of ``path_contact.csv``: the states at the factors that were asked for. On rank 0; collective."""
+    for factor in run.wanted.contact_at:
+        for row, problem, u in run.crossings(factor):
+            found = certificate.examine(problem, u, run.prepared.scene.solver.tolerance)
+            parts = contact_parts(problem, found.states)
+            yield from ((row, float(factor), *cells) for cells in tables.contact_rows(parts))
 
 
-def _write_tables(folder: Path, target: Path, solution: Solution, path: LoadPath) -> None:
-    path_table.write_csv(folder / "path.csv", path)
-    writing.text(folder / "scene.toml", dump_scene(solution.scene, target))
+def _write_on_root(
+    folder: ResultFolder, run: PathRun, path: LoadPath, record: dict[str, Any], rows: Sequence[tuple[Any, ...]]
+) -> None:
+    """Tables, scene, summary, and the states of a path that was interrupted. Rank 0 only."""
+    work = folder.work
+    tables.write_path(work / "path.csv", path)
+    if rows:
+        tables.write(work / "path_contact.csv", ("row", "factor", *tables.CONTACT), rows)
+    writing.text(work / "scene.toml", dump_scene(run.prepared.scene, folder.target))
+    write_record(work, record)
+    if path.end == End.INTERRUPTED and (folder.target / JOURNAL).exists():
+        with writing.told(work / JOURNAL):
+            shutil.copyfile(folder.target / JOURNAL, work / JOURNAL)
+
+
+def _write_from_files(folder: ResultFolder, path: LoadPath, tell: Callable[[str], None], *, draw: bool) -> None:
+    """Picture and page; that one cannot be made costs a line. Rank 0 only."""
+    if path.rows and draw:
+        from ..report.pictures import path_picture  # loads the plotting library
+
+        made("picture", tell, lambda: path_picture.draw(folder.work))
+    if path.rows:
+        made("report", tell, lambda: path_page.write(folder.work))
 
 
 def _outcome(path: LoadPath) -> dict[str, Any]:
     """What the summary of a path says in the place of a solution's."""
-    entry = plain(path.summary())
     return {
         "converged": path.converged,
         "reason": path.headline,
         "exit_code": int(path.exit_code),
         "method": "path",
-        "path": entry,
+        "path": plain(path.summary()),
     }

@@ -11,19 +11,16 @@ from ..problem import effect_summary
 from ..problem.problem import Problem
 from ..runtime import memory, versions
 from ..runtime.mpi import agree, largest
-from ..workflow import Solution
+from ..workflow import Preparation, Solution
 
 
 def summary(solution: Solution) -> dict[str, Any]:
     """All of ``summary.json``; null for infinite or absent. Collective; the same on all ranks."""
     problem, solved, examination = solution.problem, solution.solve_result, solution.examination
-    comm = problem.domain.mesh.comm
     wanted = solution.scene.solver
     return plain(
         {
-            "scene": solution.scene.title,
-            "dofs": solution.dofs,
-            "ranks": comm.size,
+            **_frame(solution, solution.dofs),
             "converged": solution.converged,
             "reason": solution.reason,
             "exit_code": solution.exit_code,
@@ -35,7 +32,6 @@ def summary(solution: Solution) -> dict[str, Any]:
             "contact": _contact(solution),
             "mode_mixity": _mode_mixity(solution),
             "resultants": _resultants(solution),
-            "solvability": solution.solvability.summary(),
             "certificate": solution.certificate.as_dict() if solution.certificate else None,
             "last_borne": _last_borne(solution),
             "obstacle": solution.obstacle.summary() if solution.obstacle else None,
@@ -45,11 +41,30 @@ def summary(solution: Solution) -> dict[str, Any]:
             "warnings": list(solution.warnings),
             "effects": [summary.as_dict() for summary in effect_summary.summaries(problem)],
             "scales": _scales(problem),
-            "time": {name: largest(comm, value) for name, value in solution.timer.report().items()},
-            "peak_memory_mb": memory.peak(comm),
-            "versions": versions.versions(),
         }
     )
+
+
+def common(prepared: Preparation) -> dict[str, Any]:
+    """The entries that every summary has. Collective; the same on all ranks.
+
+    Args:
+        prepared: the scene, assembled.
+    """
+    return plain(_frame(prepared, prepared.system.dofs))
+
+
+def _frame(of: Solution | Preparation, dofs: int) -> dict[str, Any]:
+    comm = of.problem.domain.mesh.comm
+    return {
+        "scene": of.scene.title,
+        "dofs": dofs,
+        "ranks": comm.size,
+        "solvability": of.solvability.summary(),
+        "time": {name: largest(comm, value) for name, value in of.timer.report().items()},
+        "peak_memory_mb": memory.peak(comm),
+        "versions": versions.versions(),
+    }
 
 
 def _last_borne(solution: Solution) -> dict[str, Any] | None:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import basix
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem, la
@@ -21,7 +22,7 @@ from ..problem.stress import von_mises
 from ..rigid import Mode
 from ..typing import Array, Entities, Integers
 from ..workflow import Solution
-from . import cell_strain, vtk_files
+from . import vtk_files
 from .vtk_files import Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
@@ -47,12 +48,33 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
     problem, solved = solution.problem, solution.solve_result
     assert solved is not None
     u = spaces.values(problem.space, solved.u.x.array) * problem.scales.displacement
-    cells = {"von_mises": von_mises(stress), "stress": stress, "strain": cell_strain.of_parts(problem, u)}
+    cells = {"von_mises": von_mises(stress), "stress": stress, "strain": _strain_of_parts(problem, u)}
     if (estimate := solution.estimate) is not None:
         cells["error"] = _in_parts(problem, estimate.cells / (estimate.energy_norm or 1.0))
     if len(problem.bodies.single()) > 1:
         cells["body"] = _in_parts(problem, problem.bodies.number_at(nodes.owned_cells(problem.space)[:, 0]))
     _write_on_body(path, problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
+
+
+def _strain_of_parts(problem: Problem, u: Array) -> Array:
+    """The symmetric gradient in the middles of the parts of the owned cells, (parts, 3, 3); none across a plane body.
+
+    Args:
+        problem: with the space.
+        u: a displacement by its values at the nodes, (n, d).
+    """
+    space, d = problem.space, problem.scales.dimension
+    cell, variant = basix.CellType[space.mesh.topology.cell_name()], basix.LagrangeVariant.gll_warped
+    lagrange = basix.create_element(basix.ElementFamily.P, cell, nodes.degree(space), variant)
+    slopes = lagrange.tabulate(1, nodes.middles_of_parts(space)[:, 1:])[1:, :, :, 0]
+    cells = nodes.owned_cells(space)
+    found = np.zeros((len(cells), slopes.shape[1], 3, 3))
+    for start in range(0, len(cells), _AT_ONCE):
+        own = cells[start : start + _AT_ONCE]
+        positions, rises = (np.einsum("kpn,cni->cpki", slopes, v[own, :d]) for v in (problem.positions, u))
+        gradient = np.linalg.solve(positions, rises)
+        found[start : start + _AT_ONCE, :, :d, :d] = (gradient + gradient.swapaxes(2, 3)) / 2
+    return found.reshape(-1, 3, 3)
 
 
 def _reactions(solution: Solution) -> Array:

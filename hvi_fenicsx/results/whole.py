@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ..problem.cell_stress import stress_of_parts
+from ..report import solution_arrays
 from ..report.errors import ReportError
 from ..report.html import render
 from ..report.pictures.draw import PictureProcess, waiting
-from ..runtime.mpi import on_root
-from ..runtime.processors import is_processor_free
+from ..runtime import writing
+from ..runtime.mpi import is_processor_free, on_root
 from ..runtime.timing import Timer
+from ..scene import dump_scene
 from ..typing import Array
 from ..workflow import Solution
+from . import gathering, tables, vtk_fields
 from .folder import ResultFolder
 from .summary import summary
-from .write import write_basis, write_fields, write_record
 
 _PATIENCE = 120.0
 """Seconds that pictures may take after all else is written."""
@@ -56,7 +60,7 @@ class BegunResult:
         work, comm = self.folder.work, self.folder.comm
         with self.timer("output"):
             record = {**summary(solution), **given}
-            write_fields(work, solution, self.sigma)
+            _write_fields(work, solution, self.sigma)
             on_root(comm, self._draw, asleep=True)
             record["time"] = self.timer.report()
             on_root(comm, lambda: write_record(work, record))
@@ -92,13 +96,21 @@ def begin_whole(
         tell: is given a line on rank 0 where pictures or page fail.
         pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
     """
-    work, solved = folder.work, solution.solve_result
+    comm, work, solved = folder.comm, folder.work, solution.solve_result
     with timer("output"):
         sigma = None if solved is None else stress_of_parts(solution.problem.bulk, solved.u)
-        write_basis(work, solution, folder.target, sigma)
-        record = summary(solution)
-        on_root(folder.comm, lambda: write_record(work, record))
-        if is_processor_free(folder.comm) and pictures is not None:
+        arrays, record = gathering.solution_arrays(solution, sigma), summary(solution)
+
+        def write_basis() -> None:
+            assert arrays is not None
+            if arrays.parts:
+                tables.write(work / "contact.csv", tables.CONTACT, tables.contact_rows(arrays.parts))
+            solution_arrays.save(work / solution_arrays.FILE, arrays)
+            writing.text(work / "scene.toml", dump_scene(solution.scene, folder.target))
+            write_record(work, record)
+
+        on_root(comm, write_basis)
+        if is_processor_free(comm) and pictures is not None:
             pictures.begin()
     return BegunResult(folder=folder, timer=timer, tell=tell, pictures=pictures, sigma=sigma)
 
@@ -111,7 +123,7 @@ def write_whole(
     tell: Callable[[str], None],
     pictures: PictureProcess | None,
 ) -> None:
-    """Write all files of a result but ``run.log``. Collective.
+    """Write all files of a result but ``run.log``; arguments as of :func:`begin_whole`. Collective.
 
     Args:
         folder: being written.
@@ -119,9 +131,33 @@ def write_whole(
         timer: where time goes.
         given: further entries of the summary.
         tell: is given a line on rank 0 where pictures or page cannot be made; that does not cost the run.
-        pictures: what draws; None on other ranks than the first, and where nothing is to be drawn.
+        pictures: what draws.
     """
     begin_whole(folder, solution, timer, tell, pictures).finish(solution, given)
+
+
+def _write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None:
+    """Write the fields for ParaView and ``boundary.csv``. Collective."""
+    problem, mode = solution.problem, solution.solvability.direction
+    states = () if solution.examination is None else solution.examination.states
+    if sigma is not None:
+        vtk_fields.write_body(folder / "displacement.pvd", solution, sigma)
+    elif mode is not None:
+        vtk_fields.write_escape(folder / "displacement.pvd", problem, mode)
+    if states:
+        vtk_fields.write_contact(folder / "contact.pvd", problem, states)
+    rows = list(tables.boundary_rows(solution))
+    on_root(problem.domain.mesh.comm, lambda: tables.write(folder / "boundary.csv", tables.BOUNDARY, rows))
+
+
+def write_record(folder: Path, record: dict[str, Any]) -> None:
+    """Write ``summary.json``. Rank 0 only.
+
+    Args:
+        folder: where to.
+        record: the summary.
+    """
+    writing.text(folder / "summary.json", json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 @contextlib.contextmanager

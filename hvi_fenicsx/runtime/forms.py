@@ -14,7 +14,6 @@ import os
 import shutil
 import sysconfig
 import tempfile
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -24,34 +23,22 @@ from typing import Any
 import dolfinx.jit
 import ffcx
 import ffcx.options
+import numpy as np
+import ufl
 from dolfinx import fem
+from dolfinx.mesh import meshtags
 from mpi4py import MPI
 
 from .. import compat
 from ..errors import HviError, InputError
 from . import log, processes
-from .facet_numbers import renumbered
 from .mpi import agree, on_root
 
 _LOG = log.logger("runtime")
 
 
-@dataclass(frozen=True)
-class Thresholds:
-    """How long one run waits for another.
-
-    Attributes:
-        patience: for the lock of a form, s; after it the form is compiled twice.
-        pause: between two looks at a lock, s.
-        compilation: of a form on a rank that shares no disk with rank 0, s.
-    """
-
-    patience: float = 300.0
-    pause: float = 0.05
-    compilation: int = 600
-
-
-DEFAULT = Thresholds()
+_COMPILATION = 600
+"""Seconds that a rank waits for a form which is compiled on another one."""
 
 
 class CompilationError(HviError):
@@ -89,11 +76,10 @@ class FormCache:
 
     Args:
         folder: of the cache; None: dolfinx's, from XDG_CACHE_HOME or the options of dolfinx.
-        thresholds: how long to wait.
     """
 
-    def __init__(self, folder: Path | None = None, thresholds: Thresholds = DEFAULT) -> None:
-        self._folder, self._thresholds = folder, thresholds
+    def __init__(self, folder: Path | None = None) -> None:
+        self._folder = folder
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
 
     def compiled(self, form: Any) -> fem.Form:
@@ -105,7 +91,7 @@ class FormCache:
         Raises:
             CompilationError: it cannot be compiled, on all ranks alike.
         """
-        form, comm = renumbered(form), compat.comm_of(form)
+        form, comm = _renumbered(form), compat.comm_of(form)
         entry = _Entry(form, comm, on_root(comm, self._current), _name(form))
         try:
             return self._found(entry)
@@ -132,7 +118,7 @@ class FormCache:
         folder = on_root(entry.comm, lambda: _new_folder(entry))
         try:
             result = self._made(entry, folder)
-            with contextlib.suppress(OSError):  # another rank has done it, or a run that waited too long
+            with contextlib.suppress(OSError):  # another rank has done it
                 folder.rename(entry.folder)
             return result
         finally:
@@ -145,7 +131,7 @@ class FormCache:
             CompilationError: on all ranks alike.
         """
         result, fault = None, ""
-        asked = {**options(), "cache_dir": folder, "timeout": self._thresholds.compilation}
+        asked = {**options(), "cache_dir": folder, "timeout": _COMPILATION}
         try:
             result = fem.form(entry.form, jit_options=asked)
         except Exception as error:  # dolfinx, ffcx, cffi, setuptools and the file system have errors of their own
@@ -159,19 +145,14 @@ class FormCache:
 
     @contextlib.contextmanager
     def _locked(self, entry: _Entry) -> Iterator[None]:
-        """Hold the lock of a form on rank 0, unless its holder takes too long. Collective."""
+        """Hold the lock of a form on rank 0. Collective."""
         descriptor = on_root(entry.comm, lambda: os.open(entry.folder.with_suffix(".lock"), os.O_RDWR | os.O_CREAT))
         try:
-            on_root(entry.comm, lambda: self._lock(descriptor))
+            on_root(entry.comm, lambda: _lock(descriptor))
             yield
         finally:
             if entry.comm.rank == 0:
                 os.close(descriptor)
-
-    def _lock(self, descriptor: int) -> None:
-        end = time.monotonic() + self._thresholds.patience
-        while not _is_locked(descriptor) and time.monotonic() < end:
-            time.sleep(self._thresholds.pause)
 
     def _in_temporary_folder(self, entry: _Entry, reason: HviError) -> fem.Form:
         """Compile where the cache did not allow it, and no signal that ended the compiler. Collective."""
@@ -255,12 +236,64 @@ def _new_folder(entry: _Entry) -> Path:
     return Path(tempfile.mkdtemp(prefix=f"{entry.name}.building-", dir=entry.cache))
 
 
-def _is_locked(descriptor: int) -> bool:
-    """Whether the lock is ours now, or the file system has no locks."""
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True
+def _lock(descriptor: int) -> None:
+    """Wait for the lock of a form, which ends with its process; nothing where the file system has no locks."""
+    with contextlib.suppress(OSError):
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+
+
+def _renumbered(form: Any) -> Any:
+    """The form with new numbers of its facets, from 1 on, so that forms over different parts are compiled once.
+
+    Facets have one number if the same integrands are integrated over them.
+
+    Args:
+        form: UFL; one without arguments, or whose facets have no numbers, stays as it is.
+    """
+    over = [i for i in form.integrals() if i.integral_type() == "exterior_facet" and _has_numbers(i)]
+    if not form.arguments() or len({id(i.subdomain_data()) for i in over}) != 1:
+        return form
+    alike = _alike(over)
+    old = [[n for integral in group for n in _numbers(integral)] for group in alike]
+    if any(len(set(numbers)) < len(numbers) for numbers in old):  # an integrand counts twice there
+        return form
+    new = _new_numbers(old)
+    tags = _selected(form.arguments()[0].ufl_function_space().mesh, over[0].subdomain_data(), new)
+    rest = [i for i in form.integrals() if not any(i is one for one in over)]
+    ids = [tuple(sorted({new[n] for n in numbers})) for numbers in old]
+    return ufl.Form(
+        [*rest, *(g[0].reconstruct(subdomain_id=i, subdomain_data=tags) for g, i in zip(alike, ids, strict=True))]
+    )
+
+
+def _alike(integrals: list[Any]) -> list[list[Any]]:
+    """Integrals in groups of one integrand and rule."""
+    groups: dict[Any, list[Any]] = {}
+    for integral in integrals:
+        groups.setdefault((integral.integrand(), str(integral.metadata())), []).append(integral)
+    return list(groups.values())
+
+
+def _new_numbers(old: list[list[int]]) -> dict[int, int]:
+    """A number from 1 on for each number: one for all that are in the same groups."""
+    groups_of = {n: tuple(n in numbers for numbers in old) for numbers in old for n in numbers}
+    kinds = sorted(set(groups_of.values()))
+    return {n: 1 + kinds.index(kind) for n, kind in groups_of.items()}
+
+
+def _has_numbers(integral: Any) -> bool:
+    return integral.subdomain_data() is not None and all(isinstance(n, int) for n in _numbers(integral))
+
+
+def _numbers(integral: Any) -> tuple[int, ...]:
+    number = integral.subdomain_id()
+    return number if isinstance(number, tuple) else (number,)
+
+
+def _selected(mesh: Any, tags: Any, new: dict[int, int]) -> Any:
+    """The entities that have one of these numbers, with the new ones."""
+    found = [tags.find(number) for number in new]
+    entities = np.concatenate(found)
+    values = np.repeat(np.array(list(new.values()), dtype=np.int32), [len(f) for f in found])
+    order = np.argsort(entities)
+    return meshtags(mesh, tags.dim, entities[order], values[order])

@@ -12,6 +12,7 @@ import logging
 import sys
 import time
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -19,13 +20,36 @@ from typing import Any, Self
 from ..errors import InputError
 from . import terminal, writing
 from .argument_checks import require_kind
-from .newton_step import NewtonStep
 
 PACKAGE = __name__.partition(".")[0]
 COMMANDS = f"{PACKAGE}.commands"
 TOLD_BY_COMMANDS = (f"{PACKAGE}.preparation", f"{PACKAGE}.workflow")
 """Loggers whose records a command tells in words of its own."""
 logging.getLogger(PACKAGE).addHandler(logging.NullHandler())
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class NewtonStep:
+    """One step of a Newton iteration; the same on all ranks.
+
+    Attributes:
+        method: the name of the method.
+        epsilon: relative width of the smoothing; None for exact laws.
+        iteration: counted from the start of the solve, 0 being its start value.
+        residual: of the inequality, relative.
+        contact: vertices in contact, of all ranks.
+    """
+
+    method: str
+    epsilon: float | None
+    iteration: int
+    residual: float
+    contact: int
+
+    def __repr__(self) -> str:
+        width = "" if self.epsilon is None else f", ε {self.epsilon:.3g}"
+        at = f"iteration {self.iteration}, residual {self.residual:.2e}, {self.contact} vertices in contact"
+        return f"{self.method}{width}, {at}"
 
 
 def logger(room: str) -> logging.Logger:

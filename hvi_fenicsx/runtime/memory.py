@@ -12,8 +12,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from .mpi import total
-from .processors import on_this_machine
+from .mpi import on_this_machine, total
 
 _CGROUPS = Path("/sys/fs/cgroup")
 _LIMIT_FILES = ("memory.max", "memory.limit_in_bytes")

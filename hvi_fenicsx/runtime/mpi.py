@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,7 +17,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from ..errors import HviError, InputError
-from . import terminal
+from . import processes, terminal
 
 T = TypeVar("T")
 _TOGETHER = 2.0
@@ -50,26 +52,6 @@ def on_root(comm: MPI.Comm, action: Callable[[], T], *, asleep: bool = False) ->
     if error is not None:
         raise error
     return result
-
-
-def in_turn(comm: MPI.Comm, action: Callable[[], object]) -> None:
-    """Run an action on one rank after the other; none after one that fails, whose error all ranks raise. Collective.
-
-    Args:
-        comm: the ranks.
-        action: what to do; only errors of the program and of the file system may come from it.
-
-    Raises:
-        HviError: what the first action to fail raised; of a file, which one and why.
-    """
-    error: HviError | None = comm.recv(source=comm.rank - 1) if comm.rank else None
-    if error is None:
-        error, _ = _tried(action)
-    if comm.rank + 1 < comm.size:
-        comm.send(error, dest=comm.rank + 1)
-    error = comm.bcast(error, root=comm.size - 1)
-    if error is not None:
-        raise error
 
 
 def _tried(action: Callable[[], Any]) -> tuple[HviError | None, Any]:
@@ -192,3 +174,53 @@ def largest(comm: MPI.Comm, value: float) -> float:
         value: this rank's.
     """
     return float(comm.allreduce(value, op=MPI.MAX))
+
+
+@contextmanager
+def on_this_machine(comm: MPI.Comm) -> Iterator[MPI.Comm]:
+    """The ranks of this rank's machine. Collective.
+
+    Args:
+        comm: all ranks.
+    """
+    here = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    try:
+        yield here
+    finally:
+        here.Free()
+
+
+def is_processor_free(comm: MPI.Comm) -> bool:
+    """Whether this rank's machine has more processors than ranks. Collective.
+
+    The processors are those of the machine: an mpirun may bind each rank to one.
+
+    Args:
+        comm: all ranks.
+    """
+    with on_this_machine(comm) as here:
+        return here.size < (os.cpu_count() or 1)
+
+
+class Interrupt:
+    """The request to stop, made by the first signal: solvers end, the result is written; a second one ends at once.
+
+    Args:
+        comm: the ranks that stop together.
+    """
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        self._comm, self._signalled = comm, False
+
+    def watch(self) -> None:
+        """Catch the signals from now on."""
+        processes.catch(processes.SIGNALS, self._on_signal)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if self._signalled:
+            raise KeyboardInterrupt
+        self._signalled = True
+
+    def requested(self) -> bool:
+        """Whether any rank was signalled. Collective."""
+        return bool(self._comm.allreduce(self._signalled, op=MPI.LOR))

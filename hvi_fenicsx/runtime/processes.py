@@ -1,6 +1,6 @@
 """Processes that the program starts: an environment in which they are not our MPI ranks, and an end in every case.
 
-Nothing here starts MPI.
+Nothing here starts MPI but :func:`start_petsc`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,11 @@ PYTHON = (sys.executable, "-P")
 """Python as our children run it: the current folder is not on its path."""
 STOP = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """The signals by which a user, a batch system or a terminal that is closed asks a program to stop."""
+SIGNALS = (*STOP, signal.SIGUSR1)
+"""Those and what mpirun passes on to its ranks, and what a batch system may send before a job's end."""
+_RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+_SIZE = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
+"""What mpirun tells each process, before MPI is started."""
 _NICENESS = 10
 """The niceness of a process that stands back: it gets a tenth of the time of one that does not."""
 _PR_SET_PDEATHSIG = 1
@@ -49,6 +54,34 @@ _CAUGHT: list[int] = []
 """The signals that were caught since the command began."""
 _RAISED: list[int] = []
 """Those of them that have raised KeyboardInterrupt."""
+
+
+def is_under_mpirun() -> bool:
+    """Whether mpirun or a batch system has started this process as a rank."""
+    return any(name in os.environ for name in _RANK)
+
+
+def is_first_rank() -> bool:
+    """Whether this is rank 0, or no rank."""
+    return next((os.environ[name] for name in _RANK if name in os.environ), "0") == "0"
+
+
+def ranks() -> int:
+    """The number of ranks; 1 where it is not known."""
+    return next((int(os.environ[name]) for name in _SIZE if name in os.environ), 1)
+
+
+def start_petsc() -> None:
+    """Start PETSc without its signal handlers, and without the options in a ``.petscrc`` of the current folder.
+
+    Its handlers would end the program for a broken pipe or a closed terminal. Where PETSc runs already, nothing
+    happens. Children inherit the same. Options in the home folder and in PETSC_OPTIONS are the user's, and hold.
+    """
+    given = os.environ.get("PETSC_OPTIONS", "")
+    if "-no_signal_handler" not in given.split():
+        os.environ["PETSC_OPTIONS"] = f"{given} -no_signal_handler".strip()
+    with contextlib.chdir(Path(__file__).parent):
+        from petsc4py import PETSc  # noqa: F401  (its import starts it)
 
 
 def environment() -> dict[str, str]:

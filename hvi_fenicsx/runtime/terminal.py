@@ -1,10 +1,15 @@
-"""Lines for standard output and standard error: errors of writing cost no result, no text commands the terminal."""
+"""What people are shown: lines on the terminal, shares as percentages, the tables of notebooks.
+
+Errors of writing cost no result, and no text commands the terminal.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import sys
+from collections.abc import Iterable
+from html import escape
 from typing import TextIO
 
 _STANDARD = 2
@@ -70,3 +75,22 @@ def _silence(stream: TextIO) -> None:
         descriptor = os.open(os.devnull, os.O_WRONLY)
         os.dup2(descriptor, stream.fileno())
         os.close(descriptor)
+
+
+def percent(share: float) -> str:
+    """Two digits and no power of ten, or all digits before the point.
+
+    Args:
+        share: of one; from about 1e-6 on.
+    """
+    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{100.0 * share:.2g} %"
+
+
+def html_table(rows: Iterable[tuple[str, str]]) -> str:
+    """Rows of a name and a text as HTML.
+
+    Args:
+        rows: plain texts.
+    """
+    cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
+    return f"<table>{cells}</table>"

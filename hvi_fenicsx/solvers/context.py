@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..rigid import Solvability
-from ..runtime.log import newton_step
-from ..runtime.newton_step import NewtonStep
+from ..runtime.log import NewtonStep, newton_step
 from ..runtime.timing import Timer
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings

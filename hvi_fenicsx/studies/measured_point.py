@@ -13,8 +13,7 @@ from scipy import sparse
 from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
-from ..report.solution_arrays import SolutionArrays, members
-from ..results import array_file
+from ..report.solution_arrays import SolutionArrays, save
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
 from ..runtime import writing
@@ -102,7 +101,7 @@ class MeasuredPoint:
 def _save(result: Path, found: SolutionArrays | None, matrix: sparse.csr_array | None) -> None:
     """Rank 0 only."""
     if found is not None:
-        array_file.write(MPI.COMM_SELF, result.with_suffix(".npz"), members(found))
+        save(result.with_suffix(".npz"), found)
     if matrix is not None:
         with writing.whole(result.with_suffix(".stiffness.npz")) as aside, aside.open("wb") as file:
             sparse.save_npz(file, matrix, compressed=False)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from ..errors import ExitCode
-from ..runtime.percent import percent
+from ..runtime.terminal import percent
 from .certainty import Certainty
 from .error_norms import ERROR_NORMS
 from .table import Row, claimed_error, front

@@ -25,8 +25,9 @@ from scenes import block, model, quadratic_linear
 
 from hvi_fenicsx import cli, read_scene
 from hvi_fenicsx.commands import run
-from hvi_fenicsx.runtime import petsc
-from hvi_fenicsx.runtime.signals import SIGNALS, Interrupt
+from hvi_fenicsx.runtime import processes
+from hvi_fenicsx.runtime.mpi import Interrupt
+from hvi_fenicsx.runtime.processes import SIGNALS
 
 LAW = quadratic_linear(1.0e3)
 COLUMNS = "part,s,x,y,z,u_n,u_t1,u_t2,gap,sigma_n,friction_t1,friction_t2,contact,branch_t,branch_n"
@@ -307,7 +308,7 @@ def test_a_stop_that_a_library_turns_into_an_error_of_its_own_is_an_interruption
 ) -> None:
     before = {number: signal.getsignal(number) for number in SIGNALS}
     if times == 1:
-        monkeypatch.setattr(petsc, "start", lambda: library(signal.SIGTERM))
+        monkeypatch.setattr(processes, "start_petsc", lambda: library(signal.SIGTERM))
     else:
         monkeypatch.setattr(run, "execute", second_signal)
     try:

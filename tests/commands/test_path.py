@@ -18,9 +18,9 @@ from runs import ROOT, command, hvi
 from hvi_fenicsx import prepare, read_scene
 from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.load_path import LoadPath
-from hvi_fenicsx.path import journal
 from hvi_fenicsx.path.following import Control, PathRun
-from hvi_fenicsx.path.journal import Record
+from hvi_fenicsx.runtime import journal
+from hvi_fenicsx.runtime.journal import Record
 from hvi_fenicsx.scene import PathTable
 
 BAR = ROOT / "demos" / "glued_bar.toml"

@@ -11,7 +11,7 @@ from scenes import STEEL, Table
 from unformed import difference, figures, path_run, words
 
 from hvi_fenicsx.path.following import Control
-from hvi_fenicsx.path.journal import Record
+from hvi_fenicsx.runtime.journal import Record
 from hvi_fenicsx.system.condensed_stiffness import DenseStiffness
 from hvi_fenicsx.system.factorised_stiffness import FactorisedStiffness
 

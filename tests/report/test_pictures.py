@@ -52,8 +52,8 @@ from hvi_fenicsx.report.pictures.kinds import (
     stress_plane,
 )
 from hvi_fenicsx.report.pictures.raster import shade, thinned
-from hvi_fenicsx.report.solution_arrays import FILE, SolutionArrays, load, members
-from hvi_fenicsx.results import array_file, contact_table
+from hvi_fenicsx.report.solution_arrays import FILE, SolutionArrays, load, save
+from hvi_fenicsx.results import tables
 from hvi_fenicsx.runtime import processes
 
 Array = npt.NDArray[np.float64]
@@ -117,10 +117,6 @@ def floor(body: mesh.Mesh, value: Callable[[Array], Array]) -> ContactPart:
     return ContactPart(
         name="floor", columns=columns, vertices=vertices, facets=facets, weight=zero, normal=normals, drops=drops
     )
-
-
-def save(path: Path, arrays: SolutionArrays) -> None:
-    array_file.write(MPI.COMM_SELF, path, members(arrays))
 
 
 def change(folder: Path, **values: Any) -> None:
@@ -667,7 +663,7 @@ def test_pieces_are_counted_alike_in_the_table_and_on_the_page(tmp_path: Path) -
     part = load(folder / FILE).parts["floor"]
     part = replace(part, columns={**part.columns, "branch_t": np.array([0.0, 2.0, 2.0, -1.0, 0.0])})
     change(folder, parts={"floor": part})
-    contact_table.write(MPI.COMM_SELF, tmp_path / "contact.csv", {"floor": part})
+    tables.write(tmp_path / "contact.csv", tables.CONTACT, tables.contact_rows({"floor": part}))
     with (tmp_path / "contact.csv").open(encoding="utf-8") as stream:
         table = Counter(int(row["branch_t"]) for row in csv.DictReader(stream))
     assert table == {0: 2, 2: 2, -1: 1}

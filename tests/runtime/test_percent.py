@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hvi_fenicsx.runtime.percent import percent
+from hvi_fenicsx.runtime.terminal import percent
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import tomli_w
 from enumeration import Floor, polyline
+from hvi_fenicsx.commands.search_file import SearchFile
 from matplotlib.colors import to_rgb
 from PIL import Image
 from scenes import DELTA, Table, block, model, quadratic_linear
@@ -18,7 +19,6 @@ from scenes import DELTA, Table, block, model, quadratic_linear
 import hvi_fenicsx as hvi
 from hvi_fenicsx.cli import main
 from hvi_fenicsx.commands import search_file, target
-from hvi_fenicsx.commands.search_file import SearchFile
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
 from hvi_fenicsx.stationary_points.found import Saved
 
@@ -145,7 +145,7 @@ def test_a_search_that_is_killed_goes_on_from_its_last_state(
     assert found["lowest_energy"] == pytest.approx(whole["lowest_energy"], rel=1e-9)
     assert found["count"] == whole["count"]
     assert mine.read_text() == "precious"
-    assert not (out / "search.npz").exists()
+    assert not (out / "search.journal").exists()
 
 
 def test_a_search_on_another_number_of_ranks_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,10 +167,10 @@ def test_a_search_that_is_stopped_goes_on_where_it_was(tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ["equilibria", str(written(tmp_path)), "--out", str(out), "--no-pictures"]
     assert main([*words, "--limit", "1e-9"]) == 4
-    assert (out / "search.npz").exists()
+    assert (out / "search.journal").exists()
     assert main([*words, "--resume"]) == 0
     assert json.loads((out / "summary.json").read_text())["equilibria"]["count"] == 3
-    assert not (out / "search.npz").exists()
+    assert not (out / "search.journal").exists()
 
 
 @pytest.mark.long

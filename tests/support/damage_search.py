@@ -17,7 +17,7 @@ from damage_study import WAYS
 from scenes import Table, model, quadratic_linear, two_blocks
 
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.path.journal import Journal
+from hvi_fenicsx.runtime.journal import Journal
 
 SEARCH, TORN_SEARCH = 5000, 6000
 """Where their numbers begin, and those of folders that are torn before they are resumed."""
@@ -176,7 +176,7 @@ def tear(number: int, finished: Path, folder: Path) -> str:
     chance = random.Random(number)
     shutil.copytree(finished, folder)
     files = sorted(file for file in folder.rglob("*") if file.is_file())
-    likely = [file for file in files if file.name in ("path.journal", "search.npz", "manifest.json")]
+    likely = [file for file in files if file.name in ("path.journal", "search.journal", "manifest.json")]
     done = []
     for file in dict.fromkeys([chance.choice(likely), *chance.sample(files, chance.choice([0, 1, 2]))]):
         way = chance.choice(WAYS)

@@ -20,7 +20,7 @@ import pytest
 
 from hvi_fenicsx import Scene, dump_scene
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.runtime.signals import SIGNALS
+from hvi_fenicsx.runtime.processes import SIGNALS
 
 ROOT = Path(__file__).parents[2]
 RANKS = (1, pytest.param(2, marks=pytest.mark.long), 3)

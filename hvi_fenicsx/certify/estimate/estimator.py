@@ -13,7 +13,7 @@ import numpy as np
 from dolfinx import fem
 
 from ...problem.problem import Problem
-from ...runtime import notebook
+from ...runtime import terminal
 from ...runtime.mpi import total
 from ...system.levels import Levels
 from ...system.system import System
@@ -71,7 +71,7 @@ class Estimate:
         return {name: float(getattr(self, name)) for name in names}
 
     def _repr_html_(self) -> str:
-        return notebook.table((name.replace("_", " "), f"{value:.3g}") for name, value in self.as_dict().items())
+        return terminal.html_table((name.replace("_", " "), f"{value:.3g}") for name, value in self.as_dict().items())
 
     def __repr__(self) -> str:
         return f"Estimate({', '.join(f'{name}={value:.3g}' for name, value in self.as_dict().items())})"

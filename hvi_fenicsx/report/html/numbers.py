@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..reader import ContactPart, Result
+from ..contact_part import ContactPart
+from ..reader import Result
 from ..rounding import unless_noise
 from ..units import number, quantity, thousands, unit_for
 

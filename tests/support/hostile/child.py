@@ -23,7 +23,7 @@ from typing import IO
 from runs import command
 
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.runtime.signals import SIGNALS
+from hvi_fenicsx.runtime.processes import SIGNALS
 
 from . import folders, meshes, plugins, surroundings, texts
 from .case import Case

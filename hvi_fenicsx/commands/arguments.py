@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .errors import InputError
+from ..errors import InputError
 
 
 class _Parser(argparse.ArgumentParser):
@@ -24,7 +24,7 @@ class _RunHelp(argparse.HelpFormatter):
     def _get_help_string(self, action: argparse.Action) -> str | None:
         if action.dest != "quantity":
             return super()._get_help_string(action)
-        from .accuracy import quantities
+        from ..accuracy import quantities
 
         return f"{action.help}; one of {', '.join(quantities.names())}, or a plugin's own"
 
@@ -95,9 +95,6 @@ def _add_run_options(run: argparse.ArgumentParser) -> None:
         help="choose mesh, ε and tolerances so that the relative error is below REL, like 1e-2",
     )
     run.add_argument("--quantity", metavar="NAME", help="the quantity whose error --accuracy bounds, by default energy")
-    run.add_argument(
-        "--time-budget", type=_seconds, metavar="S", help="find the most accurate solution within S seconds"
-    )
     run.add_argument("--no-report", action="store_true", help="write no report.html")
     _add_solve_options(
         run, "result; else results/SCENE", resume="keep a finished result of the same scene, else run it"

@@ -1,0 +1,163 @@
+"""What commands share that write a folder: the ranks, the folder, its log, a request to stop, and what is told."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import logging
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from .. import console, results
+from ..report.html.render import NAME as PAGE
+from ..results import finished
+from ..results.folder import inputs_of
+from ..results.output_folder import existing
+from ..runtime import log, terminal
+from ..runtime.mpi import Interrupt, on_root
+from ..runtime.timing import Timer
+from ..runtime.versions import __version__
+from ..scene import Scene, dump_scene, read_scene
+from ..system import petsc_options
+
+COMM = MPI.COMM_WORLD
+LOG = log.logger("commands")
+H = TypeVar("H", bound=logging.Handler)
+Record = dict[str, Any]
+"""A summary."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command that writes a folder.
+
+    Attributes:
+        suffix: what the default folder has behind the name of the scene.
+        again: what is done where a result cannot be kept, for the line that says so.
+        done: whether a summary is of what is asked for, and finished.
+    """
+
+    suffix: str
+    again: str
+    done: Callable[[Record], bool]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """One call of such a command.
+
+    Attributes:
+        options: the words of the command line.
+        scene: what it is of.
+        folder: where the result goes.
+        timer: where time goes.
+        interrupted: whether to stop (collective).
+    """
+
+    options: argparse.Namespace
+    scene: Scene
+    folder: results.ResultFolder
+    timer: Timer
+    interrupted: Callable[[], bool]
+
+    @property
+    def given(self) -> dict[str, str]:
+        """The command line and PETSc's options, for ``summary.json``."""
+        return {"command": self.options.given, "petsc": self.options.petsc}
+
+    @property
+    def identity(self) -> str:
+        """What an unfinished result depends on; on other ranks the unknowns have another order. Rank 0 only."""
+        target = self.folder.target
+        parts = [__version__, COMM.size, dump_scene(self.scene, target), sorted(inputs_of(self.scene, target).items())]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def scene_of(options: argparse.Namespace) -> Scene:
+    """The scene, with PETSc's options set. Collective.
+
+    Args:
+        options: of the command.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    petsc_options.insert(options.petsc)
+    return on_root(COMM, lambda: read_scene(options.scene, options.overrides))
+
+
+def execute(
+    options: argparse.Namespace, scene: Scene, command: Command, timer: Timer, work: Callable[[Session], int]
+) -> int:
+    """Have a command write its folder, unless that is finished already; the exit code. Collective.
+
+    Args:
+        options: the words of the command line.
+        scene: what it is of.
+        command: the command.
+        timer: where time goes.
+        work: writes all files but ``run.log``, and gives the exit code (collective).
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    default = Path("results") / f"{options.scene.stem}{command.suffix}"
+    target = on_root(COMM, lambda: results.resolved(options.out or default))
+    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, command))) is not None:
+        return code
+    kept = existing(force=options.force or options.resume)
+    with results.ResultFolder(COMM, target, kept, inputs=[options.scene]) as folder:
+        interrupt = Interrupt(COMM)
+        interrupt.watch()
+        run_logs = _on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
+        with log.Handlers(*_on_first_rank(log.TerminalDisplay)):
+            with log.Handlers(*run_logs):
+                session = Session(
+                    options=options, scene=scene, folder=folder, timer=timer, interrupted=interrupt.requested
+                )
+                code = work(session)
+            on_root(COMM, lambda: [run_log.finish() for run_log in run_logs])
+            folder.commit(scene)
+            say(console.warnings([*folder.kept, *petsc_options.unread(options.petsc)]))
+            first = on_root(COMM, lambda: f"; open {PAGE} there" if (target / PAGE).is_file() else "")
+            say([f"{target}: {timer.total:.1f} s in all{first}"])
+    return int(code)
+
+
+def _finished(target: Path, scene: Scene, command: Command) -> int | None:
+    """The exit code of a finished result of the same scene, which is told; None where there is none. Rank 0 only."""
+    record, fault = finished.read(target, scene)
+    if fault is not None:
+        terminal.say(f"{target}: {fault}; {command.again}")
+    if record is None or not command.done(record):
+        return None
+    terminal.say(f"{target}: finished already ({record['reason']})")
+    return int(record["exit_code"])
+
+
+def _on_first_rank(make: Callable[[], H]) -> list[H]:
+    """The handler that rank 0 makes, none on the others. Collective."""
+    made: list[H] = []
+    on_root(COMM, lambda: made.append(make()))
+    return made
+
+
+def say(lines: Iterable[str]) -> None:
+    """Tell lines: on the terminal and in the log."""
+    for line in lines:
+        LOG.info(line)
+
+
+def tell_moving(text: str, *values: object) -> None:
+    """Tell what is being done, on the terminal's moving line.
+
+    Args:
+        text: with the places of the values, as for logging.
+        *values: these.
+    """
+    LOG.debug(text, *values, extra={"moving": True})
