@@ -7,18 +7,19 @@ import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import tomli_w
 from enumeration import Floor, polyline
-from hvi_fenicsx.commands.search_file import SearchFile
 from matplotlib.colors import to_rgb
 from PIL import Image
 from scenes import DELTA, Table, block, model, quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.commands import search_file, target
+from hvi_fenicsx.commands import equilibria as command
+from hvi_fenicsx.commands import session
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
 from hvi_fenicsx.stationary_points.found import Saved
 
@@ -72,10 +73,7 @@ def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(
         assert own["energy"] == pytest.approx(float(row["energy"]), rel=1e-12)
     known = json.loads((out / "summary.json").read_text())["equilibria"]
     assert (known["count"], known["complete"], known["proven"]) == (3, True, True)
-    (barrier,) = known["barriers"]
-    first, second, saddle = energies()
-    assert (barrier["between"], barrier["saddle"]) == ([1, 2], 3)
-    assert barrier["heights"] == pytest.approx([saddle - first, saddle - second], rel=1e-6)
+    saddle = energies()[2]
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "All equilibria, proven: 3." in page
     assert f"{saddle:.10g}".replace("-", "\N{MINUS SIGN}") in page
@@ -120,10 +118,10 @@ def test_a_search_that_is_killed_goes_on_from_its_last_state(
     assert main([*run, "--out", str(tmp_path / "whole")]) == 0
     whole = json.loads((tmp_path / "whole" / "summary.json").read_text())["equilibria"]
     assert whole["nodes"] > 4
-    kept = SearchFile.keep
+    kept = command._StateFile.keep
     states: list[int] = []
 
-    def keep(file: SearchFile, state: Callable[[], Saved]) -> None:
+    def keep(file: command._StateFile, state: Callable[[], Saved]) -> None:
         kept(file, state)
         states.append(1)
         if 4 * len(states) >= whole["nodes"] - 4:
@@ -131,9 +129,9 @@ def test_a_search_that_is_killed_goes_on_from_its_last_state(
 
     out, mine = tmp_path / "out", tmp_path / "out" / "mine.txt"
     with monkeypatch.context() as patched:
-        patched.setattr(search_file, "BETWEEN", 0.0)
-        patched.setattr(search_file, "SHARE", 1e9)
-        patched.setattr(SearchFile, "keep", keep)
+        patched.setattr(command, "KEPT_AFTER", 0.0)
+        patched.setattr(command, "KEPT_EVERY", 0)
+        patched.setattr(command._StateFile, "keep", keep)
         with pytest.raises(Killed):
             main([*run, "--out", str(out)])
     mine.write_text("precious")
@@ -148,18 +146,22 @@ def test_a_search_that_is_killed_goes_on_from_its_last_state(
     assert not (out / "search.journal").exists()
 
 
-def test_a_search_on_another_number_of_ranks_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """There the unknowns have another order: boxes of the one are none of the other."""
-    out, scene = tmp_path / "out", written(tmp_path)
-    assert main(["equilibria", str(scene), "--out", str(out), "--no-pictures", "--limit", "1e-9"]) == 4
-    read = hvi.read_scene(scene)
-    assert search_file.read(out, read) is not None
+def test_a_search_of_another_version_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
-    class OtherRanks:
-        size = 2
+    words = ["equilibria", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--no-pictures"]
+    assert main([*words, "--limit", "1e-9"]) == 4
+    asked: list[Saved | None] = []
+    find = command.Equilibria.find
 
-    monkeypatch.setattr(target, "COMM", OtherRanks)
-    assert search_file.read(out, read) is None
+    def noted(bodies: command.Equilibria, **words: Any) -> Any:
+        asked.append(words["saved"])
+        return find(bodies, **words)
+
+    monkeypatch.setattr(command.Equilibria, "find", noted)
+    assert main([*words, "--resume", "--limit", "1e-9"]) == 4
+    monkeypatch.setattr(session, "__version__", "another")
+    assert main([*words, "--resume", "--limit", "1e-9"]) == 4
+    assert [saved is None for saved in asked] == [False, True]
 
 
 @pytest.mark.long

@@ -23,7 +23,7 @@ from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear, two_blocks
 
 from hvi_fenicsx import InputError, Scene, Solution, compat, prepare, solve
-from hvi_fenicsx.arguments import parser
+from hvi_fenicsx.commands.arguments import parser
 from hvi_fenicsx.mesh import refinement
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.grid_transfer import NestedGridTransfer

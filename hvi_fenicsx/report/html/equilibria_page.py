@@ -37,7 +37,7 @@ def _content(result: EquilibriaResult) -> dict[str, Any]:
         "numbers": list(_numbers(result)),
         "equilibria": list(_rows(result)),
         "left_out": max(len(result.rows) - MOST, 0),
-        "barriers": [_barrier(one, result.unit) for one in known["barriers"][:MOST_BARRIERS]],
+        "barriers": [_barrier(one, result.unit) for one in known.get("barriers", [])[:MOST_BARRIERS]],
         "body": list(scene_text.body_of(result.scene)),
         "parts": list(scene_text.parts_of(result.scene)),
     }
