@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cached_property
 from typing import Any
 
@@ -209,6 +210,15 @@ def comm_of(form: Any) -> Any:
 def petsc_version() -> str:
     """PETSc's version, as text."""
     return ".".join(str(n) for n in PETSc.Sys.getVersion())
+
+
+def _not_a_number() -> int:
+    """SNES' reason for a residual that is no number: the only one whose name tells of NaN and of the function."""
+    names = (name for name in dir(PETSc.SNES.ConvergedReason) if re.fullmatch("DIVERGED_F.*NAN.*", name))
+    return int(getattr(PETSc.SNES.ConvergedReason, next(names)))
+
+
+NOT_A_NUMBER = _not_a_number()
 
 
 def expression(value: Any, space: Any) -> Any:

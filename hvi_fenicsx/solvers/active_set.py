@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..compat import NOT_A_NUMBER
 from ..runtime.timing import Timer
 from ..system.held_solver import Goal, HeldPreconditioner
 from ..system.law_model import LawModel
@@ -37,7 +38,7 @@ _WORDS = {
     "DIVERGED_LINE_SEARCH": "no step along Newton's direction lowers the energy",
     "DIVERGED_MAX_IT": "Newton's method has used up its steps",
     "DIVERGED_LINEAR_SOLVE": "a linear system was not solved",
-    "DIVERGED_FNORM_NAN": "the residual is no number",
+    _REASON[NOT_A_NUMBER]: "the residual is no number",
 }
 """What PETSc's reasons mean, for users."""
 
@@ -297,6 +298,6 @@ class _SnesRun:
         if self.stopped:
             return PETSc.SNES.ConvergedReason.DIVERGED_FUNCTION_COUNT
         if self.far or not np.isfinite(self.last):
-            return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+            return NOT_A_NUMBER
         reasons = PETSc.SNES.ConvergedReason
         return reasons.DIVERGED_DTOL if self._stalls.gives_up(self.last) else reasons.CONVERGED_ITERATING

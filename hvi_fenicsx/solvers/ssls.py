@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..compat import NOT_A_NUMBER
 from ..system.petsc_options import configure
 from ..system.system import System
 from .smooth_method import SmoothMethod, SolverRun
@@ -95,7 +96,7 @@ class _SnesRun(SolverRun):
         self.stopped = self.solver.interrupted()
         if self.stopped:
             return _Reason.DIVERGED_FUNCTION_COUNT
-        return _Reason.CONVERGED_ITERATING if np.isfinite(measure) else _Reason.DIVERGED_FNORM_NAN
+        return _Reason.CONVERGED_ITERATING if np.isfinite(measure) else NOT_A_NUMBER
 
 
 class SemismoothNewton(SmoothMethod):
