@@ -1,0 +1,42 @@
+"""The frozen numbers (freeze.py) of a sample of each set in the fast tier, and of all small cases in the long one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from freeze import QUICK, Case, cases, golden
+from runs import hvi
+
+FAST = {
+    "curved": ("exponential friction", "slip in space"),
+    "paths": ("drop, 4 vertices", "block up to slide", "two arms, pulled apart"),
+}
+"""A few seconds in all."""
+LEFT_TO_OTHERS = ("verification",)
+"""Sets that have a test of their own, against what others found."""
+
+
+def chosen() -> list[object]:
+    """Each case as a parameter; those of the long tier are marked."""
+    found: list[object] = []
+    for group, members in cases().items():
+        known = golden(group)
+        for case in members:
+            if case.name in FAST.get(group, ()):
+                found.append(pytest.param(case, id=f"{group}: {case.name}"))
+            elif group not in LEFT_TO_OTHERS and known.get(case.name, {}).get("seconds", QUICK) < QUICK:
+                found.append(pytest.param(case, id=f"{group}: {case.name}", marks=pytest.mark.long))
+    return found
+
+
+def run(words: list[str], ranks: int) -> tuple[int, str]:
+    """Within this process, where one is enough."""
+    done = hvi(*words, ranks=ranks)
+    return done.returncode, done.stdout
+
+
+@pytest.mark.parametrize("case", chosen())
+def test_a_frozen_result_is_what_it_was(case: Case, tmp_path: Path) -> None:
+    old = golden(case.group)[case.name]["record"]
+    assert not case.differences(old, case.recorded(tmp_path, run))
