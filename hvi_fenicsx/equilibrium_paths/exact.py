@@ -28,6 +28,9 @@ from .step import FACTOR
 from .tracer import Tracer
 from .watch import Watch
 
+EMPTY_JUMPS = 8
+"""So many jumps in a row that release nothing are no way on."""
+
 
 class ExactFollower(Follower):
     """The path of a problem whose laws are piecewise linear.
@@ -60,6 +63,7 @@ class ExactFollower(Follower):
         self._beginning = beginning
         self._bonds = BondTable(problem, options.remember, options.thresholds.exact)
         self._moved, self._direction, self._blocked = 0, 1, False
+        self._empty_jumps = 0
         self._untried: tuple[Array, list[Way]] = np.empty(0), []
         self.tracer: Tracer
 
@@ -223,11 +227,11 @@ class ExactFollower(Follower):
         load, step = self._problem.load(factor), self._watcher.step
         found = snap(self._bonds, load, self.tracer, self._moved, self._direction, step)
         if found is not None and found.cells is not None:
-            yield self._landed(found.cells, factor, aim, found.inverse)
+            yield from self._goes_on(self._landed(found.cells, factor, aim, found.inverse))
             return
         landing = self._descended() if found is None else Landing(x=cells.x, escapes=True, found=False)
         if landing.found:
-            yield self._landed(self._placed(landing.x, factor), factor, aim)
+            yield from self._goes_on(self._landed(self._placed(landing.x, factor), factor, aim))
             return
         if landing.escapes:
             self._bonds.restore(memory)
@@ -256,6 +260,14 @@ class ExactFollower(Follower):
         released = self._balance.leap(cells.x, cells.bond_force)
         self._orient(aim)
         return replace(self._state(Event.JUMP), released=released)
+
+    def _goes_on(self, landed: PathState) -> Iterator[PathState]:
+        """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""
+        yield landed
+        self._empty_jumps = 0 if landed.released > 1e-12 * abs(landed.energy) else self._empty_jumps + 1
+        if self._empty_jumps > EMPTY_JUMPS:
+            self._lose(self.factor, f"at the factor {self.factor:.6g} jumps release no energy: rounding alone leads on")
+            yield self._state(Event.END)
 
     def _remember_all(self) -> None:
         cells = self.tracer.cells

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from documents import DOCUMENTS, ROOT, Block, blocks, commands
 
-LEFT_OUT = re.compile(r"^(\./hvi (test\b|exec python3 (benchmarks|tests|verification)/)|pip |docker |time )")
-"""The tests themselves, what takes minutes to hours on a quiet machine, and what changes the machine."""
+LEFT_OUT = re.compile(r"^(\./hvi (test\b|exec python3 (benchmarks|tests|verification)/)|git show |pip |docker |time )")
+"""The tests themselves, what takes minutes to hours on a quiet machine, the history, and what changes the machine."""
 READER = ("hvi", "demos", "benchmarks", "docs", "hvi_fenicsx")
 """What a command may name, relative to the root of the repository."""
 
