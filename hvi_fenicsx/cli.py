@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import os
 import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 
 from .commands.arguments import parser
 from .errors import ExitCode, HviError, InputError
@@ -80,8 +78,6 @@ def _with_petsc_joined(words: Sequence[str]) -> list[str]:
 def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
     if options.command == "version":
         return _version()
-    if options.command == "study":
-        return _study(options, words)
     if getattr(options, "np", None) and not processes.is_under_mpirun():
         from .runtime import mpirun
 
@@ -136,29 +132,6 @@ def _version() -> int:
     if processes.is_first_rank():
         terminal.say("\n".join(f"{name} {version}" for name, version in versions().items()))
     return ExitCode.CERTIFIED
-
-
-def _study(options: argparse.Namespace, words: Sequence[str]) -> int:
-    """A study is one process that starts its points; under mpirun rank 0 becomes that process, the others end.
-
-    None of them has started MPI yet, so they may end at any time.
-    """
-    if processes.is_under_mpirun():
-        if not processes.is_first_rank():
-            return ExitCode.CERTIFIED
-        _become_single_process(options.np or processes.ranks(), words)
-    with processes.held(processes.STOP):
-        from .studies import run as study
-
-    return study.run(options)
-
-
-def _become_single_process(ranks: int, words: Sequence[str]) -> NoReturn:
-    """Replace this process, one of several ranks, by ``hvi WORDS --np RANKS`` in a process of its own."""
-    from .runtime import mpirun
-
-    alone = [*processes.PYTHON, "-m", "hvi_fenicsx", *mpirun.without_ranks(words), f"--np={ranks}"]
-    os.execve(sys.executable, alone, processes.environment())
 
 
 def _print_error(message: str) -> None:

@@ -80,22 +80,25 @@ def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entiti
     return fine, np.asarray(parents[fine.topology.original_cell_index - offset], dtype=np.int32)
 
 
-def simplex_mesh(comm: Any, cells: npt.NDArray[Any], points: Array, kind: str, *, spread: bool = False) -> _mesh.Mesh:
-    """Mesh of the simplices (c, d+1) over points (n, d), each rank giving some of both. Collective.
+def simplex_mesh(
+    comm: Any, cells: npt.NDArray[Any], points: Array, kind: str, *, spread: bool = False, degree: int = 1
+) -> _mesh.Mesh:
+    """Mesh of the simplices (c, nodes) over points (n, d), each rank giving some of both. Collective.
 
     Args:
         comm: the ranks.
         cells: numbers of points, counted through the ranks.
         points: each of them once, on any rank.
-        kind: triangle or tetrahedron.
+        kind: interval, triangle or tetrahedron.
         spread: whether the cells are shared among the ranks; else each stays where it is given.
+        degree: of the shape of the cells.
 
     Returns:
         The mesh, without ghost cells.
     """
     import basix.ufl
 
-    element = basix.ufl.element("Lagrange", kind, 1, shape=(points.shape[1],))
+    element = basix.ufl.element("Lagrange", kind, degree, shape=(points.shape[1],))
 
     def stay(_: Any, ranks: int, types: Any, vertices: Any) -> Any:
         places = graph.adjacencylist(np.full((len(cells), 1), comm.rank, dtype=np.int32))

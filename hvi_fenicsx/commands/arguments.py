@@ -147,8 +147,9 @@ def _add_study_options(study: argparse.ArgumentParser) -> None:
         help="solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, "
         "tolerance, linear_solver or accuracy; several axes: all combinations; none: the program plans the study",
     )
-    study.add_argument("--repeat", type=_repetitions, metavar="N", help="solve a point at most N times for its time")
-    study.add_argument("--limit", type=_seconds, metavar="SECONDS", help="give a point up after so many seconds")
+    repeat, limit = "solve a point at most N times for its time, by default 9", "give a point up after so many seconds"
+    study.add_argument("--repeat", type=_repetitions, default=9, metavar="N", help=repeat)
+    study.add_argument("--limit", type=_seconds, default=120.0, metavar="SECONDS", help=f"{limit}, by default 120")
     _add_folder_options(study, "study; else results/SCENE-study", resume="keep the points that are finished")
 
 

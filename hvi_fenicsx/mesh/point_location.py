@@ -73,7 +73,7 @@ def containing_cells(mesh: dolfinx.mesh.Mesh, points: Array, thresholds: Thresho
     tree = geometry.bb_tree(mesh, d, padding=1e-12 * float(np.ptp(mesh.geometry.x)))
     boxed = geometry.compute_collisions_points(tree, points)
     point = np.repeat(np.arange(len(points)), np.diff(boxed.offsets))
-    corners = mesh.geometry.x[compat.geometry_dofmap(mesh)[boxed.array]][:, :, : mesh.geometry.dim]
+    corners = mesh.geometry.x[compat.geometry_dofmap(mesh)[boxed.array, : d + 1]][:, :, : mesh.geometry.dim]
     least = barycentric_weights(corners, points[point, : mesh.geometry.dim]).min(axis=1)
     found, best = np.full(len(points), -1, dtype=np.int64), np.full(len(points), -np.inf)
     order = np.argsort(least)  # of several entries for one point, the last one stays

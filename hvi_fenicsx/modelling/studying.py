@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -14,20 +13,15 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, NotWrittenError
+from ..errors import InputError
 from ..formula import SpatialValue
 from ..mesh.shapes import OnlyMesh
-from ..results.output_folder import OutputFolder, existing, placed
+from ..results.output_folder import existing
 from ..runtime.argument_checks import require_path
-from ..runtime.mpi import on_root
 from ..scene import Scene
-from ..studies import axes as study_axes
-from ..studies import plan as study_plan
-from ..studies.here import run_here
-from ..studies.run import fill, said
-from ..studies.store import Store
-from ..studies.study import Study, evaluate
-from ..studies.table import Row
+from ..study import plan as study_plan
+from ..study.conduct import conduct
+from ..study.table import Row
 from .model import Model, is_portable, scene_and_ranks
 
 
@@ -99,20 +93,12 @@ def study(
     _check_repeats(repeats)
     with _in_python_words():
         plan = study_plan.make(scene, [_axis(name, values) for name, values in axes.items()])
-    with _target(folder, ranks, force=force) as (target, output):
-        store = Store(target, ranks.size)
-        run_here(plan, store, ranks, repeats)
-        return on_root(ranks, lambda: _finished(evaluate(plan, store), store, output))
-
-
-def _finished(found: Study, store: Store, output: OutputFolder | None) -> ModelStudy:
-    """Rank 0 only."""
-    if output is not None:
-        with output.told():
-            fill(output, found, store)
+    found, _ = conduct(
+        plan, ranks, None if folder is None else Path(folder), repeats=repeats, existing=existing(force=force)
+    )
     return ModelStudy(
         rows=found.rows,
-        sentences=tuple(said(found)),
+        sentences=tuple(found.sentences()),
         uncertainty={name: known.error for name, known in found.certain.items()},
     )
 
@@ -122,10 +108,10 @@ def _check_repeats(given: Any) -> None:
         raise InputError(f"study: repeats must be a whole number, 1 or more (is {given!r}); 1 solves each point once")
 
 
-def _axis(name: str, values: Any) -> study_axes.AxisValues:
+def _axis(name: str, values: Any) -> tuple[str, tuple[str, ...]]:
     if isinstance(values, str) or not isinstance(values, Sequence):
         raise InputError(f"study: {name} is {values!r}; give a list of values")
-    return study_axes.read(f"{name}={','.join(map(str, values))}")
+    return study_plan.read_axis(f"{name}={','.join(map(str, values))}")
 
 
 @contextmanager
@@ -134,42 +120,6 @@ def _in_python_words() -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(str(error).replace("--axis ", "study: ")) from None
-
-
-@contextmanager
-def _target(
-    folder: str | os.PathLike[str] | None, comm: MPI.Comm, *, force: bool
-) -> Iterator[tuple[Path, OutputFolder | None]]:
-    """The folder of the points, on all ranks; on rank 0, what writes it where the user wants it. Collective."""
-    made: list[OutputFolder] = []
-    with tempfile.TemporaryDirectory() if folder is None and comm.rank == 0 else nullcontext() as aside:
-        if folder is None:
-            yield Path(comm.bcast(aside, root=0)), None
-            return
-        try:
-            target = on_root(comm, lambda: _opened(Path(folder), made, force=force))
-            with _placed(target):
-                yield target, made[0] if made else None
-        finally:
-            for one in made:
-                one.close()
-
-
-@contextmanager
-def _placed(target: Path) -> Iterator[None]:
-    """Say of a file that could not be written where it was to go."""
-    try:
-        yield
-    except NotWrittenError as error:
-        raise placed(error, target, None) from None
-
-
-def _opened(folder: Path, made: list[OutputFolder], *, force: bool) -> Path:
-    output = OutputFolder(folder, "study")
-    output.check(existing(force=force))
-    made.append(output)
-    output.clear()
-    return output.target
 
 
 def _scene(model: Model) -> Scene:

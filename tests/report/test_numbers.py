@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from hvi_fenicsx.report import rounding, units
 from hvi_fenicsx.report.pictures.legend import ticks
-from hvi_fenicsx.studies import plot_axes
 
 
 @pytest.mark.parametrize(
@@ -29,14 +26,6 @@ def test_a_percentage_has_two_digits_or_all_before_the_point(share: float, text:
 def test_a_bar_of_nothing_has_one_number() -> None:
     assert list(ticks((0.0, 0.0), 4).tick_values(0.0, 1.0)) == [0.0]
     assert len(ticks((0.0, 3.0), 4).tick_values(0.0, 3.0)) > 2
-
-
-def test_the_numbers_of_a_logarithmic_axis_look_alike() -> None:
-    axes = Figure().add_subplot()
-    plot_axes.plain_log(axes)
-    said = [axes.xaxis.get_major_formatter()(value) for value in np.power(10.0, np.arange(-5, 3))]
-    assert said == ["0.00001", "0.0001", "0.001", "0.01", "0.1", "1", "10", "100"]
-    assert axes.xaxis.get_major_formatter()(0.03125) == "0.0312"
 
 
 def test_a_force_that_is_rounding_beside_the_largest_is_zero() -> None:

@@ -102,7 +102,11 @@ def _faults_of_search(result: Path) -> list[str]:
 
 def _faults_of_study(result: Path) -> list[str]:
     """What a study's folder lacks: all points of the sound scene are certified."""
-    lacking = [name for name in ("study.json", "study.csv", "report.html", "time.png") if not (result / name).is_file()]
+    lacking = [
+        name
+        for name in ("study.json", "study.csv", "report.html", "work_precision.png")
+        if not (result / name).is_file()
+    ]
     with contextlib.suppress(OSError):
         found = json.loads((result / "study.json").read_text(encoding="utf-8"))
         if found["scene"] == "torn" and not all(p["converged"] and p["errors"] for p in found["points"]):

@@ -25,8 +25,8 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx.mesh import gmsh_file, nodes, refinement
 from hvi_fenicsx.mesh.curved_cells import mesh_of
 from hvi_fenicsx.problem import spaces
-from hvi_fenicsx.studies import interpolation
-from hvi_fenicsx.studies.solution_fields import SolutionFields
+from hvi_fenicsx.report.solution_arrays import SolutionArrays
+from hvi_fenicsx.study.transfer import BodyTransfer, Targets
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from rings import RING
@@ -255,6 +255,6 @@ def test_fields_are_compared_at_places_of_curved_cells(tmp_path: Path) -> None:
     for mesh in (mesh_of(domain, 2), mesh_of(refinement.uniform(domain).domain, 2)):
         space = fem.functionspace(mesh, ("Lagrange", 2))
         x = nodes.points(space)[:, :2]
-        found.append(SolutionFields(points=x, cells=space.dofmap.list.astype(np.int64), u=x, parts={}))
+        found.append(SolutionArrays(points=x, cells=nodes.parts(space.dofmap.list.astype(np.int64)), degree=2))
     coarse, fine = found
-    assert np.abs(interpolation.bodies(coarse, fine) @ coarse.points - fine.points).max() < 1e-9
+    assert np.abs(BodyTransfer(coarse, Targets(fine, ()))(coarse.points) - fine.points).max() < 1e-9

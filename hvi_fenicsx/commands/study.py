@@ -1,0 +1,57 @@
+"""``hvi study``: what accuracy costs in time."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..errors import ExitCode
+from ..results.output_folder import Existing
+from ..runtime import log
+from ..runtime.manifest import MARKS
+from ..runtime.mpi import on_root
+from ..runtime.signals import Interrupt
+from ..scene import read_scene
+from ..study import plan
+from ..study.conduct import conduct
+from ..study.table import Study
+from . import target, telling
+from .telling import COMM
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run a study into a folder; the exit code by the contract. Collective.
+
+    Raises:
+        InputError: the scene, the plan or the folder cannot be used; on all ranks alike, as all errors.
+        NoReferenceError: no solution exists (3), or the reference is not certified (4).
+        StudyInterruptedError: a signal came (130); finished points are kept.
+    """
+    scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
+    asked = plan.make(scene, [plan.read_axis(text) for text in options.axis])
+    existing: Existing = "replace" if options.force else "resume" if options.resume else "refuse"
+    interrupt = Interrupt(COMM)
+    interrupt.watch()
+    folder = target.path_of(options, "-study")
+    with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
+        study, warnings = conduct(
+            asked,
+            COMM,
+            folder,
+            repeats=options.repeat,
+            existing=existing,
+            inputs=[options.scene],
+            limit=options.limit,
+            interrupted=interrupt.requested,
+        )
+        told = [f"warning: {text}" for text in warnings]
+        telling.say([*_heading(study), *study.sentences(), *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
+    return ExitCode.CERTIFIED
+
+
+def _heading(study: Study) -> list[str]:
+    certified = sum(row.converged for row in study.rows)
+    ranks = "1 rank" if study.ranks == 1 else f"{study.ranks} ranks"
+    lines = [f"{study.title or 'untitled'}: {len(study.rows)} points, {certified} certified, on {ranks}"]
+    if study.left_out:
+        lines.append(f"{len(study.left_out)} combinations are no scenes, like {study.left_out[0]}")
+    return lines

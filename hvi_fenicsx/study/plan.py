@@ -1,0 +1,304 @@
+"""What a study runs: the scene along the axes asked for, or along those of the default plan; each point is a scene."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..errors import InputError
+from ..laws import smoothing
+from ..mesh.shapes import DomainShape
+from ..report.units import quantity
+from ..scene import Scene, SolverTable, dump_scene
+from ..scene_model import options_of
+from ..schema import input_error, unknown
+from ..solvers import registry
+
+EXACT = "exact"
+"""The width of a smoothing that is none."""
+_UNSMOOTHED = dict.fromkeys(("smoothing", "epsilon", "epsilon_absolute"))
+_WIDTHS = ("epsilon", "epsilon_absolute")
+LARGEST = {2: 400_000, 3: 250_000}
+"""Unknowns of the reference, by dimension, that are affordable."""
+Values = Mapping[str, Sequence[Any]]
+"""The values by axis; of the mesh also domain shapes."""
+
+
+def law_text(smoothing: str | None, epsilon: float | None, epsilon_absolute: float | None) -> str:
+    """The law in words: exact, or how it is smoothed.
+
+    Args:
+        smoothing: its kind; None for the exact law.
+        epsilon: its relative width.
+        epsilon_absolute: its width in N/m, where the scene says it so.
+    """
+    if smoothing is None:
+        return "exact law"
+    width = f"{epsilon_absolute:g} N/m" if epsilon_absolute is not None else f"{epsilon:.3g}"
+    return f"{'' if smoothing == 'quadratic' else f'{smoothing}, '}ε = {width}"
+
+
+@dataclass(frozen=True)
+class Point:
+    """What one point of a study solves.
+
+    Attributes:
+        scene: the scene, on its own mesh.
+        accuracy: instead of that mesh, one refined adaptively until the estimate is below this (`hvi run --accuracy`).
+    """
+
+    scene: Scene
+    accuracy: float | None = None
+
+    @property
+    def mesh(self) -> str:
+        """The mesh, as people name it."""
+        if self.accuracy is not None:
+            return f"adaptive to {100 * self.accuracy:g} %"
+        return self.scene.domain.mesh_text(lambda metres: quantity(metres, "m"))
+
+    @property
+    def degree(self) -> int:
+        """The degree of the elements."""
+        return self.scene.solver.degree or 1
+
+    @property
+    def unknowns(self) -> float:
+        """About how many there are; of a mesh file, which is not opened for it, a guess."""
+        nodes = 1.0 if self.degree == 1 else 2.0**self.scene.dimension
+        return nodes * self.scene.domain.unknowns(self.scene.dimension)
+
+    def __str__(self) -> str:
+        solver = self.scene.solver
+        law = law_text(solver.smoothing, solver.epsilon, solver.epsilon_absolute)
+        return f"{self.mesh}, degree {self.degree}, {law}, {solver.method}"
+
+    def exact(self) -> Point:
+        """The exact law on the same mesh at the same degree, all else as the program chooses it."""
+        return Point(self.scene.with_solver(**_UNSMOOTHED))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is run.
+
+    Attributes:
+        own: the scene as it is.
+        exact: the scene with the law itself; the same where nothing is smoothed.
+        points: all that is measured, cheapest mesh first; ``own`` and ``exact`` are among them.
+        reference: what is measured against and the next coarser levels, finest first.
+        left_out: combinations that are no scene, in words.
+    """
+
+    own: Point
+    exact: Point
+    points: tuple[Point, ...]
+    reference: tuple[Point, ...]
+    left_out: tuple[str, ...]
+
+    def exact_like(self, point: Point) -> Point:
+        """The exact law on a point's mesh and at its degree, by the scene's own method."""
+        scene = self.exact.scene.changed(domain=point.scene.domain)
+        return Point(scene.with_solver(degree=point.degree))
+
+
+def read_axis(text: str) -> tuple[str, tuple[str, ...]]:
+    """The name and the values that ``--axis NAME=VALUE,VALUE`` asks for.
+
+    Raises:
+        InputError: an unknown name, no values, or one that is not allowed.
+    """
+    name, _, rest = text.partition("=")
+    values = tuple(dict.fromkeys(v.strip() for v in rest.split(",") if v.strip()))
+    axes = ("mesh", *SolverTable.model_fields, "accuracy")
+    if name not in axes:
+        raise InputError(f"--axis {text}: {unknown('axis', name, axes)}")
+    if not values:
+        raise InputError(f"--axis {text}: needs values, like --axis epsilon=1,0.1,0.01,exact")
+    for value in values:
+        _check(name, value)
+    return name, values
+
+
+def _check(name: str, value: str) -> None:
+    """Refuse a value that an axis does not have."""
+    try:
+        if name == "accuracy":
+            SolverTable.model_validate({"tolerance": _number(value)})  # a tolerance is what is between 0 and 1
+        elif name != "mesh" and not (name in _WIDTHS and value == EXACT):
+            width = {"epsilon": 1.0} if name == "smoothing" else {}
+            options_of(SolverTable.model_validate({**width, name: _number(value)}))
+    except (ValidationError, InputError) as error:
+        mistake = str(input_error(error, SolverTable) if isinstance(error, ValidationError) else error)
+        raise InputError(f"--axis {name}={value}: {mistake.partition(': ')[2] or mistake}") from None
+
+
+def _number(text: str) -> Any:
+    """A value of the solver table: a number where the text is one."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
+
+
+@dataclass
+class _Planner:
+    """Makes the points of a study of a scene."""
+
+    scene: Scene
+    left_out: list[str] = field(default_factory=list)
+
+    def combinations(self, axes: Values) -> Iterator[Point]:
+        """The points of all combinations of values; those that are no scenes are noted."""
+        for values in itertools.product(*axes.values()):
+            pairs = dict(zip(axes, values, strict=True))
+            scene = self._on_mesh(pairs.pop("mesh", self.scene.domain))
+            accuracy = pairs.pop("accuracy", None)
+            if accuracy is not None and not _can_be_refined(scene):
+                raise InputError("--axis accuracy: this mesh cannot be refined; leave the axis out")
+            try:
+                yield Point(_solved(scene, pairs), None if accuracy is None else float(accuracy))
+            except InputError as error:
+                self.left_out.append(f"{', '.join(f'{name} {value}' for name, value in pairs.items())}: {error}")
+
+    def _on_mesh(self, mesh: str | DomainShape) -> Scene:
+        try:
+            shape = self.scene.domain.with_mesh(mesh) if isinstance(mesh, str) else mesh
+            return self.scene.changed(domain=shape)
+        except ValidationError as error:
+            raise input_error(error, type(self.scene.domain)) from None
+        except InputError as error:
+            raise InputError(f"--axis mesh: {error}") from None
+
+    def default(self) -> Iterator[Values]:
+        """Meshes by widths; on the scene's own mesh smoothings, methods, tolerances; both degrees; adaptive meshes."""
+        exact, meshes = {"epsilon": (EXACT,)}, {"mesh": _default_meshes(self.scene)}
+        widths = {"epsilon": (EXACT, "0.1", "0.01")} if _laws(self.scene) else exact
+        yield {**meshes, **widths}
+        if _laws(self.scene):
+            yield {"epsilon": ("1", "0.001")}
+            yield {**widths, "smoothing": smoothing.available()}
+        yield {"method": registry.available()}
+        yield {**exact, "tolerance": ("1e-4", "1e-10")}
+        yield {**exact, "linear_solver": ("lu", "gamg")}
+        yield {**meshes, **exact, "degree": ("2",)}
+        if _can_be_refined(self.scene):
+            yield {"accuracy": ("0.1", "0.03"), "degree": ("1", "2")}
+
+
+def make(scene: Scene, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
+    """The plan for a scene: all combinations of the axes' values; without axes, the default plan.
+
+    The scene's own setting and the exact law on every mesh are always in it: they tell the error of h from that of ε.
+
+    Args:
+        scene: what is studied.
+        axes: what is varied, by :func:`read_axis`.
+
+    Raises:
+        InputError: an axis that the scene has not, or named twice; or none of the combinations is a scene.
+    """
+    _check_axes(scene, axes)
+    scene = scene.with_solver(degree=scene.solver.degree or 1)
+    planner, asked = _Planner(scene), dict(axes)
+    products = list(_asked(asked) if asked else planner.default())
+    wanted = [point for product in products for point in planner.combinations(product)]
+    if not wanted:
+        raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(planner.left_out))
+    own = Point(scene)
+    plan = Plan(own, own.exact(), (), (), tuple(dict.fromkeys(planner.left_out)))
+    uniform = [own, *(point for point in wanted if point.accuracy is None)]
+    everything = [*wanted, own, plan.exact, *map(plan.exact_like, uniform)]
+    distinct = {(dump_scene(p.scene), p.accuracy): p for p in everything}.values()
+    finest = max(uniform, key=lambda p: p.scene.domain.unknowns(scene.dimension))
+    degree = max(point.degree for point in everything)
+    points = tuple(sorted(distinct, key=lambda p: p.unknowns))
+    return Plan(plan.own, plan.exact, points, _reference(finest, degree), plan.left_out)
+
+
+def _asked(axes: Values) -> Iterator[Values]:
+    """All combinations; those of adaptive meshes beside the others, at each degree."""
+    uniform = {name: values for name, values in axes.items() if name != "accuracy"}
+    if uniform:
+        yield uniform
+    if "accuracy" in axes:
+        yield {name: values for name, values in axes.items() if name in ("accuracy", "degree")}
+
+
+def _check_axes(scene: Scene, axes: Sequence[tuple[str, Sequence[str]]]) -> None:
+    names = [name for name, _ in axes]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"--axis {name}: is given twice; put its values into one list")
+        if name in _UNSMOOTHED and not _laws(scene):
+            raise InputError(f"--axis {name}: the scene has no law that could be smoothed; leave the axis out")
+    if set(_WIDTHS) <= set(names):
+        raise InputError("--axis epsilon_absolute: epsilon is given too; leave one of them out")
+
+
+def _solved(scene: Scene, pairs: Mapping[str, str]) -> Scene:
+    """A scene with other values in its solver table.
+
+    Raises:
+        InputError: they contradict each other, or the laws cannot be smoothed so.
+    """
+    values = {name: _number(value) for name, value in pairs.items()}
+    width = next((name for name in _WIDTHS if name in values), None)
+    if width is not None and values[width] == EXACT:
+        values |= _UNSMOOTHED
+    elif width is not None:
+        kind = values.get("smoothing", scene.solver.smoothing) or "quadratic"
+        values = {**dict.fromkeys(_WIDTHS), **values, "smoothing": kind}
+    try:
+        found = scene.with_solver(**values)
+    except ValidationError as error:
+        raise input_error(error, Scene) from None
+    solver = found.solver
+    options_of(solver)
+    for law in _laws(found) if solver.smoothing else ():
+        smoothing.create(solver.smoothing, law, epsilon=solver.epsilon, epsilon_absolute=solver.epsilon_absolute)
+    return found
+
+
+def _laws(scene: Scene) -> list[Any]:
+    return [law for placed in scene.effects() for law in placed.effect.superpotentials()]
+
+
+def _refined(scene: Scene, factor: Fraction) -> Scene | None:
+    """The scene with cells ``factor`` times finer each way; None where there is no such mesh."""
+    shape = scene.domain.refined(factor)
+    return None if shape is None else scene.changed(domain=shape)
+
+
+def _can_be_refined(scene: Scene) -> bool:
+    return scene.domain.refined(Fraction(2)) is not None
+
+
+def _default_meshes(scene: Scene) -> list[DomainShape]:
+    """The scene's mesh, two coarser ones, and a finer one if twice finer ones are affordable as references."""
+    found = [scene] + [s for n in (2, 4) if (s := _refined(scene, Fraction(1, n))) is not None]
+    finer, reference = (_refined(scene, Fraction(n)) for n in (2, 4))
+    if finer is not None and reference is not None and _affordable(reference):
+        found.append(finer)
+    return [s.domain for s in found]
+
+
+def _reference(finest: Point, degree: int) -> tuple[Point, ...]:
+    """The exact law on a mesh four times finer, or twice, and on the next two coarser ones."""
+    scene = finest.scene.with_solver(**_UNSMOOTHED, degree=degree, method="auto", linear_solver="auto", tolerance=1e-10)
+    fine = _refined(scene, Fraction(4))
+    if fine is None or not _affordable(fine):
+        fine = _refined(scene, Fraction(2)) or scene
+    coarser = [_refined(fine, Fraction(1, n)) for n in (2, 4)]
+    return tuple(Point(one) for one in (fine, *coarser) if one is not None)
+
+
+def _affordable(scene: Scene) -> bool:
+    return Point(scene).unknowns <= LARGEST[scene.dimension]

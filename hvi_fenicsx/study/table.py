@@ -1,0 +1,387 @@
+"""A finished study in numbers: one row for each point, the Pareto front of each quantity, its tables and sentences."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..errors import ExitCode, InputError
+from ..runtime.percent import percent
+from ..runtime.versions import __version__, versions
+from ..scene import SolverTable
+from ..schema import unknown
+from .errors import NORMS, Certainty, Errors, Fields, ReferenceSolution, certainty
+from .measure import PHASES, RECORDED, Store
+from .plan import Plan, Point, law_text
+
+Certain = Mapping[str, Certainty]
+"""How well the reference is known, by quantity."""
+RESOLVED = 2
+"""An error tells an order of convergence if it is so many times the reference's own."""
+_TARGETS = (0.1, 0.01, 0.001)
+"""The relative errors whose cost is named."""
+_HEADLINES = ("energy_norm", "u_t_l2", "friction_l1", "pressure_l1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """A point: its setting, what it cost, how far off it is.
+
+    Attributes:
+        point: its name in the folder ``points``.
+        mesh: as people name it.
+        accuracy: that an adaptive mesh is made for; None of any other.
+        degree: of the elements.
+        h: the mesh width, m; None of an adaptive mesh.
+        smoothing: kind of the smoothing; None for the exact law.
+        epsilon: width of the smoothing, relative; None for the exact law.
+        epsilon_absolute: width of the smoothing, N/m, where the scene says it so.
+        method: of the solver table.
+        linear_solver: of the solver table.
+        tolerance: of the solver table.
+        dofs: unknowns.
+        converged: whether the solution is certified.
+        reason: why the run ended as it did.
+        exit_code: of the run.
+        energy: J/m or J.
+        iterations: by kind.
+        seconds: median cost without compilation and output.
+        runs: that the median is of.
+        phases: median cost by phase, s.
+        errors: relative, against the reference.
+        epsilon_part: how far the point is from the exact law on its own mesh; None: it is exact, or that point failed.
+        left_out: part of Γc near jumps of the law, which ``friction_max`` leaves out.
+        beyond_reference: quantities whose error is below the reference's own.
+    """
+
+    point: str
+    mesh: str
+    accuracy: float | None
+    degree: int
+    h: float | None
+    smoothing: str | None
+    epsilon: float | None
+    epsilon_absolute: float | None
+    method: str
+    linear_solver: str
+    tolerance: float
+    dofs: int | None
+    converged: bool
+    reason: str
+    exit_code: int
+    energy: float | None
+    iterations: Mapping[str, int] | None
+    seconds: float | None
+    runs: int | None
+    phases: Mapping[str, float] | None
+    errors: Errors | None = None
+    epsilon_part: Errors | None = None
+    left_out: float | None = None
+    beyond_reference: tuple[str, ...] = ()
+
+    @property
+    def law(self) -> str:
+        """The law in words: exact, or how it is smoothed."""
+        return law_text(self.smoothing, self.epsilon, self.epsilon_absolute)
+
+    @property
+    def text(self) -> str:
+        """The setting in words; what is as the program chooses is left out."""
+        parts = [self.mesh, *(["degree 2"] if self.degree == 2 else []), self.law]
+        parts += [self.method] if self.method != "auto" else []
+        parts += [f"tolerance {self.tolerance:g}"] if self.tolerance != SolverTable().tolerance else []
+        parts += [self.linear_solver] if self.linear_solver != "auto" else []
+        return ", ".join(parts)
+
+    def error(self, quantity: str) -> float | None:
+        """Relative; None where there is none.
+
+        Args:
+            quantity: one of ``NORMS``.
+
+        Raises:
+            InputError: there is no such quantity.
+        """
+        if quantity not in NORMS:
+            raise InputError(unknown("quantity", quantity, NORMS))
+        return self.errors[quantity] if self.converged and self.errors else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A finished study.
+
+    Attributes:
+        title: of the scene.
+        rows: the points, cheapest mesh first.
+        own: the scene's own setting.
+        exact: the exact law on the scene's mesh.
+        certain: how well the reference is known, by quantity.
+        reference: its row.
+        coarser: errors of the next coarser levels against the reference, finest first.
+        left_out: combinations that were not run.
+        ranks: that solved the points.
+    """
+
+    title: str
+    rows: tuple[Row, ...]
+    own: Row
+    exact: Row
+    certain: Certain
+    reference: Row
+    coarser: tuple[Errors, ...]
+    left_out: tuple[str, ...]
+    ranks: int
+
+    def headlines(self) -> list[str]:
+        """The quantities that are shown: energy norm, slip, and last -σ_t (-σ_n where there is no friction)."""
+        known = [q for q in _HEADLINES if any(r.error(q) is not None for r in self.rows)]
+        return [q for q in known if q != "pressure_l1" or "friction_l1" not in known]
+
+    def claimed(self, row: Row, quantity: str) -> float | None:
+        """The error that can be claimed: not less than the reference's own."""
+        error = row.error(quantity)
+        return None if error is None else max(error, self.certain[quantity].error or 0.0)
+
+    def front(self, quantity: str) -> list[Row]:
+        """The points that nothing cheaper is as accurate as, cheapest first; errors count with two digits."""
+        known = [(r.seconds, float(f"{e:.1e}"), r) for r in self.rows if (e := self.claimed(r, quantity)) is not None]
+        found: list[Row] = []
+        best = math.inf
+        for _, error, row in sorted(((s, e, r) for s, e, r in known if s is not None), key=lambda t: t[:2]):
+            if error < best:
+                best = error
+                found.append(row)
+        return found
+
+    def over_h(self, quantity: str, like: Row) -> list[tuple[float, float]]:
+        """(h, error) of the points with a row's law and degree, and the scene's own method, coarse to fine."""
+        own = self.own
+        wanted = (like.law, like.degree, own.method, own.tolerance, own.linear_solver)
+        alike = [r for r in self.rows if (r.law, r.degree, r.method, r.tolerance, r.linear_solver) == wanted]
+        found = {r.h: e for r in alike if r.h is not None and (e := r.error(quantity)) is not None}
+        return sorted(found.items(), reverse=True)
+
+    def order(self, quantity: str, like: Row) -> float | None:
+        """The order in h of the error over :meth:`over_h`, from the two finest meshes that the reference resolves."""
+        own = self.certain[quantity].error or 0.0
+        known = [(h, e) for h, e in self.over_h(quantity, like) if e > RESOLVED * own][-2:]
+        if len(known) < 2:
+            return None
+        (h, far), (finer, near) = known
+        return math.log(near / far) / math.log(finer / h)
+
+    def share_of_epsilon(self, quantity: str) -> float | None:
+        """ε's part of the scene's own error: its distance from the exact law on its mesh, beside that law's error."""
+        part, bare = (self.own.epsilon_part or {}).get(quantity), self.exact.error(quantity)
+        return None if part is None or bare is None or part + bare == 0.0 else part / (part + bare)
+
+    def sentences(self) -> list[str]:
+        """What the study says in words that a person can act on."""
+        return [*_sentences(self)]
+
+    def as_data(self) -> dict[str, Any]:
+        """All of ``study.json`` (docs/study.md)."""
+        return {
+            "scene": self.title,
+            "version": __version__,
+            "ranks": self.ranks,
+            "sentences": self.sentences(),
+            "quantities": {key: description for key, (description, _) in NORMS.items()},
+            "headlines": self.headlines(),
+            "own": self.own.point,
+            "exact": self.exact.point,
+            "share_of_epsilon": {q: self.share_of_epsilon(q) for q in self.headlines()},
+            "reference": {
+                **asdict(self.reference),
+                "certainty": {q: asdict(known) for q, known in self.certain.items()},
+                "errors_of_coarser_meshes": list(self.coarser),
+            },
+            "fronts": {q: [r.point for r in self.front(q)] for q in NORMS},
+            "points": [asdict(r) for r in self.rows],
+            "left_out": list(self.left_out),
+            "versions": versions(),
+        }
+
+    def as_csv(self) -> str:
+        """One line for each point; empty where there is nothing; errors in columns ``error_QUANTITY``."""
+        text, lines = io.StringIO(), [_flat(r) for r in self.rows]
+        writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(lines)
+        return text.getvalue()
+
+
+def _flat(row: Row) -> dict[str, Any]:
+    nested = {
+        "phases": ("phases", PHASES),
+        "iterations": ("iterations", ("newton", "linear", "levels", "branch")),
+        "errors": ("error", tuple(NORMS)),
+        "epsilon_part": ("epsilon_part", tuple(NORMS)),
+    }
+    data = asdict(row)
+    plain = {key: value for key, value in data.items() if key not in nested}
+    for name, (prefix, keys) in nested.items():
+        plain |= {f"{prefix}_{key}": (data[name] or {}).get(key) for key in keys}
+    return {**plain, "beyond_reference": " ".join(row.beyond_reference)}
+
+
+def evaluate(plan: Plan, store: Store) -> Study:
+    """Measure all points that are in a store against the reference.
+
+    Args:
+        plan: what was to be run.
+        store: the points; it must hold the reference.
+
+    Raises:
+        ResultError: a point's solution is missing or damaged.
+    """
+    finest, *coarser = plan.reference
+    arrays = store.solution(finest)
+    assert arrays is not None
+    reference = ReferenceSolution(arrays, store.stiffness(finest), plan.own.scene.interface)
+    levels = [reference.errors(found) for point in coarser if (found := _fields(reference, store, point)) is not None]
+    certain = certainty(levels)
+    rows = tuple(_rows(plan, store, reference, certain))
+    own, exact = (next(r for r in rows if r.point == store.name(p)) for p in (plan.own, plan.exact))
+    return Study(
+        title=plan.own.scene.title,
+        rows=rows,
+        own=own,
+        exact=exact,
+        certain=certain,
+        reference=Row(**_measured(store, finest)),
+        coarser=tuple(levels),
+        left_out=plan.left_out,
+        ranks=store.ranks,
+    )
+
+
+def _fields(reference: ReferenceSolution, store: Store, point: Point) -> Fields | None:
+    """A certified point on the reference's nodes; None for another."""
+    arrays = store.solution(point)
+    return None if arrays is None else reference.transfer(arrays)
+
+
+def _rows(plan: Plan, store: Store, reference: ReferenceSolution, certain: Certain) -> Iterator[Row]:
+    partner, beside = None, None
+    for point in plan.points:
+        exact = plan.exact_like(point)
+        if partner != exact:
+            partner, beside = exact, _fields(reference, store, exact)
+        measured, found = _measured(store, point), _fields(reference, store, point)
+        if found is None:
+            yield Row(**measured)
+            continue
+        own, smoothed = reference.errors(found), point.scene.solver.smoothing and point.accuracy is None
+        part = reference.errors(found, beside) if smoothed and beside is not None else None
+        pairs = ((q, own[q], certain[q].error) for q in NORMS)
+        beyond = tuple(q for q, error, least in pairs if error is not None and least is not None and error < least)
+        yield Row(
+            **measured,
+            errors=own,
+            epsilon_part=part,
+            left_out=reference.left_out(found),
+            beyond_reference=beyond,
+        )
+
+
+def _measured(store: Store, point: Point) -> dict[str, Any]:
+    """What a row has of a point's setting and record."""
+    record, solver = store.record(point) or {}, point.scene.solver
+    keys = (*RECORDED, "seconds", "runs", "phases")
+    return {key: record.get(key) for key in keys} | {
+        "point": store.name(point),
+        "mesh": point.mesh,
+        "accuracy": point.accuracy,
+        "degree": point.degree,
+        "h": None if point.accuracy is not None else point.scene.domain.width() or record.get("h"),
+        "smoothing": solver.smoothing,
+        "epsilon": (record.get("epsilon") or solver.epsilon) if solver.smoothing else None,
+        "epsilon_absolute": solver.epsilon_absolute,
+        "method": solver.method,
+        "linear_solver": solver.linear_solver,
+        "tolerance": solver.tolerance,
+    }
+
+
+def _sentences(study: Study) -> Iterator[str]:
+    """The most useful first."""
+    quantities = study.headlines()
+    yield _own(study, quantities[-1] if quantities else "energy_norm")
+    yield from (_targets(study, quantity) for quantity in reversed(quantities))
+    yield from _orders(study, quantities)
+    bad = [r for r in study.rows if not r.converged and r.exit_code != ExitCode.BAD_INPUT]
+    if bad:
+        yield f"{len(bad)} of {len(study.rows)} points ended without a certified solution; study.csv says why."
+    known = [(q, study.certain[q].error) for q in quantities]
+    parts = [f"{_of_error(e)} in {NORMS[q][1]}" for q, e in known if e is not None]
+    sure = f"itself uncertain by {', '.join(parts)}" if parts else "on the only mesh there is"
+    yield f"Measured against {study.reference.text} ({study.reference.dofs or 0:,} unknowns), {sure}."
+
+
+def _own(study: Study, quantity: str) -> str:
+    """What the scene's own setting costs, how far off it is, and by what."""
+    own, setting = study.own, f"The scene's own setting ({study.own.text})"
+    error, bare, share = own.error(quantity), study.exact.error(quantity), study.share_of_epsilon(quantity)
+    if error is None:
+        return f"{setting} was not measured: {own.reason}."
+    text = f"{setting} takes {duration(own.seconds)} and is {_of_error(error)} off in {NORMS[quantity][1]}"
+    if own.smoothing is None or bare is None:
+        return f"{text}."
+    text += "" if share is None else f", {percent(share)} of it by ε"
+    return f"{text}. The exact law on the same mesh takes {duration(study.exact.seconds)} and is {_of_error(bare)} off."
+
+
+def _targets(study: Study, quantity: str) -> str:
+    """What each accuracy costs."""
+    best, name = study.front(quantity), NORMS[quantity][1]
+    reached: dict[str, tuple[Row, list[str]]] = {}
+    missed = []
+    for target in _TARGETS:
+        cheapest = next((r for r in best if (study.claimed(r, quantity) or 0.0) <= target), None)
+        if cheapest is None:
+            missed = [_missed(study, quantity, target)]
+            break
+        reached.setdefault(cheapest.point, (cheapest, []))[1].append(_of_error(target))
+    parts = [f"{', '.join(targets)} for {duration(r.seconds)} ({r.text})" for r, targets in reached.values()]
+    return f"In {name}: {'; '.join([*parts, *missed])}."
+
+
+def _missed(study: Study, quantity: str, target: float) -> str:
+    own = study.certain[quantity].error
+    if own is not None and own > target:
+        return f"{_of_error(target)} cannot be claimed: the reference itself is uncertain by {_of_error(own)}"
+    errors = [(e, r) for r in study.rows if (e := r.error(quantity)) is not None]
+    best, at = min(errors, key=lambda pair: pair[0])
+    return (
+        f"{_of_error(target)} is not reached here: the best is {_of_error(best)} for {duration(at.seconds)} ({at.text})"
+    )
+
+
+def _orders(study: Study, quantities: Sequence[str]) -> Iterator[str]:
+    exact = {r.degree: r for r in study.rows if r.converged and r.smoothing is None}
+    for degree, like in sorted(exact.items()):
+        found = [(q, study.order(q, like)) for q in quantities]
+        parts = [f"h^{value:.2f} in {NORMS[q][1]}" for q, value in found if value is not None]
+        if parts:
+            which = "two finest meshes whose errors the reference resolves"
+            yield f"With the exact law the error at degree {degree} falls as {', '.join(parts)} ({which})."
+
+
+def _of_error(value: float) -> str:
+    """A relative error as a percentage, to two digits."""
+    return "below 0.001 %" if value < 1e-5 else percent(value)
+
+
+def duration(value: float | None) -> str:
+    """A time, to two digits."""
+    if value is None:
+        return "an unknown time"
+    if value < 0.0995:  # which would be 1e+02 ms
+        return f"{1e3 * value:.2g} ms"
+    return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"

@@ -1,0 +1,263 @@
+"""Errors of a study against closed forms and known differences, at both degrees, on nested and other meshes."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from mpi4py import MPI
+from scenes import Table, model, quadratic_linear, two_blocks
+
+from hvi_fenicsx import Scene, Solution, prepare
+from hvi_fenicsx.mesh.grid_transfer import NestedGridTransfer
+from hvi_fenicsx.problem import spaces
+from hvi_fenicsx.report.solution_arrays import SolutionArrays
+from hvi_fenicsx.results import gathering
+from hvi_fenicsx.study import transfer
+from hvi_fenicsx.study.errors import NORMS, ReferenceSolution, certainty, stiffness
+from hvi_fenicsx.study.transfer import BodyTransfer, Targets
+from hvi_fenicsx.typing import Array
+from hvi_fenicsx.workflow import finish
+
+LAW = quadratic_linear(1.0e6)
+
+
+def solved(table: Table) -> Solution:
+    return finish(prepare(Scene.model_validate(table), MPI.COMM_SELF), estimating=False)
+
+
+@functools.cache
+def with_law(dimension: int, cells: int, degree: int = 1) -> Solution:
+    return solved(model(cells, friction=LAW, degree=degree) if dimension == 2 else in_space(cells, degree))
+
+
+def in_space(cells: int, degree: int) -> Table:
+    return {
+        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [cells] * 3},
+        "material": {"model": "three_dimensional", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29},
+        "boundary": {
+            "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": LAW},
+            "press": {"on": "top", "traction": [1e5, 0.0, "-1e6*(1 + x)"]},
+        },
+        "solver": {"degree": degree},
+    }
+
+
+def taken(solution: Solution) -> SolutionArrays:
+    arrays = gathering.solution_arrays(solution)
+    assert arrays is not None
+    return arrays
+
+
+def reference_of(solution: Solution) -> ReferenceSolution:
+    matrix = stiffness(solution)
+    assert matrix is not None
+    return ReferenceSolution(taken(solution), matrix, solution.scene.interface)
+
+
+def errors(reference: ReferenceSolution, found: SolutionArrays) -> dict[str, float]:
+    told = reference.errors(reference.transfer(found))
+    return {name: value for name, value in told.items() if value is not None}
+
+
+def of_mesh(space: fem.FunctionSpace) -> SolutionArrays:
+    d = space.mesh.geometry.dim
+    cells = space.dofmap.list.astype(np.int64)
+    return SolutionArrays(points=space.tabulate_dof_coordinates()[:, :d], cells=cells)
+
+
+def quadratic(x: Array) -> Array:
+    return np.column_stack([1.0 + x[:, 0] * (2.0 - x[:, -1]) + 3.0 * x[:, 0] ** 2 - x[:, 1] ** 2, *x[:, 1:].T])
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: str) -> None:
+    size, cells = ([1.0, 2.0], [4, 6]) if shape == "rectangle" else ([1.0, 2.0, 0.5], [4, 6, 2])
+    table = in_space(2, 1) if shape == "box" else model(4)
+    fine = Scene.model_validate({**table, "domain": {"shape": shape, "size": size, "cells": cells}})
+    coarse, d = fine.with_domain(cells=tuple(n // 2 for n in cells)), len(size)
+    both = [fem.functionspace(s.domain.build(MPI.COMM_SELF, d).mesh, ("Lagrange", 1, (d,))) for s in (fine, coarse)]
+    step = NestedGridTransfer(size, coarse.domain.cells).prolongation(*both)  # type: ignore[attr-defined]
+    target, source = map(of_mesh, both)
+    values = np.random.default_rng(1).normal(size=source.points.shape)
+    coarse_vector, fine_vector = step.createVecs()
+    coarse_vector.array[:] = values.ravel()
+    step.mult(coarse_vector, fine_vector)
+    found = BodyTransfer(source, Targets(target, ()))(values)
+    np.testing.assert_allclose(found, fine_vector.array.reshape(-1, d), atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_where_two_bodies_meet_each_node_takes_the_field_of_its_own(shape: str) -> None:
+    d = {"rectangle": 2, "box": 3}[shape]
+    elasticity = {"rectangle": "plane_strain", "box": "three_dimensional"}[shape]
+
+    def mesh_of(n: int) -> tuple[SolutionArrays, Array]:
+        across = [n] * (d - 1)
+        table = two_blocks(shape, [1.0] * (d - 1), [[*across, n], [*(2 * k for k in across), n]], elasticity)
+        table["domain"]["upper"]["origin"][0] = 0.0
+        arrays = of_mesh(prepare(Scene.model_validate(table), MPI.COMM_SELF).problem.space)
+        u = 1.0 + arrays.points
+        u[np.unique(arrays.cells[arrays.points[arrays.cells].mean(axis=1)[:, -1] > 0.5])] *= -2.0
+        return arrays, u
+
+    (source, given), (target, wanted) = mesh_of(2), mesh_of(4)
+    assert len(np.unique(source.points, axis=0)) < len(source.points)
+    np.testing.assert_allclose(BodyTransfer(source, Targets(target, ()))(given), wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_quadratic_fields_are_taken_to_finer_meshes_exactly(dimension: int) -> None:
+    source, target = taken(with_law(dimension, 2, 2)), taken(with_law(dimension, 4, 1))
+    found = BodyTransfer(source, Targets(target, ()))(quadratic(source.points))
+    np.testing.assert_allclose(found, quadratic(target.points), atol=1e-12)
+    (near,), (far,) = source.parts.values(), target.parts.values()
+    along = transfer.surface(source, near, target.points[far.vertices])
+    np.testing.assert_allclose(along @ source.points[near.vertices], target.points[far.vertices], atol=1e-12)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_energy_of_nodal_values_is_that_of_the_form(dimension: int) -> None:
+    """In space coefficients of midpoints are no values."""
+    solution = with_law(dimension, 2, 2)
+    problem, reference = solution.problem, reference_of(solution)
+    field = fem.Function(problem.space)
+    field.x.array[:] = np.random.default_rng(3).normal(size=field.x.array.size)
+    values = spaces.values(problem.space, field.x.array)
+    product = problem.bulk.matrix() * field.x.petsc_vec
+    assert reference.energy(values) ** 2 == pytest.approx(float(product.dot(field.x.petsc_vec)), rel=1e-12)
+
+
+def test_degree_2_is_nearer_in_all_that_converges() -> None:
+    """The same nodes at both degrees; and the reference's own error is zero."""
+    reference = reference_of(with_law(2, 16, 2))
+    one, two = (errors(reference, taken(with_law(2, 8 // p, p))) for p in (1, 2))
+    for key in ("energy_norm", "u_t_l2", "u_t_max", "friction_l1"):
+        assert two[key] < 0.6 * one[key], key
+    assert max(value for value in reference.errors(reference.own).values() if value is not None) == 0.0
+
+
+def test_the_closed_form_is_met_on_every_mesh() -> None:
+    """Without friction P1 holds the solution: all errors are rounding, whatever the mesh."""
+    known = errors(reference_of(solved(model(8))), taken(solved(model(4))))
+    assert set(known) == {"energy_norm", "u_t_l2", "u_t_max", "pressure_l1", "pressure_l2", "contact_set", "resultant"}
+    assert max(known.values()) < 1e-9
+
+
+def test_every_norm_measures_a_known_difference() -> None:
+    """All fields one per cent larger: one per cent in every norm; and a rigid motion has no energy."""
+    solution = with_law(2, 8)
+    reference, here = reference_of(solution), taken(solution)
+    assert here.displacement is not None
+    grown = {"u_t1", "friction_t1", "sigma_n"}
+    parts = {
+        name: replace(p, columns={k: v * (1.01 if k in grown else 1.0) for k, v in p.columns.items()})
+        for name, p in here.parts.items()
+    }
+    found = errors(reference, replace(here, displacement=1.01 * here.displacement, parts=parts))
+    assert found.pop("contact_set") == 0.0
+    assert all(value == pytest.approx(0.01, rel=1e-9) for value in found.values()), found
+    turned = here.displacement + 1e-6 * np.column_stack([1.0 - here.points[:, 1], here.points[:, 0]])
+    assert errors(reference, replace(here, displacement=turned))["energy_norm"] < 1e-6
+
+
+def test_the_contact_set_is_the_area_where_one_is_closed() -> None:
+    """Half of the floor open in the other solution: half of the closed area is wrong."""
+    solution = solved(model(8))
+    here, reference = taken(solution), reference_of(solution)
+    ((name, part),) = here.parts.items()
+    opened = {**part.columns, "contact": part.columns["contact"] * (part.columns["x"] > 0.5)}
+    wrong = part.weights[(part.columns["x"] <= 0.5) & (part.columns["contact"] > 0)].sum()
+    found = errors(reference, replace(here, parts={name: replace(part, columns=opened)}))
+    assert found["contact_set"] == pytest.approx(wrong / part.weights[part.columns["contact"] > 0].sum())
+
+
+def test_the_energy_norm_is_that_of_the_closed_form() -> None:
+    """Of the model problem without friction: a(u, u) = <g, u>, and the energy is -6 J/m, so a(u, u) = 12 J/m."""
+    solution = solved(model(4))
+    displacement, scales = taken(solution).displacement, solution.problem.scales
+    assert displacement is not None
+    energy = reference_of(solution).energy(displacement / scales.displacement)
+    assert energy**2 * scales.energy == pytest.approx(12.0, rel=1e-9)
+
+
+def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out() -> None:
+    solution = with_law(2, 8)
+    matrix, here = stiffness(solution), taken(solution)
+    assert matrix is not None
+    ((name, part),) = here.parts.items()
+    x = part.columns["x"]
+    slips = {**part.columns, "u_t1": np.where(x < 0.5, 1.0, 3.0)}
+    dropped = replace(part, columns=slips, drops=np.full((len(x), 1), 2.0))
+    reference = ReferenceSolution(replace(here, parts={name: dropped}), matrix)
+    near = reference.near_jump(reference.own)
+    jump = 0.5 - 1 / 16  # the slip passes the drop between the vertices at 3/8 and 1/2
+    np.testing.assert_array_equal(near, np.abs(x - jump) <= 2 / 8)
+    assert reference.left_out(reference.own) == pytest.approx(float(part.weights[near].sum()))
+    wrong = {**slips, "friction_t1": part.columns["friction_t1"] + 1e3 * near}
+    found = errors(reference, replace(here, parts={name: replace(dropped, columns=wrong)}))
+    assert found["friction_max"] == 0.0 < found["friction_l1"]
+
+
+def turning_disk(size: float) -> Table:
+    """A disk that a torque turns against springs all round: the slip is the same everywhere."""
+    spring = {"law": "linear_spring", "stiffness": 1e9}
+    return {
+        "domain": {"shape": "disk", "radius": 1.0, "mesh_size": size},
+        "material": {"model": "plane_strain", "youngs_modulus": 1e9, "poisson_ratio": 0.3},
+        "body": {"force": ["-1e3*(y - 1)", "1e3*x"]},
+        "boundary": {
+            "rim": {"on": ["lower_arc", "upper_arc"], "contact": {"lower": 0.0, "upper": 0.0}, "friction": spring}
+        },
+    }
+
+
+def test_slips_of_a_curved_part_are_compared_as_vectors() -> None:
+    """Its tangents turn their sign four times: between two such nodes a slip along them passes zero."""
+    reference = reference_of(solved(turning_disk(0.1)))
+    found = errors(reference, taken(solved(turning_disk(0.24))))
+    for name in ("u_t_l2", "u_t_max", "friction_l1", "friction_l2", "friction_max"):
+        assert found[name] < 0.035, name
+    assert reference.left_out(reference.own) == 0.0
+
+
+def test_the_slip_of_a_joint_is_that_of_one_body_beside_the_other() -> None:
+    """As the contact table has it, where the meshes match."""
+    table = two_blocks("rectangle", [1.0], [[4, 2], [4, 2]], "plane_strain")
+    table["domain"]["upper"]["origin"][0] = 0.0
+    solution = solved(table)
+    reference, arrays = reference_of(solution), taken(solution)
+    told = np.concatenate([part.columns["u_t1"] for part in arrays.parts.values()])
+    assert np.abs(told).max() > 0.0
+    along = np.linalg.norm(reference.own.slip, axis=1)
+    np.testing.assert_allclose(along, np.abs(told), atol=1e-9 * np.abs(told).max())
+
+
+@pytest.mark.parametrize("order", [0.7, 1.0, 1.6])
+def test_the_references_own_error_follows_from_the_coarser_levels(order: float) -> None:
+    """Errors C hᵖ, additive; in the energy norm their squares are."""
+    h, c = 0.1, 3.0
+    truth = c * h**order
+    below = [dict.fromkeys(NORMS, c * (n * h) ** order - truth) for n in (2, 4)]
+    for at_level, n in zip(below, (2, 4), strict=True):
+        at_level["energy_norm"] = math.sqrt((c * (n * h) ** order) ** 2 - truth**2)
+    for found in certainty(below).values():
+        assert found.error == pytest.approx(truth)
+        assert found.order == pytest.approx(order)
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_the_mesh_width_halves_where_a_mesh_is_refined(shape: str) -> None:
+    """Whatever the angles of its cells: an order in h is a slope over it."""
+    size = (1.0, 0.3, 0.7)[: 2 if shape == "rectangle" else 3]
+    widths = []
+    for n in (3, 6):
+        table = in_space(2, 1) if shape == "box" else model(4)
+        scene = Scene.model_validate({**table, "domain": {"shape": shape, "size": size, "cells": [n] * len(size)}})
+        mesh = scene.domain.build(MPI.COMM_SELF, len(size)).mesh
+        widths.append(transfer.mesh_width(of_mesh(fem.functionspace(mesh, ("Lagrange", 1)))))
+    assert widths[1] == pytest.approx(widths[0] / 2, rel=1e-9)

@@ -1,0 +1,260 @@
+"""The folder of a study: its numbers, what is not the study's stays, it is resumed, interrupted, on a full disk."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from full_disk import room_for
+from runs import command, hvi, write_scene
+from scenes import model, quadratic_linear
+
+from hvi_fenicsx.errors import ExitCode
+from hvi_fenicsx.report.errors import ResultError
+from hvi_fenicsx.report.html import study_page
+from hvi_fenicsx.results.output_folder import OutputFolder
+from hvi_fenicsx.study.errors import NORMS
+from hvi_fenicsx.study.measure import Measurement, NoReferenceError, Store
+
+LAW = quadratic_linear(1e6)
+
+ASKED = ("--axis", "epsilon=1,0.1", "--repeat", 1)
+
+
+@pytest.fixture
+def copy(studied: Path, tmp_path: Path) -> Path:
+    shutil.copytree(studied / "out", tmp_path / "out")
+    shutil.copy(studied / "square.toml", tmp_path)
+    return tmp_path
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(str(f.relative_to(folder)) for f in folder.rglob("*") if f.is_file())
+
+
+def study(folder: Path, *words: object) -> Any:
+    return hvi("study", folder / "square.toml", *ASKED, "--out", folder / "out", *words)
+
+
+def test_a_study_that_is_killed_while_its_folder_is_made_leaves_none_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed in the first writing to the disk; the next one may go on there."""
+
+    class Killed(BaseException):
+        pass
+
+    def killed(_: int) -> None:
+        raise Killed
+
+    folder = OutputFolder(tmp_path / "out", "study")
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", killed)
+        patched.setattr(Path, "unlink", lambda *_, **__: None)  # what follows in the killed process
+        with pytest.raises(Killed):
+            Store(folder.target, 1).open()
+    assert names(tmp_path / "out") == [".manifest.json.part"]
+    folder._lock.release(keep=True)  # as the kernel does
+    again = OutputFolder(tmp_path / "out", "study")
+    again.check("resume")
+    Store(again.target, 1).open()
+    again.close()
+    assert names(tmp_path / "out") == ["manifest.json"]
+
+
+def no_reference(*_: object) -> None:
+    raise NoReferenceError("none today", ExitCode.NOT_CONVERGED)
+
+
+@pytest.mark.parametrize("way", ["--force", "--resume"])
+def test_what_the_study_did_not_write_stays(way: str, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what it wrote once and does not write now goes: no point is run here, they are there after --resume alone."""
+    kept = ["holiday.png", "points/mine.npz", "body.msh"]
+    for name in kept:
+        (copy / "out" / name).write_text("mine")
+    if way == "--force":
+        monkeypatch.setattr(Measurement, "run", no_reference)
+    done = study(copy, way)
+    assert all((copy / "out" / name).read_text() == "mine" for name in kept)
+    left = set(names(copy / "out")) - {"manifest.json", *kept}
+    if way == "--force":
+        assert done.returncode == 4  # there is no reference
+        assert left == set()
+    else:
+        assert done.returncode == 0, done.stderr
+        assert {"study.json", "study.csv", "report.html", "work_precision.png"} < left
+    assert names(copy) == sorted(["square.toml", *(f"out/{n}" for n in names(copy / "out"))])
+
+
+def test_a_page_that_cannot_be_written_costs_a_line(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(folder: Path) -> Path:
+        raise ResultError("no page today")
+
+    monkeypatch.setattr(study_page, "write", refused)
+    done = study(copy, "--resume")
+    assert done.returncode == 0
+    assert "warning: no page today" in done.stdout
+    assert (copy / "out" / "study.json").exists()
+    assert not (copy / "out" / "report.html").exists()
+
+
+def test_folders_of_others_are_no_studies(copy: Path, tmp_path: Path) -> None:
+    (copy / "out" / "manifest.json").unlink()
+    before = names(copy)
+    for way in ("--force", "--resume"):
+        done = study(copy, way)
+        assert done.returncode == 2
+        assert "holds other files" in done.stderr
+    assert names(copy) == before
+
+
+def test_a_run_and_a_study_do_not_replace_each_other(copy: Path) -> None:
+    done = hvi("run", copy / "square.toml", "--out", copy / "out", "--force")
+    assert done.returncode == 2
+    assert "holds a study" in done.stderr
+
+
+def test_a_second_study_is_refused_at_once(copy: Path) -> None:
+    first = OutputFolder(copy / "out", "study")
+    done = study(copy, "--resume")
+    first.close()
+    assert done.returncode == 2
+    assert "another run writes into it just now" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("room", "further"),
+    [(100, ()), (20_000, ()), pytest.param(3_000, ("--axis", "tolerance=1e-7"), marks=pytest.mark.long)],
+)
+def test_a_full_disk_ends_a_study_in_one_message_and_nothing_finished_is_lost(
+    room: int, further: tuple[str, ...], copy: Path
+) -> None:
+    """No file may grow beyond so many bytes: the first that would is the study's own, a picture, or that of a point."""
+    if room == 100:
+        (copy / "out" / "points" / next(iter(names(copy / "out" / "points")))).unlink()
+    before = {name: (copy / "out" / name).read_bytes() for name in names(copy / "out") if name != "manifest.json"}
+    with room_for(room):
+        done = study(copy, "--resume", *further)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("hvi: --out")
+    assert "could not be written: File too large" in done.stderr
+    assert {name: (copy / "out" / name).read_bytes() for name in before} == before
+    assert [name for name in names(copy) if "hvi-" in name] == []
+
+
+def data(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_a_study_leaves_numbers_and_pictures(studied: Path) -> None:
+    found = data(studied / "out")
+    lines = list(csv.DictReader((studied / "out" / "study.csv").open(encoding="utf-8")))
+    assert len(lines) == len(found["points"]) == 3
+    for line, point in zip(lines, found["points"], strict=True):
+        assert point["converged"]
+        assert float(line["error_energy_norm"]) == point["errors"]["energy_norm"]
+        assert float(line["seconds"]) == pytest.approx(sum(point["phases"].values()))
+        assert found["own"] == found["exact"]
+    assert [set(errors) for errors in found["reference"]["errors_of_coarser_meshes"]] == [set(NORMS)] * 2
+    assert set(found["quantities"]) == set(NORMS)
+    assert {p.name for p in (studied / "out").glob("*.png")} == {"work_precision.png", "error_epsilon.png"}
+
+
+def test_a_finished_study_is_refused_or_resumed_without_running_a_point(studied: Path) -> None:
+    words = ("study", studied / "square.toml", "--axis", "epsilon=1,0.1", "--out", studied / "out", "--repeat", 1)
+    refused = hvi(*words)
+    assert refused.returncode == 2
+    assert "--resume" in refused.stderr
+    before = {p: p.stat().st_mtime_ns for p in (studied / "out" / "points").iterdir()}
+    first = data(studied / "out")
+    assert hvi(*words, "--resume").returncode == 0
+    assert {p: p.stat().st_mtime_ns for p in (studied / "out" / "points").iterdir()} == before
+    assert data(studied / "out") == first
+
+
+@pytest.mark.long
+def test_under_mpirun_the_points_run_on_its_ranks_and_the_errors_are_the_same(studied: Path) -> None:
+    words = ("study", studied / "square.toml", "--axis", "epsilon=1,0.1", "--out", studied / "two", "--repeat", 1)
+    done = hvi(*words, ranks=2)
+    assert done.returncode == 0, done.stderr
+    one, two = data(studied / "out"), data(studied / "two")
+    assert two["ranks"] == 2
+    for a, b in zip(one["points"], two["points"], strict=True):
+        assert b["converged"]
+        for name in NORMS:
+            assert a["errors"][name] == pytest.approx(b["errors"][name], rel=1e-5, abs=1e-8), name
+
+
+def test_a_scene_without_a_solution_ends_a_study(tmp_path: Path) -> None:
+    pulled = model(2)
+    pulled["boundary"]["press"]["traction"] = [0.0, 1.0e6]
+    done = hvi("study", write_scene(tmp_path / "up.toml", pulled), "--axis", "mesh=2", "--out", tmp_path / "out")
+    assert done.returncode == 3
+    assert "no solution exists" in done.stderr
+
+
+@pytest.mark.long
+def test_a_point_that_takes_too_long_is_given_up_and_run_again_with_a_longer_limit(tmp_path: Path) -> None:
+    """The reference is never given up."""
+    file = write_scene(tmp_path / "square.toml", model(2, friction=LAW))
+    words = ("study", file, "--axis", "mesh=2", "--out", tmp_path / "out", "--repeat", 1)
+    assert hvi(*words, "--limit", 1e-9).returncode == 0
+    told = data(tmp_path / "out")
+    assert told["reference"]["converged"]
+    assert all(p["reason"].startswith("not finished after 1e-09 s; --limit") for p in told["points"])
+    assert hvi(*words, "--resume").returncode == 0
+    assert all(p["converged"] for p in data(tmp_path / "out")["points"])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_study_keeps_its_points_and_goes_on(tmp_path: Path, number: int) -> None:
+    file = write_scene(tmp_path / "square.toml", model(4, friction=LAW))
+    words = ("study", file, "--axis", "epsilon=1,0.1,0.01,0.001", "--out", tmp_path / "out", "--repeat", 1)
+    child = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True)
+    points = tmp_path / "out" / "points"
+    deadline = time.monotonic() + 120
+    while len(list(points.glob("*.json"))) < 3 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(child.pid, number)
+    _, errors = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert "--resume goes on" in errors
+    kept = {p: p.stat().st_mtime_ns for p in points.glob("*.json")}
+    assert len(kept) >= 3
+    assert hvi(*words, "--resume").returncode == 0
+    assert {p: p.stat().st_mtime_ns for p in kept} == kept
+    assert len(data(tmp_path / "out")["points"]) == 5
+
+
+@pytest.mark.long
+def test_each_point_of_a_study_presses_its_obstacle_by_the_force(tmp_path: Path) -> None:
+    """A column without lateral contraction is exact on each mesh: energy F² h/(2 E b), and nothing is off."""
+    force, height, modulus = 2e4, 0.5, 1e9
+    plate = {"point": [0.0, height + 1e-4], "normal": [0.0, -1.0], "force": [0.0, -force]}
+    table = {
+        "domain": {"shape": "rectangle", "size": [1.0, height], "cells": [4, 2]},
+        "material": {"model": "plane_strain", "youngs_modulus": modulus, "poisson_ratio": 0.0},
+        "boundary": {
+            "base": {"on": "bottom", "displacement": [0.0, 0.0]},
+            "lid": {"on": "top", "contact": {"obstacle": plate}},
+        },
+    }
+    file = write_scene(tmp_path / "column.toml", table)
+    done = hvi("study", file, "--axis", "mesh=4,8", "--out", tmp_path / "out", "--repeat", 1)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out" / "study.csv").open(encoding="utf-8")))
+    assert len(rows) == 2
+    for row in rows:
+        assert row["reason"] == "certified"
+        assert float(row["energy"]) == pytest.approx(force**2 * height / (2 * modulus), rel=1e-7)
+        assert max(float(row[f"error_{name}"]) for name in ("energy_norm", "pressure_l2", "resultant")) < 1e-6
