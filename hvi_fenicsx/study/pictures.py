@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -40,28 +41,38 @@ def _page(study: Study, subject: str, label: str, make: Draw) -> Figure | None:
     fig = figure(1.4 + 2.9 * len(drawn))
     titled(fig, study.title or "untitled", subject)
     panels = fig.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0] if drawn else []
-    fig.subplots_adjust(left=0.13, right=0.72, top=1 - 1.25 / fig.get_figheight(), bottom=0.75 / fig.get_figheight())
+    fig.subplots_adjust(left=0.13, right=0.7, top=1 - 1.25 / fig.get_figheight(), bottom=0.75 / fig.get_figheight())
+    for axes in panels:
+        axes.set(xscale="log", yscale="log")
     shown = [make(axes, study, quantity) for axes, quantity in zip(panels, drawn, strict=True)]
     if not any(shown):
         return None
     for axes, quantity in zip(panels, drawn, strict=True):
         _error_axis(axes, study, quantity)
     handles = {text: line for axes in panels for line, text in zip(*axes.get_legend_handles_labels(), strict=True)}
-    panels[0].legend(handles.values(), handles.keys(), loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    panels[0].legend(
+        handles.values(), handles.keys(), loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=10
+    )
     panels[-1].set_xlabel(label)
     return fig
 
 
 def _error_axis(axes: Axes, study: Study, quantity: str) -> None:
-    """Errors in per cent, both axes logarithmic; the reference's own error is a grey band from below."""
-    axes.set(xscale="log", yscale="log")
+    """The title and the grid; the reference's own error is a grey band from below."""
     axes.grid(which="major", color="#e6e6e6", lw=0.8)
     axes.set_title(f"error in {NORMS[quantity][1]}".replace("_t", "ₜ").replace("_n", "ₙ").replace("-", "−"), loc="left")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{_decimal(100 * y)} %"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    _label(axes.yaxis, lambda y: f"{_decimal(100 * y)} %")
     low, own = axes.get_ylim()[0], study.certain[quantity].error
     if own is not None and own > low:
         axes.axhspan(low, own, color=GREY, alpha=0.16, lw=0, zorder=0, label="the reference's own error")
+
+
+def _label(axis: Axis, text: Callable[[float], str]) -> None:
+    """Label a logarithmic axis at the powers of ten, between few of them at 2 and 5 too."""
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 1e3 * low else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: text(value)))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _decimal(value: float) -> str:
@@ -87,10 +98,7 @@ def _over_time(axes: Axes, study: Study, quantity: str) -> bool:
     front = [(r.seconds, max(r.error(quantity) or 0.0, LEAST)) for r in study.front(quantity)]
     if front:
         axes.plot(*zip(*front, strict=True), color=INK, lw=1.6, zorder=1, drawstyle="steps-post", label="the front")
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: duration(x)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    _label(axes.xaxis, duration)
     return bool(known)
 
 
@@ -113,11 +121,7 @@ def _over_h(axes: Axes, study: Study, quantity: str) -> bool:
             axes.annotate(
                 f"h^{order:.2f}", (points[-1][0], max(points[-1][1], LEAST)), (6, 0), textcoords="offset points"
             )
-    if lines:
-        axes.set_xscale("log")
-        axes.set_xticks(sorted({h for points, _ in lines for h, _ in points}))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: _decimal(x)))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+    _label(axes.xaxis, _decimal)
     return bool(lines)
 
 
@@ -134,6 +138,7 @@ def _over_epsilon(axes: Axes, study: Study, quantity: str) -> bool:
     if (bare := study.exact.error(quantity)) is not None:
         axes.axhline(max(bare, LEAST), color=GREEN, ls="--", lw=2, label="exact law")
     _own(axes, own.epsilon, study, quantity)
+    _label(axes.xaxis, _decimal)
     return any(len(found) > 1 for found in kinds.values())
 
 

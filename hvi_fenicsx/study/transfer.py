@@ -12,7 +12,7 @@ import basix
 import numpy as np
 from dolfinx import fem, geometry
 from mpi4py import MPI
-from scipy import sparse, spatial
+from scipy import sparse
 from scipy.sparse import csgraph
 
 from .. import compat
@@ -69,11 +69,15 @@ class Targets:
         self.others: dict[str, Integers] = {}
         for name in sorted(arrays.parts.keys() & set(joints)):
             vertices = arrays.parts[name].vertices
-            beyond = np.flatnonzero(own != own[vertices[0]])
-            near = beyond[spatial.KDTree(arrays.points[beyond]).query(arrays.points[vertices])[1]]
+            beyond = cells[self.cell_bodies != own[vertices[0]]]
+            holding = beyond[
+                _Mesh(arrays.points, beyond).containing(arrays.points[vertices]), : self.middles.shape[1] + 1
+            ]
+            corners = arrays.points[holding]
+            weights = point_location.clipped(point_location.barycentric_weights(corners, arrays.points[vertices]))
             self.others[name] = np.arange(len(self.points), len(self.points) + len(vertices))
-            self.points = np.vstack([self.points, arrays.points[vertices]])
-            self.bodies = np.append(self.bodies, own[near])
+            self.points = np.vstack([self.points, np.einsum("mc,mcd->md", weights, corners)])
+            self.bodies = np.append(self.bodies, own[holding[:, 0]])
 
 
 def _bodies(arrays: SolutionArrays) -> Integers:
