@@ -114,8 +114,8 @@ def execute(
     with results.ResultFolder(COMM, target, kept, inputs=[options.scene]) as folder:
         interrupt = Interrupt(COMM)
         interrupt.watch()
-        run_logs = _on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
-        with log.Handlers(*_on_first_rank(log.TerminalDisplay)):
+        run_logs = on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
+        with log.Handlers(*on_first_rank(log.TerminalDisplay)):
             with log.Handlers(*run_logs):
                 session = Session(
                     options=options, scene=scene, folder=folder, timer=timer, interrupted=interrupt.requested
@@ -140,7 +140,7 @@ def _finished(target: Path, scene: Scene, command: Command) -> int | None:
     return int(record["exit_code"])
 
 
-def _on_first_rank(make: Callable[[], H]) -> list[H]:
+def on_first_rank(make: Callable[[], H]) -> list[H]:
     """The handler that rank 0 makes, none on the others. Collective."""
     made: list[H] = []
     on_root(COMM, lambda: made.append(make()))

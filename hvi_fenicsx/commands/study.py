@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
+from .. import results
 from ..errors import ExitCode
 from ..results.output_folder import Existing
 from ..runtime import log
 from ..runtime.manifest import MARKS
-from ..runtime.mpi import on_root
-from ..runtime.signals import Interrupt
+from ..runtime.mpi import Interrupt, on_root
 from ..scene import read_scene
 from ..study import plan
 from ..study.conduct import conduct
 from ..study.table import Study
-from . import target, telling
-from .telling import COMM
+from .session import COMM, on_first_rank, say
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -27,14 +27,15 @@ def execute(options: argparse.Namespace) -> int:
         StudyInterruptedError: a signal came (130); finished points are kept.
     """
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
-    asked = plan.make(scene, [plan.read_axis(text) for text in options.axis])
+    planned = plan.make(scene, [plan.read_axis(text) for text in options.axis])
     existing: Existing = "replace" if options.force else "resume" if options.resume else "refuse"
     interrupt = Interrupt(COMM)
     interrupt.watch()
-    folder = target.path_of(options, "-study")
-    with log.Handlers(*telling.on_first_rank(log.TerminalDisplay)):
+    default = Path("results") / f"{options.scene.stem}-study"
+    folder = on_root(COMM, lambda: results.resolved(options.out or default))
+    with log.Handlers(*on_first_rank(log.TerminalDisplay)):
         study, warnings = conduct(
-            asked,
+            planned,
             COMM,
             folder,
             repeats=options.repeat,
@@ -44,7 +45,7 @@ def execute(options: argparse.Namespace) -> int:
             interrupted=interrupt.requested,
         )
         told = [f"warning: {text}" for text in warnings]
-        telling.say([*_heading(study), *study.sentences(), *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
+        say([*_heading(study), *study.sentences(), *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
     return ExitCode.CERTIFIED
 
 

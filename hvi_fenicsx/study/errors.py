@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse, spatial
 
-from ..geometry import tangents
 from ..problem import spaces
-from ..report.solution_arrays import PartArrays, SolutionArrays
+from ..report.contact_part import ContactPart
+from ..report.solution_arrays import SolutionArrays
 from ..runtime.mpi import joined
-from ..solution import Solution
 from ..typing import Array, Mask
+from ..workflow import Solution
 from .transfer import BodyTransfer, Targets, edge_ends, rows_of, surface
 
 NORMS: Mapping[str, tuple[str, str]] = {
@@ -83,8 +83,8 @@ class ReferenceSolution:
         self._ends, self._transfers = edge_ends(arrays), dict[bytes, _Transfer]()
         self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[arrays.points.shape[1]]
         parts = arrays.parts.values()
-        self._weights = np.concatenate([np.empty(0), *(part.weights for part in parts)])
-        self._normals = np.vstack([np.empty((0, arrays.points.shape[1])), *(part.normals for part in parts)])
+        self._weights = np.concatenate([np.empty(0), *(part.weight for part in parts)])
+        self._normals = np.vstack([np.empty((0, arrays.points.shape[1])), *(part.normal for part in parts)])
         self._bounded = any("contact" in part.columns for part in parts)
         self._from_jump = np.concatenate([np.empty(0), *(_from_jump(arrays, part) for part in parts)])
         self.own = self.transfer(arrays)
@@ -111,7 +111,7 @@ class ReferenceSolution:
         """The tangential part of a displacement on a part, at a joint relative to the other body, (m, d)."""
         part, other = self._arrays.parts[name], self._targets.others.get(name)
         found = u[part.vertices] - (0.0 if other is None else u[other])
-        return np.asarray(found - np.sum(found * part.normals, axis=1)[:, None] * part.normals)
+        return np.asarray(found - np.sum(found * part.normal, axis=1)[:, None] * part.normal)
 
     def energy(self, u: Array) -> float:
         """√a(u, u) of a displacement (n, d), up to a factor; the stiffness is that of coefficients in its basis."""
@@ -161,39 +161,29 @@ class ReferenceSolution:
 _Transfer = tuple[BodyTransfer, Mapping[str, sparse.csr_array]]
 
 
-def _tractions(part: PartArrays) -> Array:
+def _tractions(part: ContactPart) -> Array:
     """-σ_t as vectors, σ_n and contact at a part's vertices, (m, d + 2)."""
-    columns, friction = part.columns, np.zeros_like(part.normals)
-    if "friction_t1" in columns:
-        friction = _vectors(part, "friction_t")
-    bounded = "contact" in columns
+    columns, bounded = part.columns, "contact" in part.columns
+    friction = part.vectors("friction") if "friction_t1" in columns else np.zeros_like(part.normal)
     pressure = columns["sigma_n"] * (bounded or "branch_n" in columns)
     return np.column_stack([friction, pressure, columns["contact"] if bounded else np.zeros(len(pressure))])
 
 
-def _vectors(part: PartArrays, name: str) -> Array:
-    """A tangential column as vectors, (m, d)."""
-    components = np.column_stack([part.columns[f"{name}{i}"] for i in range(1, part.normals.shape[1])])
-    return np.asarray(np.einsum("mk,mkd->md", components, tangents(part.normals)))
-
-
-def _width(arrays: SolutionArrays, part: PartArrays) -> float:
+def _width(arrays: SolutionArrays, part: ContactPart) -> float:
     corners = arrays.points[part.facets]
     return float(np.max(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), initial=0.0))
 
 
-def _from_jump(arrays: SolutionArrays, part: PartArrays) -> Array:
+def _from_jump(arrays: SolutionArrays, part: ContactPart) -> Array:
     """How far each vertex of a part is from a facet on which the slip passes a drop of the law, m, (m,)."""
-    facets, along, slip = rows_of(arrays, part)[part.facets], tangents(part.normals)[:, 0], _vectors(part, "u_t")
-    size, plane = np.linalg.norm(slip, axis=1), slip.shape[1] == 2
+    facets, along = rows_of(arrays, part)[part.facets], part.tangents[:, 0]
     turned = np.sum(along[facets[:, 0]] * along[facets[:, -1]], axis=1) < 0.0
-    signed = np.sum(slip * along, axis=1) if plane else size
-    beyond = np.where(turned[:, None], size[facets], signed[facets])[:, :, None] - part.drops[facets]
+    signed = part.size("slip")
+    beyond = np.where(turned[:, None], np.abs(signed)[facets], signed[facets])[:, :, None] - part.drops[facets]
     passed = np.any((beyond.min(axis=1) <= 0.0) & (beyond.max(axis=1) >= 0.0), axis=1)
-    points = arrays.points[part.vertices]
     if not passed.any():
-        return np.full(len(points), np.inf)
-    return np.asarray(spatial.KDTree(points[facets[passed]].mean(axis=1)).query(points)[0])
+        return np.full(len(part), np.inf)
+    return np.asarray(spatial.KDTree(part.x[facets[passed]].mean(axis=1)).query(part.x)[0])
 
 
 def _lengths(vectors: Array) -> Array:

@@ -22,11 +22,9 @@ from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
 from ..errors import ExitCode, HviError, NotWrittenError
-from ..preparation import prepare
 from ..report import solution_arrays as archive
 from ..report.errors import ResultError
 from ..report.solution_arrays import SolutionArrays
-from ..results import array_file
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
 from ..runtime import log, manifest, writing
@@ -35,9 +33,8 @@ from ..runtime.mpi import largest, on_root, time_over
 from ..runtime.timing import Timer
 from ..runtime.versions import __version__
 from ..scene import dump_scene
-from ..solution import Solution
 from ..solvers.context import never
-from ..workflow import find_solution
+from ..workflow import Solution, find_solution, prepare
 from .errors import stiffness
 from .plan import Plan, Point
 from .transfer import mesh_width
@@ -259,7 +256,7 @@ class Measurement:
 
         def write() -> float:
             assert found is not None
-            array_file.write(MPI.COMM_SELF, self.store.file(point, ".npz"), archive.members(found))
+            archive.save(self.store.file(point, ".npz"), found)
             if matrix is not None:
                 path = self.store.file(point, ".stiffness.npz")
                 with writing.whole(path) as aside, aside.open("wb") as file:

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..errors import ExitCode, InputError
-from ..runtime.percent import percent
+from ..runtime.terminal import percent
 from ..runtime.versions import __version__, versions
 from ..scene import SolverTable
 from ..schema import unknown

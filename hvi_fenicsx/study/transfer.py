@@ -17,7 +17,8 @@ from scipy.sparse import csgraph
 
 from .. import compat
 from ..mesh import nodes, point_location
-from ..report.solution_arrays import PartArrays, SolutionArrays
+from ..report.contact_part import ContactPart
+from ..report.solution_arrays import SolutionArrays
 from ..typing import Array, Integers
 
 _KINDS = {1: "interval", 2: "triangle", 3: "tetrahedron"}
@@ -147,14 +148,14 @@ class _Mesh:
         return np.asarray(field.eval(_in_space(points), cells.astype(np.int32))).reshape(-1, d)
 
 
-def rows_of(arrays: SolutionArrays, part: PartArrays) -> Integers:
+def rows_of(arrays: SolutionArrays, part: ContactPart) -> Integers:
     """The row that each node of a solution has in a part, (n,); any number where it has none."""
     found = np.empty(len(arrays.points), dtype=np.int64)
     found[part.vertices] = np.arange(len(part.vertices))
     return found
 
 
-def surface(source: SolutionArrays, part: PartArrays, points: Array) -> sparse.csr_array:
+def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.csr_array:
     """The matrix from a part's rows (n) to points on it (m) of what is linear between neighbouring nodes, as tractions.
 
     Args:

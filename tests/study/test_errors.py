@@ -171,9 +171,9 @@ def test_the_contact_set_is_the_area_where_one_is_closed() -> None:
     here, reference = taken(solution), reference_of(solution)
     ((name, part),) = here.parts.items()
     opened = {**part.columns, "contact": part.columns["contact"] * (part.columns["x"] > 0.5)}
-    wrong = part.weights[(part.columns["x"] <= 0.5) & (part.columns["contact"] > 0)].sum()
+    wrong = part.weight[(part.columns["x"] <= 0.5) & (part.columns["contact"] > 0)].sum()
     found = errors(reference, replace(here, parts={name: replace(part, columns=opened)}))
-    assert found["contact_set"] == pytest.approx(wrong / part.weights[part.columns["contact"] > 0].sum())
+    assert found["contact_set"] == pytest.approx(wrong / part.weight[part.columns["contact"] > 0].sum())
 
 
 def test_the_energy_norm_is_that_of_the_closed_form() -> None:
@@ -197,7 +197,7 @@ def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out() -> None:
     near = reference.near_jump(reference.own)
     jump = 0.5 - 1 / 16  # the slip passes the drop between the vertices at 3/8 and 1/2
     np.testing.assert_array_equal(near, np.abs(x - jump) <= 2 / 8)
-    assert reference.left_out(reference.own) == pytest.approx(float(part.weights[near].sum()))
+    assert reference.left_out(reference.own) == pytest.approx(float(part.weight[near].sum()))
     wrong = {**slips, "friction_t1": part.columns["friction_t1"] + 1e3 * near}
     found = errors(reference, replace(here, parts={name: replace(dropped, columns=wrong)}))
     assert found["friction_max"] == 0.0 < found["friction_l1"]

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene
-from hvi_fenicsx.arguments import parser
+from hvi_fenicsx.commands.arguments import parser
 from hvi_fenicsx.study import plan
 from hvi_fenicsx.study.errors import NORMS, Certainty
 from hvi_fenicsx.study.table import Row, Study
