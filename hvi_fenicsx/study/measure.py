@@ -95,7 +95,12 @@ class Store:
         return digest.hexdigest()[:16]
 
     def file(self, point: Point, ending: str) -> Path:
-        """A file of a point: ``.json`` its record, ``.npz`` its solution, ``.stiffness.npz`` that of a reference."""
+        """A file of a point.
+
+        Args:
+            point: the point.
+            ending: ``.json`` of its record, ``.npz`` of its solution, ``.stiffness.npz`` of a reference's stiffness.
+        """
         return self.folder / _POINTS / f"{self.name(point)}{ending}"
 
     def record(self, point: Point) -> dict[str, Any] | None:
@@ -127,7 +132,13 @@ class Store:
             raise ResultError(f"{file}: damaged ({error})") from None
 
     def finished(self, point: Point, limit: float | None, *, is_reference: bool) -> bool:
-        """Whether a point is there, whole and with all that is wanted, or was given up after no less time."""
+        """Whether a point is there, whole and with all that is wanted, or was given up after no less time.
+
+        Args:
+            point: the point.
+            limit: seconds after which it would be given up; None: never.
+            is_reference: whether its stiffness is wanted.
+        """
         record = self.record(point)
         if record is None or (record.get("limit") is not None and (limit is None or record["limit"] < limit)):
             return False

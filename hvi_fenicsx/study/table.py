@@ -143,7 +143,12 @@ class Study:
         return [q for q in known if q != "pressure_l1" or "friction_l1" not in known]
 
     def claimed(self, row: Row, quantity: str) -> float | None:
-        """The error that can be claimed: not less than the reference's own."""
+        """The error that can be claimed: not less than the reference's own.
+
+        Args:
+            row: the point.
+            quantity: one of ``NORMS``.
+        """
         error = row.error(quantity)
         return None if error is None else max(error, self.certain[quantity].error or 0.0)
 
@@ -159,7 +164,12 @@ class Study:
         return found
 
     def over_h(self, quantity: str, like: Row) -> list[tuple[float, float]]:
-        """(h, error) of the points with a row's law and degree, and the scene's own method, coarse to fine."""
+        """(h, error) of the points with the scene's own method, coarse to fine.
+
+        Args:
+            quantity: one of ``NORMS``.
+            like: whose law and degree the points have.
+        """
         own = self.own
         wanted = (like.law, like.degree, own.method, own.tolerance, own.linear_solver)
         alike = [r for r in self.rows if (r.law, r.degree, r.method, r.tolerance, r.linear_solver) == wanted]
@@ -167,7 +177,12 @@ class Study:
         return sorted(found.items(), reverse=True)
 
     def order(self, quantity: str, like: Row) -> float | None:
-        """The order in h of the error over :meth:`over_h`, from the two finest meshes that the reference resolves."""
+        """The order in h of the error over :meth:`over_h`, from the two finest meshes that the reference resolves.
+
+        Args:
+            quantity: one of ``NORMS``.
+            like: whose law and degree the points have.
+        """
         own = self.certain[quantity].error or 0.0
         known = [(h, e) for h, e in self.over_h(quantity, like) if e > RESOLVED * own][-2:]
         if len(known) < 2:

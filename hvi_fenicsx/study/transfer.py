@@ -149,7 +149,12 @@ class _Mesh:
 
 
 def rows_of(arrays: SolutionArrays, part: ContactPart) -> Integers:
-    """The row that each node of a solution has in a part, (n,); any number where it has none."""
+    """The row that each node of a solution has in a part, (n,); any number where it has none.
+
+    Args:
+        arrays: the solution.
+        part: of it.
+    """
     found = np.empty(len(arrays.points), dtype=np.int64)
     found[part.vertices] = np.arange(len(part.vertices))
     return found
