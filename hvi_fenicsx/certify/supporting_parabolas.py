@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..equilibrium_paths.graphs import graph_of
 from ..laws import TractionGraph
 from ..laws.arc import Arc
 from ..typing import Array
@@ -25,7 +24,7 @@ def needed_falls(state: LawState, thresholds: UniquenessThresholds) -> Array | N
         state: of a law at a certified displacement.
         thresholds: what is rounding.
     """
-    graph = graph_of(state.term.law)
+    graph = state.term.law.graph
     if graph is None or state.term.mixity is not None:
         return None
     low, high = state.term.law.interval(state.argument, state.near)

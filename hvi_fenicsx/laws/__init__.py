@@ -11,6 +11,7 @@ from .registry import available, create, describe
 from .sampled import SampledLaw, sample_traction
 from .thresholds import Thresholds
 from .traction_graph import TractionGraph
+from .vertex_laws import VertexLaws
 from .weakening import Exponential, WeakeningLaw
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "Thresholds",
     "TractionGraph",
     "Tresca",
+    "VertexLaws",
     "WeakeningLaw",
     "available",
     "create",

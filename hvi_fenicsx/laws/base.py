@@ -24,6 +24,7 @@ from .convex_parts import ConvexPart, Directional, ScaledPart, quotient
 from .parameter_checks import require_positive
 from .split_law import SplitLaw
 from .traction_bounds import Extremes, extremes
+from .traction_graph import TractionGraph
 
 _REGISTRY: dict[str, type] = {}
 
@@ -62,6 +63,11 @@ class Superpotential(SplitLaw):
     @abstractmethod
     def even(self) -> bool:
         """Whether j(-x) = j(x), so that the law can act on the length of a slip in 3D."""
+
+    @property
+    def graph(self) -> TractionGraph | None:
+        """The table of the traction where that is piecewise linear; None where it is curved."""
+        return None
 
     @property
     def is_linear(self) -> bool:
@@ -158,6 +164,11 @@ class ScaledLaw(Superpotential, register=False):
     @cached_property
     def concave(self) -> ConvexPart:
         return ScaledPart(self.law.concave, self.length, self.traction)
+
+    @override
+    @cached_property
+    def graph(self) -> TractionGraph | None:
+        return None if self.law.graph is None else self.law.graph.scaled(self.length, self.traction)
 
     @override
     @property

@@ -69,6 +69,7 @@ class PolylineLaw(Superpotential):
         """Typical displacement of a graph without a break off zero, m."""
         return 1e-6
 
+    @override
     @cached_property
     def graph(self) -> TractionGraph:
         """The table of the law; read `build` once."""

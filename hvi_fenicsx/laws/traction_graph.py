@@ -1,15 +1,18 @@
-"""The numerical kernel of all polyline laws: a piecewise linear traction over the whole line."""
+"""The numerical kernel of all polyline laws: tables of the pieces of a traction, one for all vertices or a row each.
+
+The rows of a table have their breaks at 0 in one column; a row with fewer breaks than others has some at -inf or inf.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from ..typing import Array, Integers
+from ..typing import Array, Integers, Mask
 from .arc import Arc
 
 
@@ -18,10 +21,10 @@ class TractionGraph:
     """A piecewise linear traction over displacement, and its primitive with the value 0 at 0.
 
     Attributes:
-        breaks: displacements (k,), strictly ascending, one of them 0.
-        left: limits from the left at the breaks, (k,).
-        right: limits from the right at the breaks, (k,).
-        slopes: of the pieces, (k+1,); the first and the last piece are unbounded.
+        breaks: displacements (k,), strictly ascending, one of them 0; of a table with a row a vertex, (m, k).
+        left: limits from the left at the breaks, of the same shape.
+        right: limits from the right at the breaks, of the same shape.
+        slopes: of the pieces, (k+1,) or (m, k+1); the first and the last piece are unbounded.
     """
 
     breaks: Array
@@ -41,16 +44,8 @@ class TractionGraph:
         breaks, first = np.unique(table[:, 0], return_index=True)
         last = np.append(first[1:], len(table)) - 1
         near, far = table[first, 1], table[last, 1]
-        slopes = np.append((near[1:] - far[:-1]) / np.diff(breaks), 0.0)
-        if one_sided:
-            start = np.append(0.0, near[1:])
-            return TractionGraph(breaks, start, far, np.append(0.0, slopes))
-        return TractionGraph(
-            np.append(-breaks[:0:-1], breaks),
-            np.concatenate([-far[:0:-1], [-far[0]], near[1:]]),
-            np.append(-near[:0:-1], far),
-            np.append(slopes[::-1], slopes),
-        )
+        ahead = _HalfLine(breaks, near, far, np.append((near[1:] - far[:-1]) / np.diff(breaks), 0.0))
+        return _joined(_HalfLine(*np.zeros((4, 1))) if one_sided else ahead, ahead)
 
     @staticmethod
     def from_slopes(breaks: Array, slopes: Array, jumps: Array, start: Array) -> TractionGraph:
@@ -63,14 +58,119 @@ class TractionGraph:
             start: the limits (left, right) at 0, (2,).
         """
         zero = int(np.searchsorted(breaks, 0.0))
-        near, far = _outward(breaks[zero:], slopes[zero + 1 :], jumps[zero:], start[1])
-        near_m, far_m = _outward(-breaks[zero::-1], slopes[zero::-1], jumps[zero::-1], -start[0])
-        return TractionGraph(
-            breaks,
-            np.concatenate([-far_m[:0:-1], [start[0]], near[1:]]),
-            np.concatenate([-near_m[:0:-1], [start[1]], far[1:]]),
-            slopes,
+        ahead = _outward(breaks[zero:], slopes[zero + 1 :], jumps[zero:], start[1])
+        return _joined(_outward(-breaks[zero::-1], slopes[zero::-1], jumps[zero::-1], -start[0]), ahead)
+
+    @staticmethod
+    def chords(places: Array, left: Array, right: Array, slopes: tuple[float, float] = (0.0, 0.0)) -> TractionGraph:
+        """Graph of straight lines between places.
+
+        Args:
+            places: displacements (k,), strictly ascending, one of them 0.
+            left: limits from the left there, (k,).
+            right: limits from the right there, (k,).
+            slopes: of the two pieces beyond.
+        """
+        inner = (left[1:] - right[:-1]) / np.diff(places)
+        return TractionGraph(places, left, right, np.concatenate([slopes[:1], inner, slopes[1:]]))
+
+    def scaled(self, length: float, traction: float) -> TractionGraph:
+        """The graph in other units.
+
+        Args:
+            length: the unit of displacements.
+            traction: the unit of tractions.
+        """
+        parts = (self.breaks / length, self.left / traction, self.right / traction, self.slopes * (length / traction))
+        return TractionGraph(*(np.asarray(part, dtype=np.float64) for part in parts))
+
+    def turned(self) -> TractionGraph:
+        """The graph of a law that acts on -x: its traction along x."""
+        parts = (-self.breaks, -self.right, -self.left, self.slopes)
+        return TractionGraph(*(part[..., ::-1] for part in parts))
+
+    def at_vertices(self, factors: Array) -> TractionGraph:
+        """A row a vertex: of a law that acts on factor times x, the traction along x.
+
+        Args:
+            factors: not zero, (m,).
+        """
+        halves = _padded(self._ahead, self.turned()._ahead)
+        size = np.abs(factors)[:, None]
+        along, against = (_HalfLine(h.places / size, h.near * size, h.far * size, h.after * size**2) for h in halves)
+        forward = factors[:, None] > 0.0
+        return _joined(_chosen(forward, against, along), _chosen(forward, along, against))
+
+    def times(self, weights: Array) -> TractionGraph:
+        """The tractions of a table with a row a vertex, multiplied.
+
+        Args:
+            weights: positive, (m,).
+        """
+        w = weights[:, None]
+        return TractionGraph(self.breaks, self.left * w, self.right * w, self.slopes * w)
+
+    def remembering(self, memory: Array) -> TractionGraph:
+        """A row a vertex, of bonds that have been so far: secants up to there, the graph beyond.
+
+        Args:
+            memory: the least and the greatest displacement, ≤ 0 and ≥ 0, and the tractions there, (m, 4).
+        """
+        rows = self if self.breaks.ndim == 2 else self.at_vertices(np.ones(len(memory)))
+        low, high, low_traction, high_traction = memory.T
+        ahead, behind = rows._beyond(high, high_traction), rows.turned()._beyond(-low, -low_traction)
+        return _joined(behind, ahead)
+
+    def _beyond(self, end: Array, traction: Array) -> _HalfLine:
+        """The half-line x ≥ 0: up to the end a secant, then the graph, (m, k + 1)."""
+        places, near, far, after = self._ahead
+        been, at_end = end > 0.0, np.where(end > 0.0, end, np.inf)
+        secant = np.divide(traction, end, out=np.zeros_like(end), where=been)
+        there = self.traction(np.where(been, end, 0.0), "right"), self._after(np.where(been, end, 0.0))
+        first = (
+            np.zeros_like(end),
+            np.zeros_like(end),
+            np.where(been, 0.0, far[:, 0]),
+            np.where(been, secant, after[:, 0]),
         )
+        rest = np.where(places[:, 1:] > end[:, None], places[:, 1:], np.inf), near[:, 1:], far[:, 1:], after[:, 1:]
+        columns = zip(first, (at_end, traction, *there), rest, strict=True)
+        return _HalfLine(*(np.column_stack(column) for column in columns)).ordered()
+
+    def plus(self, other: TractionGraph) -> TractionGraph:
+        """The sum of two tables, row by row.
+
+        Args:
+            other: the other one, of the same rows.
+        """
+        return _joined(self.turned()._sum(other.turned()), self._sum(other))
+
+    def _sum(self, other: TractionGraph) -> _HalfLine:
+        places = np.sort(np.concatenate([self._ahead.places, other._ahead.places[:, 1:]], axis=1), axis=1)
+        places[:, 1:][places[:, 1:] == places[:, :-1]] = np.inf
+        columns = np.where(np.isfinite(places), places, 0.0).T
+        both = (self, other)
+        near, far, after = (
+            np.column_stack([sum(part(graph, x) for graph in both) for x in columns])
+            for part in (_left_limit, _right_limit, TractionGraph._after)
+        )
+        return _HalfLine(places, near, far, after).ordered()
+
+    def row(self, i: int) -> TractionGraph:
+        """The graph of one vertex.
+
+        Args:
+            i: its number.
+        """
+        known = np.isfinite(self.breaks[i])
+        pieces = np.append(known[: self.zero], np.append(True, known[self.zero :]))
+        return TractionGraph(self.breaks[i][known], self.left[i][known], self.right[i][known], self.slopes[i][pieces])
+
+    @property
+    def _ahead(self) -> _HalfLine:
+        """What is at x ≥ 0."""
+        z = self.zero
+        return _HalfLine(self.breaks[..., z:], self.left[..., z:], self.right[..., z:], self.slopes[..., z + 1 :])
 
     @property
     def jumps(self) -> Array:
@@ -80,27 +180,27 @@ class TractionGraph:
     @cached_property
     def zero(self) -> int:
         """Index of the break at displacement 0."""
-        return int(np.searchsorted(self.breaks, 0.0))
+        return int(np.argmax(np.reshape(self.breaks, (-1, self.breaks.shape[-1]))[0] == 0.0))
 
     @cached_property
     def _anchor(self) -> Integers:
         """For each piece the break nearest to 0. Evaluated from there, an odd graph is odd to the bit."""
-        return np.append(np.arange(self.zero + 1), np.arange(self.zero, self.breaks.size))
+        return np.append(np.arange(self.zero + 1), np.arange(self.zero, self.breaks.shape[-1]))
 
     @cached_property
     def _start(self) -> Array:
         """Traction of each piece at its anchor."""
-        return np.append(self.left[: self.zero + 1], self.right[self.zero :])
+        return np.concatenate([self.left[..., : self.zero + 1], self.right[..., self.zero :]], axis=-1)
 
     @cached_property
     def _energy(self) -> Array:
-        """Primitive at the breaks (k,), summed outward from 0."""
-        z, gaps = self.zero, np.diff(self.breaks)
-        steps = (
-            np.append(self.left[1 : z + 1], self.right[z:-1]) * gaps * np.append(-np.ones(z), np.ones(gaps.size - z))
-        )
-        steps += 0.5 * self.slopes[1:-1] * gaps**2
-        return np.concatenate([np.cumsum(steps[:z][::-1])[::-1], [0.0], np.cumsum(steps[z:])])
+        """Primitive at the breaks, of their shape, summed outward from 0."""
+        z, gaps = self.zero, np.diff(np.where(np.isfinite(self.breaks), self.breaks, 0.0), axis=-1)
+        signs = np.append(-np.ones(z), np.ones(gaps.shape[-1] - z))
+        starts = np.concatenate([self.left[..., 1 : z + 1], self.right[..., z:-1]], axis=-1)
+        steps = starts * gaps * signs + 0.5 * self.slopes[..., 1:-1] * gaps**2
+        behind, ahead = np.cumsum(steps[..., :z][..., ::-1], axis=-1)[..., ::-1], np.cumsum(steps[..., z:], axis=-1)
+        return np.concatenate([behind, np.zeros_like(self.breaks[..., :1]), ahead], axis=-1)
 
     def traction(self, x: Array, side: str) -> Array:
         """Limit (m,) of the traction; at a break to the bit.
@@ -122,16 +222,24 @@ class TractionGraph:
 
     def _pieces(self, x: Array) -> tuple[Integers, Integers]:
         """The pieces before and behind x, (m,) each; off the breaks they are one."""
-        return self.breaks.searchsorted(x), self.breaks.searchsorted(x, side="right")
+        if self.breaks.ndim == 1:
+            return self.breaks.searchsorted(x), self.breaks.searchsorted(x, side="right")
+        return np.sum(self.breaks < x[:, None], axis=1), np.sum(self.breaks <= x[:, None], axis=1)
 
     def _steeper(self, before: Integers, behind: Integers) -> Array:
-        return np.asarray(np.maximum(self.slopes[before], self.slopes[behind]))
+        return np.asarray(np.maximum(_taken(self.slopes, before), _taken(self.slopes, behind)))
+
+    def _after(self, x: Array) -> Array:
+        """Slope right of x, (m,)."""
+        return _taken(self.slopes, self._pieces(x)[1])
 
     def _limit(self, x: Array, next_break: Integers, passed: Integers, side: str) -> Array:
         piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
         with np.errstate(over="ignore"):
-            inside = self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
-        return np.where(passed > next_break, limits[np.minimum(next_break, limits.size - 1)], inside)
+            distance = x - _taken(self.breaks, self._anchor[piece])
+            inside = _taken(self._start, piece) + _taken(self.slopes, piece) * distance
+        last = limits.shape[-1] - 1
+        return np.where(passed > next_break, _taken(limits, np.minimum(next_break, last)), inside)
 
     def slope(self, x: Array) -> Array:
         """Slope (m,) at x; at a break the larger of the two."""
@@ -157,12 +265,13 @@ class TractionGraph:
     def primitive(self, x: Array) -> Array:
         """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""
         # Of a break's two pieces the one nearer to 0, so that an even law is even to the bit.
-        ahead, behind = np.searchsorted(self.breaks, x), np.searchsorted(self.breaks, x, side="right")
+        ahead, behind = self._pieces(x)
         piece = np.where(x < 0.0, behind, ahead)
         anchor = self._anchor[piece]
-        d = x - self.breaks[anchor]
+        d = x - _taken(self.breaks, anchor)
+        start, half = _taken(self._start, piece), 0.5 * _taken(self.slopes, piece)
         with np.errstate(over="ignore"):
-            return np.asarray(self._energy[anchor] + (self._start[piece] + (0.5 * self.slopes[piece]) * d) * d)
+            return np.asarray(_taken(self._energy, anchor) + (start + half * d) * d)
 
     def arcs(self) -> Iterator[Arc]:
         """The pieces of the primitive."""
@@ -189,12 +298,67 @@ class TractionGraph:
         return rising, falling
 
 
-def _outward(breaks: Array, slopes: Array, jumps: Array, start: float) -> tuple[Array, Array]:
-    """Limits before and behind each break of a half-line that starts at 0 with the traction `start`."""
+class _HalfLine(NamedTuple):
+    """The breaks of a traction at x ≥ 0, the first of them 0: limits on the near and the far side, slopes behind."""
+
+    places: Array
+    near: Array
+    far: Array
+    after: Array
+
+    def ordered(self) -> _HalfLine:
+        """The same with breaks that are left out, at inf, last."""
+        order = np.argsort(self.places, axis=1, kind="stable")
+        return _HalfLine(*(np.take_along_axis(part, order, axis=1) for part in self))
+
+
+def _joined(behind: _HalfLine, ahead: _HalfLine) -> TractionGraph:
+    """The graph of two half-lines; the one behind is that of the law of -x."""
+    columns = (
+        (-behind.places[..., :0:-1], ahead.places),
+        (-behind.far[..., ::-1], ahead.near[..., 1:]),
+        (-behind.near[..., :0:-1], ahead.far),
+        (behind.after[..., ::-1], ahead.after),
+    )
+    return TractionGraph(*(np.concatenate(parts, axis=-1) for parts in columns))
+
+
+def _padded(one: _HalfLine, other: _HalfLine) -> tuple[_HalfLine, _HalfLine]:
+    """Two half-lines with equally many breaks, more of them at inf."""
+    most = max(one.places.size, other.places.size)
+
+    def filled(part: Array, end: float) -> Array:
+        return np.append(part, np.full(most - part.size, end))
+
+    first, second = (_HalfLine(filled(h.places, np.inf), *(filled(p, 0.0) for p in h[1:])) for h in (one, other))
+    return first, second
+
+
+def _chosen(first: Mask, one: _HalfLine, other: _HalfLine) -> _HalfLine:
+    return _HalfLine(*(np.where(first, a, b) for a, b in zip(one, other, strict=True)))
+
+
+def _taken(table: Array, columns: Integers) -> Array:
+    """The entry of each vertex, (m,), of one table or of its row."""
+    if table.ndim == 1:
+        return table[columns]
+    return np.take_along_axis(table, columns[:, None], axis=1)[:, 0]
+
+
+def _left_limit(graph: TractionGraph, x: Array) -> Array:
+    return graph.traction(x, "left")
+
+
+def _right_limit(graph: TractionGraph, x: Array) -> Array:
+    return graph.traction(x, "right")
+
+
+def _outward(breaks: Array, slopes: Array, jumps: Array, start: float) -> _HalfLine:
+    """The half-line that starts at 0 with the traction `start`."""
     near, far = np.full(breaks.size, start), np.full(breaks.size, start)
     rises = slopes[:-1] * np.diff(breaks)
     # One after the other: without a jump the two limits must be equal to the bit.
     for i, rise in enumerate(rises, start=1):
         near[i] = far[i - 1] + rise
         far[i] = near[i] + jumps[i]
-    return near, far
+    return _HalfLine(breaks, near, far, slopes)

@@ -16,7 +16,6 @@ from petsc4py import PETSc
 
 from ..equilibrium_paths.bonds import is_piecewise_linear
 from ..equilibrium_paths.full_load import FullLoad, at_full_load
-from ..equilibrium_paths.graphs import graph_of
 from ..equilibrium_paths.watch import Watch
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
@@ -52,7 +51,7 @@ def softens(law: Superpotential) -> bool:
     Args:
         law: the law.
     """
-    graph, unsmoothed = graph_of(law), law.law if isinstance(law, SmoothedLaw) else law
+    graph, unsmoothed = law.graph, law.law if isinstance(law, SmoothedLaw) else law
     return 0.0 < unsmoothed.steepest_fall < np.inf if graph is None else bool(np.any(graph.slopes < 0.0))
 
 
@@ -70,7 +69,7 @@ def first_steps(laws: Sequence[Superpotential], thresholds: PathThresholds) -> i
 
 def _are_straight(laws: Sequence[Superpotential]) -> bool:
     """Whether the tractions of all laws are piecewise linear."""
-    return all(graph_of(law) is not None for law in laws)
+    return all(law.graph is not None for law in laws)
 
 
 def follow(system: System, thresholds: PathThresholds, interrupted: Callable[[], bool]) -> PathStart | None:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..effects import Direction
-from ..laws import Mixity, Superpotential
+from ..laws import Mixity, Superpotential, VertexLaws
 from ..typing import Array, Integers
 from .condensed_stiffness import CondensedStiffness
 
@@ -47,6 +47,12 @@ class Bonds:
     def radial(self) -> bool:
         """Whether the law acts on a length."""
         return self.opens or self.unknowns.shape[1] > 1
+
+    @property
+    def laws(self) -> VertexLaws:
+        """The law at its vertices, over their coordinates: of a length that itself, else the unknown."""
+        factors = np.ones(len(self.weights)) if self.radial else self.signs[:, 0]
+        return VertexLaws(law=self.law, factors=factors, weights=self.weights)
 
     def argument(self, x: Array) -> Array:
         """What the law acts on, (m,).

@@ -22,7 +22,6 @@ from typing_extensions import override
 from ...typing import Array
 from ..base import Superpotential
 from ..convex_parts import ConvexPart, DifferentiablePart, folded
-from ..polyline import PolylineLaw
 from ..traction_graph import TractionGraph
 from .base import SmoothedLaw, Smoothing
 from .rounded_kinks import RoundedKinks
@@ -184,15 +183,13 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
     def concave(self) -> ConvexPart:
         return self._smooth_concave
 
+    @override
     @cached_property
     def graph(self) -> TractionGraph | None:
-        """The graph of the smoothed law's traction where that is piecewise linear; else None."""
-        if not (self.plus.parabolic and isinstance(self.law, PolylineLaw)):
+        if not (self.plus.parabolic and self.law.graph is not None):
             return None
-        ends, tails = self.breaks, self.law.graph.slopes[[0, -1]]
-        left, right = self.left(ends), self.right(ends)
-        inner = (left[1:] - right[:-1]) / np.diff(ends)
-        return TractionGraph(ends, left, right, np.concatenate([tails[:1], inner, tails[1:]]))
+        ends, tails = self.breaks, self.law.graph.slopes
+        return TractionGraph.chords(ends, self.left(ends), self.right(ends), (float(tails[0]), float(tails[-1])))
 
     @cached_property
     @override

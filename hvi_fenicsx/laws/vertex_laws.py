@@ -1,0 +1,176 @@
+"""One law at the vertices of Γc, a row each: its traction along a coordinate, its energy, and what a bond remembers.
+
+The coordinate is an unknown, or the length of several (:mod:`.lengths`). A bond with memory unloads along the secant to
+the greatest coordinate so far, and beyond it follows the law: its graph is another table (physics of damage).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..typing import Array, Mask
+from .base import Superpotential
+from .traction_graph import TractionGraph
+
+_ROUNDING = 1e-12
+"""Relative, a difference of displacements that is none."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VertexLaws:
+    """One law at m vertices. Coordinates, tractions along them and energies have shape (m,).
+
+    Attributes:
+        law: j, of the factor times the coordinate.
+        factors: not zero, positive where the coordinate is a length, (m,).
+        weights: lumped areas times what the law is multiplied by, (m,).
+        memory: the least and the greatest coordinate so far, ≤ 0 and ≥ 0, and the tractions there, (m, 4); None: the
+            vertices remember nothing.
+    """
+
+    law: Superpotential
+    factors: Array
+    weights: Array
+    memory: Array | None = None
+
+    @property
+    def with_memory(self) -> VertexLaws:
+        """The same vertices, which remember, and have been nowhere yet; a linear law has nothing to remember."""
+        return self if self.law.is_linear else replace(self, memory=np.zeros((len(self.weights), 4)))
+
+    def at(self, rows: Array | slice) -> VertexLaws:
+        """Some of the vertices.
+
+        Args:
+            rows: their numbers.
+        """
+        memory = None if self.memory is None else self.memory[rows]
+        return replace(self, factors=self.factors[rows], weights=self.weights[rows], memory=memory)
+
+    def traction(self, x: Array, side: str) -> Array:
+        """The limit of the traction along the coordinate.
+
+        Args:
+            x: coordinates.
+            side: "left" or "right".
+        """
+        left, right = self._limits(x)
+        found = left if side == "left" else right
+        if self.memory is None:
+            return found
+        low, high = self.memory[:, 0], self.memory[:, 1]
+        inside = (x > low) & (x <= high) if side == "left" else (x >= low) & (x < high)
+        return np.where(inside, self._secants(x) * x, found)
+
+    def interval(self, x: Array, near: float | Array = 0.0) -> tuple[Array, Array]:
+        """The tractions that the law allows: Clarke's subdifferential along the coordinate.
+
+        Args:
+            x: coordinates.
+            near: displacements up to this from a kink are on it, one or (m,).
+        """
+        size = np.abs(self.factors)
+        low, high = self.law.interval(self.factors * x, near * size)
+        ends = self.factors * low, self.factors * high
+        found = np.minimum(*ends), np.maximum(*ends)
+        if self.memory is None:
+            return found
+        x = self._on_ends(x, near)
+        low, high = self._memory[:, 0], self._memory[:, 1]
+        been = (low <= x) & (x <= high) & (low < high)
+        ends = self.traction(x, "left"), self.traction(x, "right")
+        return np.where(been, np.minimum(*ends), found[0]), np.where(been, np.maximum(*ends), found[1])
+
+    def slope(self, x: Array) -> Array:
+        """The slope of the traction off the kinks, the larger one at a break."""
+        found = self.factors**2 * self.law.derivatives(self.factors * x)[1]
+        return found if self.memory is None else np.where(self._inside(x), self._secants(x), found)
+
+    def recoverable(self, x: Array, traction: Array) -> Array:
+        """What the vertices give back on the way to zero: w j, or the triangle under the secant with memory.
+
+        Args:
+            x: coordinates.
+            traction: along them.
+        """
+        plain = 0.5 * x * traction if self.memory is not None else self.law.value(self.factors * x)
+        return np.asarray(self.weights * plain)
+
+    def dissipated(self, x: Array, traction: Array) -> Array:
+        """The energy that is lost for good once the vertices have been at x, or where they were before.
+
+        Args:
+            x: coordinates.
+            traction: along them.
+        """
+        if self.memory is None:
+            return np.zeros_like(x)
+        been = self._reached(x, traction)
+        ends, tractions = been[:, :2], been[:, 2:]
+        taken = self.law.value((self.factors[:, None] * ends).ravel()) - self.law.value(np.zeros(1))
+        lost = taken.reshape(ends.shape) - 0.5 * ends * tractions
+        return np.asarray(self.weights * (lost[:, 1] if self.law.even else lost.sum(axis=1)))
+
+    def remembering(self, x: Array, traction: Array) -> VertexLaws:
+        """The laws once the vertices have been at x.
+
+        Args:
+            x: coordinates.
+            traction: along them.
+        """
+        return self if self.memory is None else replace(self, memory=self._reached(x, traction))
+
+    def graphs(self, ends: Array | None = None) -> TractionGraph:
+        """The table of tractions over the coordinates, a row a vertex, with memory; of a curved law its chords.
+
+        Args:
+            ends: further coordinates at which the chords of a curved law meet it, (k,).
+        """
+        graph = self.law.graph or self._chords(np.empty(0) if ends is None else ends)
+        rows = graph.at_vertices(self.factors)
+        return rows if self.memory is None else rows.remembering(self.memory)
+
+    def _chords(self, ends: Array) -> TractionGraph:
+        places = np.outer(self.factors, np.append(ends, self._memory[:, :2])).ravel()
+        places = np.union1d(self.law.breaks, places)
+        return TractionGraph.chords(places, self.law.left(places), self.law.right(places))
+
+    def _limits(self, x: Array) -> tuple[Array, Array]:
+        at, forward = self.factors * x, self.factors > 0.0
+        left, right = self.law.left(at), self.law.right(at)
+        return self.factors * np.where(forward, left, right), self.factors * np.where(forward, right, left)
+
+    def _secants(self, x: Array) -> Array:
+        """Traction over coordinate where a bond turned, on the side of x; 0 where it has not been."""
+        low, high, low_traction, high_traction = self._memory.T
+        end, there = np.where(x < 0.0, low, high), np.where(x < 0.0, low_traction, high_traction)
+        return np.divide(there, end, out=np.zeros_like(x), where=end != 0.0)
+
+    def _inside(self, x: Array) -> Mask:
+        """Whether bonds are where they have been, and at no end of that."""
+        low, high = self._memory[:, 0], self._memory[:, 1]
+        return np.asarray((x > low) & (x < high))
+
+    def _on_ends(self, x: Array, near: float | Array) -> Array:
+        """Coordinates; where they are but for rounding as far as the bonds have been, that."""
+        for end in (self._memory[:, 0], self._memory[:, 1]):
+            x = np.where((end != 0.0) & (np.abs(x - end) <= near), end, x)
+        return x
+
+    def _reached(self, x: Array, traction: Array) -> Array:
+        """The memory once the vertices have been at x: both sides of an even law remember the same."""
+        side = np.column_stack([x < 0.0, x > 0.0])
+        if self.law.even:
+            side, sign = np.broadcast_to(x[:, None] != 0.0, side.shape), np.sign(x)[:, None] * [-1.0, 1.0]
+        else:
+            sign = np.ones_like(side, dtype=float)
+        at, there, ends = sign * x[:, None], sign * traction[:, None], self._memory[:, :2]
+        beyond = side & (np.abs(at) >= np.abs(ends) * (1.0 - _ROUNDING))
+        same = np.abs(at - ends) <= _ROUNDING * np.abs(at)
+        return np.column_stack([np.where(beyond & ~same, at, ends), np.where(beyond, there, self._memory[:, 2:])])
+
+    @property
+    def _memory(self) -> Array:
+        return np.zeros((len(self.weights), 4)) if self.memory is None else self.memory
