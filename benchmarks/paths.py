@@ -26,8 +26,8 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
 from hvi_fenicsx.equilibrium_paths.state import Follow, PathOptions
 from hvi_fenicsx.modelling.following import ModelPath
+from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.scene.overrides import override
-from hvi_fenicsx.system.condensation import Condensation
 
 LIST = Path(__file__).with_suffix(".toml")
 PAGE = common.ROOT / "docs" / "benchmarks" / "paths.md"

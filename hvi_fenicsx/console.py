@@ -16,8 +16,8 @@ from .rigid import AnyBody, LoadFactors, Mode
 from .runtime.terminal import percent
 from .scene import PathTable
 from .solvers import nested_iteration, registry
-from .solvers.result import Counts
-from .system import loading
+from .solvers.method import Counts
+from .reduced import loading
 from .workflow import Preparation, Solution
 
 NO_HISTORY = (

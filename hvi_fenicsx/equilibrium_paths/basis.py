@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..system.condensed_stiffness import CellInverse, CondensedStiffness
+from ..reduced.condensed_stiffness import CellInverse, CondensedStiffness
 from ..typing import Array
 from .cells import Cells
 from .step import FACTOR

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..laws import TractionGraph
-from ..system.condensed_problem import Bonds, CondensedProblem
+from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
 from .graphs import Passed, graph_of, on_corner, remembering, turned
 from .segments import Component, Segment, chain

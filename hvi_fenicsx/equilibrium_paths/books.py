@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..system.condensed_problem import CondensedProblem
+from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .bonds import BondTable
 

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..system.condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
-from ..system.spectrum import ZERO
+from ..reduced.condensed_stiffness import ZERO, CellColumns, CellInverse, CondensedStiffness
 from ..typing import Array, Integers, Mask
 from .neutral import Unresisted, are_same, pins, unresisted
 from .segments import Kind, Segment

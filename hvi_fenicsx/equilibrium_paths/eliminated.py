@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..system.condensed_problem import Bonds, CondensedProblem, PrescribedBonds
-from ..system.condensed_stiffness import DenseStiffness
+from ..reduced.condensed_problem import Bonds, CondensedProblem, PrescribedBonds
+from ..reduced.condensed_stiffness import DenseStiffness
 from ..typing import Array, Integers, Mask
 
 

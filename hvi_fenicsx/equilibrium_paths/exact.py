@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from typing_extensions import override
 
-from ..system.condensed_problem import CondensedProblem
-from ..system.condensed_stiffness import CellInverse
+from ..reduced.condensed_problem import CondensedProblem
+from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
 from .beginning import Beginning, at_rest
 from .bonds import BondTable

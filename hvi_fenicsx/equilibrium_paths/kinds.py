@@ -8,7 +8,7 @@ from typing import Protocol
 
 from typing_extensions import override
 
-from ..system.condensed_problem import CondensedProblem
+from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .arc_length.curved_graphs import CurvedGraphs
 from .arc_length.distances import CurvedDistances

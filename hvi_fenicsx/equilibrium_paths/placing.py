@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..system.condensed_stiffness import CondensedStiffness
+from ..reduced.condensed_stiffness import CondensedStiffness
 from ..typing import Array, Integers
 from .cells import Cells
 from .segments import Segment

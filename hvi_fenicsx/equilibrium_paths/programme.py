@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..system.condensed_problem import CondensedProblem
+from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .rounds import Round
 from .settling import Nowhere

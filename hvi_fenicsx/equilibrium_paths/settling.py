@@ -6,7 +6,7 @@ from enum import Enum
 
 import numpy as np
 
-from ..system.condensed_problem import CondensedProblem
+from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .bonds import BondTable
 from .cells import Cells

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..system.condensed_stiffness import CellInverse
+from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .bonds import BondTable
 from .cells import Cells

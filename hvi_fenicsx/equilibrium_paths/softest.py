@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-from ..system.condensed_stiffness import CellInverse
+from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
 from .cells import Cells
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from ..system.condensed_problem import CondensedProblem
+from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
 from .thresholds import DEFAULT, Thresholds
 

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ..system.condensed_problem import CondensedProblem
+from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .bonds import BondTable
 from .placing import place

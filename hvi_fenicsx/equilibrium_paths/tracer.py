@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..system.condensed_stiffness import CellInverse, CondensedStiffness
+from ..reduced.condensed_stiffness import CellInverse, CondensedStiffness
 from ..typing import Array, Integers
 from .basis import Basis
 from .cells import Cells

@@ -29,9 +29,9 @@ from ..problem import references
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..problem.vectors import product
+from ..reduced.condensation import Condensation
 from ..runtime.mpi import total
 from ..solvers import frozen_mixity
-from ..system.condensation import Condensation
 from ..system.system import System
 from ..typing import Array
 from . import refinement

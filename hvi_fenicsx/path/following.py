@@ -23,7 +23,7 @@ from ..runtime.journal import Record
 from ..scene import PathTable
 from ..solvers import obstacle_force
 from ..system import existence, loading
-from ..system.condensation import Condensation
+from ..reduced.condensation import Condensation
 from ..workflow import Preparation
 from . import records
 from .certifying import Certifier, Verdict

@@ -20,8 +20,8 @@ from ..runtime.log import logger
 from ..scene import PathTable
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.context import never
-from ..solvers.result import Borne
-from ..system import loading
+from ..solvers.method import Borne
+from ..reduced import loading
 from ..workflow import LastBorne, Preparation, Solution
 
 _LOG = logger("path")

@@ -15,8 +15,8 @@ from ..effects import Drive, Place
 from ..problem import part_areas
 from ..problem.problem import Problem
 from ..problem.vectors import new_vector, turn
-from ..system import loading
-from ..system.condensation import Condensation
+from ..reduced import loading
+from ..reduced.condensation import Condensation
 from ..system.system import System
 from ..typing import Array, Integers
 from . import held_laws

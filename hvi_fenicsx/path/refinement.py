@@ -17,7 +17,7 @@ from ..certify.contact_state import Forces
 from ..equilibrium_paths.kinds import Graphs
 from ..problem.problem import Problem
 from ..problem.vectors import turn
-from ..system.condensation import Condensation
+from ..reduced.condensation import Condensation
 from ..system.system import System
 from ..typing import Array
 

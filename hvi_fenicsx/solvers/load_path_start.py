@@ -20,9 +20,9 @@ from ..equilibrium_paths.watch import Watch
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
 from ..laws.smoothing.base import SmoothedLaw
+from ..reduced.condensation import Condensation
+from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking
-from ..system.condensation import Condensation
-from ..system.condensed_problem import CondensedProblem
 from ..system.system import System
 from .result import Borne
 from .thresholds import PathThresholds

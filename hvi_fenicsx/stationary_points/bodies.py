@@ -11,8 +11,8 @@ from ..certify.uniqueness import is_convex
 from ..errors import SolverError
 from ..runtime.mpi import agree
 from ..solvers import frozen_mixity, obstacle_force
-from ..solvers.result import SolveResult
-from ..system.condensation import Condensation
+from ..solvers.method import SolveResult
+from ..reduced.condensation import Condensation
 from ..typing import Array
 from ..workflow import Preparation, Solution, certified, finish
 from .condensed_form import scalar_problem

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from ..system.condensed_problem import Bonds, CondensedProblem
+from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
 from .arcs import FREE, Chain, chain, total
 from .law_graphs import LawGraph, exact_graph, law_graph, near_graph

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..system.condensed_problem import Bonds, CondensedProblem
+from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array, Mask
 from . import stationarity
 from .point_list import StationaryPoint

@@ -18,7 +18,7 @@ from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import BenzeggaghKenane, Exponential, Mixity, PowerLaw, Superpotential
-from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
+from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]
 SOFTENING = [[0, 0], [1, 1], [5, 0]]

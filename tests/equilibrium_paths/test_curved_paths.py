@@ -35,8 +35,8 @@ from hvi_fenicsx.equilibrium_paths.thresholds import CurveThresholds, JumpThresh
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
 from hvi_fenicsx.laws.smoothing import create
-from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
-from hvi_fenicsx.system.condensed_stiffness import DenseStiffness
+from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
+from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
 
 Array = npt.NDArray[np.float64]
 DROP = [(0, 0), (1, 1), (1, 0.4)]

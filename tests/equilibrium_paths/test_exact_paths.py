@@ -22,8 +22,8 @@ from hvi_fenicsx.equilibrium_paths.segments import Segment
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.equilibrium_paths.thresholds import ExactThresholds, Thresholds
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.system.condensation import Condensation
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
+from hvi_fenicsx.reduced.condensation import Condensation
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 
 Array = npt.NDArray[np.float64]
 SOFTENING = [(0, 0), (1, 1), (1.5, 0)]

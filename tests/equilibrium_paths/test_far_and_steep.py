@@ -10,7 +10,7 @@ from hvi_fenicsx.equilibrium_paths.bonds import BondTable
 from hvi_fenicsx.equilibrium_paths.descent import Descent
 from hvi_fenicsx.equilibrium_paths.exact import ExactFollower
 from hvi_fenicsx.equilibrium_paths.state import PathOptions
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 
 
 @pytest.mark.parametrize("aim", [0.405, 0.6, 0.805, 0.811, 0.815, 0.9])

@@ -18,7 +18,7 @@ from hvi_fenicsx.equilibrium_paths.arc_length.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_paths.state import End, Event, Follow
 from hvi_fenicsx.laws import Exponential
 from hvi_fenicsx.laws.smoothing import create
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 
 Array = npt.NDArray[np.float64]
 SHARP = create("chks", Exponential(1.0, 0.3, 0.5), epsilon=1e-6)

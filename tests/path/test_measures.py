@@ -12,7 +12,7 @@ from scenes import STEEL, Table, quadratic_linear
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.modelling import solve
 from hvi_fenicsx.path.measures import Measures
-from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.reduced.condensation import Condensation
 
 FACTOR = 0.4
 SCALED = ("grip.displacement", "lid.traction")

@@ -13,7 +13,7 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx import prepare
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.problem.vectors import turn
-from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.reduced.condensation import Condensation
 
 SOFT = "boundary.base.adhesion.points=[[0,0],[5e-6,1e6],[1e-4,0]]"
 

@@ -12,8 +12,8 @@ from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.equilibrium_paths.eliminated import without_fixed
 from hvi_fenicsx.equilibrium_paths.kinds import kind_of
 from hvi_fenicsx.equilibrium_paths.state import PathOptions
+from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.solvers import load_path_start
-from hvi_fenicsx.system.condensation import Condensation
 
 MOST_STEPS = 65
 """Newton steps where a load path ends: those before it, and three further starts of at most 15."""

@@ -22,7 +22,7 @@ from hvi_fenicsx.stationary_points.lengths import Lengths
 from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
-from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.workflow import prepare
 
 Array = npt.NDArray[np.float64]

@@ -9,13 +9,13 @@ from array_enumeration import stationary
 from scenes import block
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.boxes import fresh_box
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.elastic_radius import ElasticRadius
 from hvi_fenicsx.stationary_points.rigid_balance import RigidBalance
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
-from hvi_fenicsx.system.condensation import Condensation
 from hvi_fenicsx.typing import Array
 
 BOND = condensed.graph([[0.0, 0.0], [0.1, 1.0], [0.1, 0.3]])

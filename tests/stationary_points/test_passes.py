@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from flooding import assert_levels, flooded_levels, joined_levels
 
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.landscapes import PolylineLandscape
 from hvi_fenicsx.stationary_points.passes import Pass, passes
 from hvi_fenicsx.stationary_points.point_list import StationaryPoint
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
 
 Found = tuple[list[StationaryPoint], tuple[Pass, ...]]
 

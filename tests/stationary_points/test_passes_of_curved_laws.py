@@ -9,6 +9,7 @@ from curved import LAWS, enumerated, random_pair, two_bonds
 from flooding import assert_levels, flooded_levels, joined_levels
 
 from hvi_fenicsx.laws.smoothing import registered
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
 from hvi_fenicsx.stationary_points.found import Wanted
@@ -18,7 +19,6 @@ from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.search import find
 from hvi_fenicsx.stationary_points.stationarity import Kind
 from hvi_fenicsx.stationary_points.thresholds import DEFAULT, DescentThresholds, Thresholds
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
 
 
 def landscape(problem: CondensedProblem, thresholds: Thresholds = DEFAULT) -> CurvedLandscape:

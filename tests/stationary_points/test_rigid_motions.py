@@ -9,12 +9,12 @@ from curved import enumerated
 from scenes import Table, block, model
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.reduced.condensation import Condensation
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.rigid_motions import EPSILON, with_motions
 from hvi_fenicsx.stationary_points.thresholds import DEFAULT
-from hvi_fenicsx.system.condensation import Condensation
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
 
 PEAK = 1e6
 TRESCA = {"law": "tresca", "yield_traction": PEAK, "reference_slip": 1e-6}

@@ -19,6 +19,8 @@ from scenes import DELTA, block, model
 from hvi_fenicsx import Scene, prepare, solve
 from hvi_fenicsx.errors import SolverError
 from hvi_fenicsx.laws.traction_graph import TractionGraph
+from hvi_fenicsx.reduced.condensation import Condensation
+from hvi_fenicsx.reduced.condensed_problem import Bonds
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, arcs_of, chain, energy, total
 from hvi_fenicsx.stationary_points.boxes import fresh_box
@@ -32,8 +34,6 @@ from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.rigid_balance import RigidBalance
 from hvi_fenicsx.stationary_points.scalar_problem import ArcTable, ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
-from hvi_fenicsx.system.condensation import Condensation
-from hvi_fenicsx.system.condensed_problem import Bonds
 
 Array = npt.NDArray[np.float64]
 Graph = Sequence[tuple[float, float]]

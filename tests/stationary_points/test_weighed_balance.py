@@ -14,6 +14,7 @@ from scenes import DELTA, model
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.laws.traction_graph import TractionGraph
+from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, chain
 from hvi_fenicsx.stationary_points.balance_programme import BalanceProgramme
@@ -23,7 +24,6 @@ from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.weighed_balance import Graphs, Split, allowed, weighed
-from hvi_fenicsx.system.condensation import Condensation
 from hvi_fenicsx.typing import Array
 
 SAWTOOTH = TractionGraph.from_points([(0.0, 0.0), (0.4, 2.0), (0.4, 0.5), (1.5, 1.8), (1.5, 0.3)])

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.laws import Graph, Superpotential
-from hvi_fenicsx.system.condensed_problem import Bonds, CondensedProblem
-from hvi_fenicsx.system.condensed_stiffness import DenseStiffness
+from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
+from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
 
 Array = npt.NDArray[np.float64]
 

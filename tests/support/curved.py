@@ -7,10 +7,10 @@ import numpy as np
 
 from hvi_fenicsx import laws
 from hvi_fenicsx.laws.smoothing import registered
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
 
 MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
 LAWS = {

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.stationary_points.passes import Pass
 from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.stationarity import Kind
-from hvi_fenicsx.system.condensed_problem import CondensedProblem
 
 Array = npt.NDArray[np.float64]
 Levels = dict[tuple[int, int], float]

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.reduced.condensation import Condensation
 
 
 def main() -> None:

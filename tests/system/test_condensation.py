@@ -16,7 +16,7 @@ from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.equilibrium_paths.bonds import is_piecewise_linear
 from hvi_fenicsx.errors import InputError, SolverError
-from hvi_fenicsx.system.condensation import Condensation
+from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.system.factorisation import form_of
 from hvi_fenicsx.system.interior import Interior
 from hvi_fenicsx.system.petsc_options import CHOLESKY

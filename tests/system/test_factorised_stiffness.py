@@ -12,9 +12,9 @@ from unformed import path_run
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.system.condensation import Condensation
-from hvi_fenicsx.system.condensed_stiffness import CellColumns, CondensedStiffness, DenseStiffness
-from hvi_fenicsx.system.factorised_stiffness import FactorisedStiffness
+from hvi_fenicsx.reduced.condensation import Condensation
+from hvi_fenicsx.reduced.condensed_stiffness import CellColumns, CondensedStiffness, DenseStiffness
+from hvi_fenicsx.reduced.factorised_stiffness import FactorisedStiffness
 
 SPRING = {"law": "graph", "points": [[0, 0], [9e-6, 3e6], [9e-6, 1.5e6]]}
 

@@ -10,7 +10,7 @@ import pytest
 from scenes import STEEL, Table
 
 from hvi_fenicsx import InputError, Scene, prepare
-from hvi_fenicsx.system import loading
+from hvi_fenicsx.reduced import loading
 
 FACTOR = -0.4
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hvi_fenicsx.system.spectrum import negative_directions
+from hvi_fenicsx.reduced.condensed_stiffness import negative_directions
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 7, 60])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from .law_rows import LawRows, law_rows
 from .sites import Sites, Values

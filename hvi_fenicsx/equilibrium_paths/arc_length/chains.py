@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import InputError
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ..segments import Kind, Segment, between
 from .radials import Radials
 from .vertex_laws import VertexLaw

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Array
 from .bond_energies import BondEnergies
 from .equations import Place

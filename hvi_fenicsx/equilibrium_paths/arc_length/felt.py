@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...system.condensed_problem import CondensedProblem
-from ...system.condensed_stiffness import DenseStiffness
+from ...reduced.condensed_problem import CondensedProblem
+from ...reduced.condensed_stiffness import DenseStiffness
 from ...typing import Array
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from typing_extensions import override
 
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Array
 from ..programme import Follower, why_not_loaded
 from ..rounds import Round, Rounds

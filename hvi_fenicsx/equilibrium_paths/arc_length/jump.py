@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Array, Integers
 from .curve import Curve
 from .energies import displacement_rate

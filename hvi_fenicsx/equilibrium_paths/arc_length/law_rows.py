@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...laws import Superpotential, TractionGraph
-from ...system.condensed_problem import Bonds, CondensedProblem
+from ...reduced.condensed_problem import Bonds, CondensedProblem
 from ...typing import Array
 from ..graphs import graph_of, was_passed
 

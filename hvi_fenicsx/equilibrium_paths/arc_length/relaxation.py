@@ -13,7 +13,7 @@ from enum import Enum
 
 import numpy as np
 
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Array
 from .curve import Curve
 from .equations import Refused

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...system.condensed_problem import CondensedProblem
-from ...system.spectrum import is_singular, rounding_of
+from ...reduced.condensed_problem import CondensedProblem
+from ...reduced.condensed_stiffness import is_singular, rounding_of
 from ...typing import Array
 from ..programme import constant_alone
 from ..segments import Kind, Segment

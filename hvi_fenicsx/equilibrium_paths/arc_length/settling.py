@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Array
 from ..settling import Nowhere, no_load
 from ..watch import Watch

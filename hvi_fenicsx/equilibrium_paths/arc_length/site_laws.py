@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.sparse import csr_array
 
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Integers
 from ..thresholds import DEFAULT, Thresholds
 from .chains import refuse_shared

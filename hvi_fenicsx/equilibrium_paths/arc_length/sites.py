@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from ...system.spectrum import negative_directions, rounding_of
+from ...reduced.condensed_stiffness import negative_directions, rounding_of
 from ...typing import Array, Mask
 from ..neutral import Unresisted, unresisted
 from .blocks import Blocks

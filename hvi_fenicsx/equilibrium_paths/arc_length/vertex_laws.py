@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...laws import Mixity, Superpotential, TractionGraph
-from ...system.condensed_problem import CondensedProblem
+from ...reduced.condensed_problem import CondensedProblem
 from ...typing import Array, Mask
 from ..graphs import Passed, graph_of, on_corner, remembering, turned, was_passed
 

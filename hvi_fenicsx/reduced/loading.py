@@ -12,8 +12,8 @@ from ..effects.base import load_name
 from ..errors import InputError
 from ..problem.vectors import new_vector, turn
 from ..runtime.mpi import agree
+from ..system.system import System
 from ..typing import Array
-from .system import System
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,25 +10,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
 from ..errors import SolverError
+from ..runtime.mpi import total
+from ..system import factor_counts
+from ..system.factorisation import form_of
+from ..system.interior import PREFIX, Interior
+from ..system.system import System
 from ..typing import Array, Integers
-from . import carriers, condensed_laws, factor_counts, loading
-from .body_forces import BodyForces
-from .carriers import Carriers
+from . import condensed_laws, loading
+from .condensed_laws import Carriers
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
-from .elimination import Elimination
-from .factorisation import form_of
+from .elimination import Elimination, RigidMotions
 from .factorised_stiffness import FactorisedStiffness
-from .interior import PREFIX, Interior
-from .rigid_defect import RigidMotions
-from .system import System
 
 
 class Condensation:
@@ -64,7 +64,7 @@ class Condensation:
         self._form = form_of(system, PREFIX)
         self._interior = interior = Interior(self._form, kept)
         laws = condensed_laws.make(system, interior, self._loading.prescribed)
-        found = carriers.find(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
+        found = condensed_laws.find(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
         if largest_dense is not None and self._is_large(largest_dense, len(found.carrying)):
             chosen = self._reduce(found.carrying)
             found, laws = found.of(chosen), laws.renumbered(chosen, interior.size)
@@ -261,3 +261,85 @@ def _shifted(by: Array, problem: CondensedProblem) -> CondensedProblem:
 def _quadratic(products: Array) -> Array:
     """c0, c1, c2 of the bilinear form at (1, λ)."""
     return np.array([products[0, 0], products[0, 1] + products[1, 0], products[1, 1]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class CondensedForces:
+    """Forces on the whole body, condensed.
+
+    Attributes:
+        body: on this rank's unknowns off the supports, (local unknowns,).
+        kept: on all unknowns of Γc that the body keeps, (n of the interior,).
+        condensed: on the condensed unknowns, (n,).
+    """
+
+    body: Array
+    kept: Array
+    condensed: Array
+
+
+class BodyForces:
+    """Forces on a condensed body.
+
+    Args:
+        system: the system.
+        interior: the body with unknowns of Γc held.
+        elimination: of those of them that carry nothing.
+    """
+
+    def __init__(self, system: System, interior: Interior, elimination: Elimination) -> None:
+        self._system, self._interior, self._elimination = system, interior, elimination
+
+    def spread(self, forces: Array) -> PETSc.Vec:
+        """Forces on the condensed unknowns as forces on the whole body, in the components of the unknowns.
+
+        Args:
+            forces: (n,).
+        """
+        interior, whole = self._interior, np.zeros(self._interior.size)
+        whole[self._elimination.stay] = forces
+        found = self._system.load.duplicate()
+        found.array[interior.kept] = interior.own_part(whole)
+        return found
+
+    def condensed(self, forces: Array) -> CondensedForces:
+        """Forces on the whole body as forces on the condensed unknowns. Collective.
+
+        Args:
+            forces: on this rank's unknowns, in their components, (local unknowns,).
+        """
+        body = self._free(forces)
+        kept = self._interior.loads(body[:, None])[:, 0]
+        return CondensedForces(body=body, kept=kept, condensed=self._elimination.reduced(kept))
+
+    def change(self, x: Array, forces: CondensedForces) -> Array:
+        """How the unknowns of the whole body change, in balance with forces, where condensed ones do. Collective.
+
+        Args:
+            x: change of the condensed unknowns, (n,).
+            forces: on the body.
+
+        Returns:
+            The change of this rank's unknowns, (local unknowns,).
+        """
+        return self._interior.expand(self._elimination.completed(x, forces.kept), forces.body)
+
+    def _free(self, forces: Array) -> Array:
+        """Forces off the supports, which carry the others, (local unknowns,)."""
+        found = np.array(forces)
+        found[self._system.problem.fixed_here] = 0.0
+        return found
+
+    def unbalanced(self, reaction: PETSc.Vec, carried: PETSc.Vec) -> float:
+        """What is left of forces on the body once contact and laws carry theirs. Collective.
+
+        Args:
+            reaction: internal forces minus loads of the whole body, in the components of the unknowns.
+            carried: by contact and laws, likewise.
+
+        Returns:
+            The Euclidean norm off the supports.
+        """
+        left = reaction.array - carried.array
+        left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
+        return float(np.sqrt(total(self._system.comm, float(left @ left))))

@@ -20,12 +20,12 @@ from petsc4py import PETSc
 from typing_extensions import override
 
 from ..runtime.mpi import agree
+from ..system.factorisation import Factorisation
+from ..system.interior import Interior
+from ..system.petsc_options import CHOLESKY
+from ..system.system import System
 from ..typing import Array, Mask
 from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
-from .factorisation import Factorisation
-from .interior import Interior
-from .petsc_options import CHOLESKY
-from .system import System
 
 _T = TypeVar("_T")
 _KNOWN = 8

@@ -18,11 +18,10 @@ from typing import Any, Self
 
 import numpy as np
 from scipy.linalg.blas import dger
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg.lapack import dpotrf, dpotri, dsytrf
 from typing_extensions import override
 
 from ..typing import Array, Integers, Mask
-from . import spectrum
 
 _ROUNDS = 4
 """Steps of an inverse iteration: each leaves of what is stiff the shift over its stiffness."""
@@ -140,10 +139,10 @@ class CondensedStiffness(ABC):
         """The displacements that S does not resist, as orthonormal rows, (k, n): by inverse iteration. Collective."""
         diagonal = self.diagonal
         n, none = len(diagonal), np.zeros(len(diagonal))
-        count = self.negative_directions(np.ones(n, dtype=bool), none, -spectrum.ZERO)
+        count = self.negative_directions(np.ones(n, dtype=bool), none, -ZERO)
         found = np.eye(n, count)
         if 0 < count < n:
-            shifted = self.raised(spectrum.ZERO * float(np.max(diagonal)))
+            shifted = self.raised(ZERO * float(np.max(diagonal)))
             inverse = shifted.inverse(CellColumns(slope=none, rise=none, driver=None, factor=none))
             found = np.random.default_rng(0).standard_normal((n, count))
             for _ in range(_ROUNDS):
@@ -161,7 +160,7 @@ class CondensedStiffness(ABC):
             moving: the unknowns that move, (n,).
             slope: of the laws' forces, (n,).
         """
-        return self.negative_directions(moving, slope, -spectrum.ZERO) > 0
+        return self.negative_directions(moving, slope, -ZERO) > 0
 
 
 class DenseStiffness(CondensedStiffness):
@@ -172,7 +171,7 @@ class DenseStiffness(CondensedStiffness):
     """
 
     def __init__(self, array: Array) -> None:
-        self._array, self._rounding = array, spectrum.rounding_of(array)
+        self._array, self._rounding = array, rounding_of(array)
 
     @property
     @override
@@ -235,7 +234,7 @@ class DenseStiffness(CondensedStiffness):
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
         free = np.flatnonzero(moving)
-        return spectrum.negative_directions(self._moving(free, slope), negligible, self._rounding)
+        return negative_directions(self._moving(free, slope), negligible, self._rounding)
 
     @override
     def free(self) -> None:
@@ -282,3 +281,45 @@ class DenseInverse(CellInverse):
     @override
     def is_long(self) -> bool:
         return False
+
+
+ZERO = 1e-11
+"""An eigenvalue so small beside the greatest is zero."""
+
+
+def rounding_of(stiffness: Array) -> float:
+    """What is nothing in a stiffness, and in what is left of it where unknowns are held.
+
+    Args:
+        stiffness: symmetric, (n, n).
+    """
+    return len(stiffness) * float(np.finfo(float).eps * np.linalg.norm(stiffness, 1)) if len(stiffness) else 0.0
+
+
+def is_singular(stiffness: Array, rounding: float) -> bool:
+    """Whether some displacement meets no stiffness, or a negative one.
+
+    Args:
+        stiffness: symmetric, (n, n); of no unknowns, it is regular.
+        rounding: an eigenvalue that is zero.
+    """
+    values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
+    return bool(values[0] <= max(ZERO * values[-1], rounding))
+
+
+def negative_directions(stiffness: Array, negligible: float, rounding: float = 0.0) -> int:
+    """The number of negative eigenvalues, by the signs of the pivots of LDLᵀ (Sylvester's law of inertia).
+
+    Args:
+        stiffness: symmetric, (n, n).
+        negligible: an eigenvalue that is zero, relative to the largest sum of a row; negative: zero ones count.
+        rounding: an eigenvalue that is zero.
+    """
+    if not len(stiffness):
+        return 0
+    shifted = np.array(stiffness, order="F")
+    size = max(abs(negligible) * float(np.linalg.norm(stiffness, 1)), rounding)
+    shifted[np.diag_indices(len(shifted))] += np.copysign(size, negligible)
+    factors, pivots, _ = dsytrf(shifted, lower=1, overwrite_a=1)
+    pairs = pivots < 0  # a block of two pivots has one negative eigenvalue and one positive
+    return int(np.count_nonzero(np.diag(factors)[~pairs] < 0.0) + np.count_nonzero(pairs) // 2)
