@@ -11,7 +11,7 @@ from .problem.interface_sides import Sides
 from .problem.part_laws import Modification, unchanged
 from .scene import Scene, SolverTable
 from .solvers import registry
-from .solvers.options import SolverOptions
+from .solvers.context import SolverOptions
 from .solvers.thresholds import DEFAULT, Thresholds
 
 

@@ -16,8 +16,8 @@ from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..system import net_forces as rigid_balance
+from ..system.free_motions import SupportedBody
 from ..system.net_forces import ActingForces, Holder
-from ..system.supported_body import SupportedBody
 from ..typing import Array, Mask
 from .contact_state import ContactState, Forces
 from .thresholds import DEFAULT, Thresholds

@@ -24,7 +24,7 @@ from ..results.whole import picture_process, write_whole
 from ..runtime import log, terminal
 from ..runtime.argument_checks import require_kind, require_path
 from ..runtime.terminal import percent
-from ..solvers.result import SolveResult
+from ..solvers.method import SolveResult
 from ..typing import Array
 from ..workflow import Solution
 from . import plotting

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from ..errors import SolverError
 from ..runtime.mpi import total
-from ..system import factor_counts
+from ..system import factorisation
 from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
 from ..system.system import System
@@ -76,7 +76,7 @@ class Condensation:
 
     def _is_large(self, most: int, carrying: int) -> bool:
         """Whether Γc has more unknowns, or products with S of those that carry take longer than solves with factors."""
-        entries = 2.0 * factor_counts.entries(self._interior.factors.pc) + self._system.thresholds.solve_overhead
+        entries = 2.0 * factorisation.entries(self._interior.factors.pc) + self._system.thresholds.solve_overhead
         return self._interior.size > most or carrying**2 > entries
 
     def _reduce(self, carrying: Integers) -> Integers:

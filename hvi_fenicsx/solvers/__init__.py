@@ -1,7 +1,6 @@
 """The solution methods, one module each, and nested iteration."""
 
 from .context import SolveContext
-from .method import Method
-from .result import SolveResult
+from .method import Method, SolveResult
 
 __all__ = ["Method", "SolveContext", "SolveResult"]

@@ -17,18 +17,16 @@ from petsc4py import PETSc
 
 from ..compat import NOT_A_NUMBER
 from ..runtime.timing import Timer
+from ..system.equations import LawModel
 from ..system.held_solver import Goal, HeldPreconditioner
-from ..system.law_model import LawModel
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
-from ..system.petsc_errors import raise_python_error
-from ..system.petsc_options import default_options, prefix
+from ..system.petsc_options import default_options, prefix, raise_python_error
 from ..system.system import System
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
 from .snes_views import InactiveSolve, unextracted
-from .stalls import StallTest
-from .thresholds import DEFAULT, FULL_STEPS, Thresholds
+from .thresholds import DEFAULT, FULL_STEPS, ActiveSetThresholds, Thresholds
 
 StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
@@ -301,3 +299,39 @@ class _SnesRun:
             return NOT_A_NUMBER
         reasons = PETSc.SNES.ConvergedReason
         return reasons.DIVERGED_DTOL if self._stalls.gives_up(self.last) else reasons.CONVERGED_ITERATING
+
+
+class StallTest:
+    """Is told the residual of each step.
+
+    Args:
+        thresholds: when to give up.
+        full_steps: whether no line search shortens the steps: these may go round in a circle for ever. Those of a
+            search are of use where the energy falls, even if the residual does not.
+    """
+
+    def __init__(self, thresholds: ActiveSetThresholds, *, full_steps: bool) -> None:
+        self._thresholds, self._full_steps = thresholds, full_steps
+        self._last = self._least = np.inf
+        self._still = self._slow = self._useless = 0
+
+    def gives_up(self, residual: float) -> bool:
+        """Whether to give up after a step.
+
+        Args:
+            residual: relative, after the step.
+        """
+        self._note(residual)
+        thresholds, most = self._thresholds, self._thresholds.stalled_steps
+        at_rounding = residual < thresholds.rounding_below
+        circles = self._full_steps and self._useless >= thresholds.useless_steps
+        return self._still >= most or (at_rounding and self._slow >= 2 * most) or circles
+
+    def _note(self, residual: float) -> None:
+        thresholds = self._thresholds
+        self._still = self._still + 1 if abs(residual - self._last) < thresholds.still * self._last else 0
+        self._slow = self._slow + 1 if residual > 0.5 * self._last else 0
+        falls = residual < thresholds.useful_fall * self._least
+        self._useless = 0 if falls else self._useless + 1
+        self._least = residual if falls else self._least
+        self._last = residual

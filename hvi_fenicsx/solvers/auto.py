@@ -20,14 +20,12 @@ from petsc4py import PETSc
 from ..errors import SolverError
 from ..laws import Superpotential
 from . import load_path_start, newton_continuation
-from .branch import BranchIteration
-from .closed_start import resting_start
+from .branch import BranchIteration, Continuation
 from .context import SolveContext
-from .continuation import Continuation
 from .law_models import Majorant
 from .load_path_start import PathStart
-from .result import Counts, SolveResult
-from .rigid_start import at_rest
+from .method import Counts, SolveResult
+from .resting_start import at_rest, resting_start
 
 
 class _StepLimit:

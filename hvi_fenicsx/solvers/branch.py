@@ -13,19 +13,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 from petsc4py import PETSc
 
+from ..effects import Direction
 from ..errors import SolverError
+from ..formula import Formula
 from ..laws import Superpotential
+from ..laws.smoothing import QUADRATIC
+from ..problem.law_term import LawTerm
+from ..system.system import System
 from ..typing import Array
-from . import initial_branches
-from .closed_start import resting_start
-from .context import SolveContext
+from .context import SolveContext, Start
 from .convergence import Outcome
 from .convex_step import UNBOUNDED, ConvexStep, no_step
 from .law_models import Cells
-from .method import Method
-from .result import Counts, SolveResult
+from .method import Counts, Method, SolveResult
+from .resting_start import resting_start
 
 
 class BranchIteration(Method):
@@ -100,7 +104,7 @@ class BranchIteration(Method):
         """ξ of the pieces to begin on: those of a displacement, or those of the options."""
         if branches is not None:
             return self._convex.subgradients(branches)
-        first = initial_branches.arguments(self.system, x, self.options.start, self.thresholds.broken_slip)
+        first = arguments(self.system, x, self.options.start, self.thresholds.broken_slip)
         return [law.concave.left(a) for law, a in zip(self._laws, first, strict=True)]
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
@@ -183,3 +187,64 @@ class BranchIteration(Method):
             interrupted=outcome.interrupted,
             steady=steady,
         )
+
+
+def arguments(system: System, resting: PETSc.Vec, start: Start, broken_slip: float) -> list[Array]:
+    """Arguments of the laws on the pieces to begin on, by term, (m,) each.
+
+    Args:
+        system: the assembled problem.
+        resting: the displacement with contact closed and laws at rest.
+        start: the name of a start, or a displacement by component (m).
+        broken_slip: slip of a broken bond, relative to the law's length or to the slip at rest.
+    """
+    if start == "unbroken":
+        return [np.zeros(len(t.surface.blocks)) for t in system.terms]
+    if not isinstance(start, str):
+        return _displaced(system, start)
+    found = [t.argument(resting.array_r) for t in system.terms]
+    if start == "resting":
+        return found
+    return [_broken(t, a, broken_slip) for t, a in zip(system.terms, found, strict=True)]
+
+
+def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
+    """Arguments of a displacement; the directions of the problem's own terms are Cartesian, as it is."""
+    found = []
+    for term in system.problem.terms:
+        u = np.column_stack([f.at(term.surface.points) for f in start]) / system.problem.scales.displacement
+        found.append(term.argument_of(np.einsum("mkd,md->mk", term.directions, u)))
+    return found
+
+
+def _broken(term: LawTerm, slip: Array, far: float) -> Array:
+    """A large slip in the direction of the slip at rest; positive for laws of an opening or a penetration."""
+    sign = np.where(slip < 0, -1.0, 1.0) if term.direction is Direction.SLIP else np.ones_like(slip)
+    return np.asarray(sign * far * np.maximum(np.abs(slip), term.exact.length_scale))
+
+
+class Continuation(Method):
+    """The continuation on one system; call :meth:`solve` once."""
+
+    name = "snes_vi"
+    description = "a continuation in the smoothing over branch iterations"
+    takes_pieces = False
+
+    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
+        """A stationary point of the wanted law. Collective.
+
+        Args:
+            start: not used; each width starts from the solution of the width before.
+        """
+        counts, start, context = Counts(), None, self.context
+        thresholds = self.options.thresholds.branch
+        loose = context.with_options(tolerance=max(thresholds.loose_tolerance, self.options.tolerance))
+        for width in (w for w in thresholds.widths if w > (context.epsilon or 0.0)):
+            laws = [QUADRATIC.relative(t.exact, width) for t in self.system.terms]
+            found = BranchIteration(loose, laws, width, check_bounded=True).solve(start)
+            counts.add(found.counts)
+            if found.converged:
+                start = self.system.unknowns(found.u)
+        last = BranchIteration(context, check_bounded=True).solve(start)
+        counts.add(last.counts)
+        return replace(last, method=self.name, counts=counts)

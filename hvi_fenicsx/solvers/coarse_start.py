@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from ..system.levels import Levels
 from ..system.system import System
 from ..typing import Integers
-from .result import SolveResult
+from .method import SolveResult
 from .thresholds import ActiveSetThresholds
 
 

@@ -19,15 +19,13 @@ from scipy.sparse import csr_matrix
 
 from ..errors import InputError
 from ..laws import Superpotential
+from ..system.equations import LawModel
 from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
-from ..system.law_model import LawModel
 from ..system.system import System
 from ..typing import Array, Integers
 from .context import SolveContext
-from .method import Method
-from .result import Counts, SolveResult
-from .ssls import onto_bounds
+from .method import Counts, Method, SolveResult
 
 _STATUS = {
     0: "the evaluations are used up",
@@ -59,6 +57,25 @@ class MeanDerivative:
     def second(self, x: Array) -> Array:
         """H'' - G''."""
         return self.law.convex.second(x) - self.law.concave.second(x)
+
+
+def onto_bounds(system: System, x: PETSc.Vec, residual: PETSc.Vec) -> PETSc.Vec:
+    """An admissible copy of x, with those dofs on their bound whose force there is larger than their distance from it.
+
+    Fischer-Burmeister iterates come near their bounds without ever being on them. Nondimensional nodal stiffnesses are
+    about 1, so distances compare with forces, as in the primal-dual active set method.
+
+    Args:
+        system: the assembled problem.
+        x: the displacement.
+        residual: of the equations at x.
+    """
+    found = x.copy()
+    value, force = x.array_r, residual.array_r
+    lower, upper = system.lower.array_r, system.upper.array_r
+    found.array[:] = np.where(value - lower <= force, lower, np.where(upper - value <= -force, upper, value))
+    found.array[:] = np.clip(found.array_r, lower, upper)
+    return found
 
 
 class Condensation(Method):

@@ -23,7 +23,7 @@ from .context import SolveContext
 from .convergence import Outcome
 from .fallbacks import Attempt, first_success
 from .law_models import Cells, ExactLaw, Majorant, SecantMajorant
-from .result import Counts
+from .method import Counts
 from .thresholds import FULL_STEPS
 
 UNBOUNDED = "the body slides away on what is left of its bonds"

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from ..system.law_model import LawModel
+from ..system.equations import LawModel
 from .active_set import ActiveSetSolver
 from .convergence import Outcome
+from .method import Counts
 from .projected_newton import ProjectedNewton
-from .result import Counts
 from .thresholds import EXACT
 
 

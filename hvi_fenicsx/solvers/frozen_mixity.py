@@ -20,10 +20,9 @@ from ..runtime.mpi import largest
 from ..system.system import System
 from ..typing import Array
 from . import nested_iteration
-from .context import RunControl
+from .context import RunControl, SolverOptions
+from .method import Counts
 from .nested_iteration import LevelSolution
-from .options import SolverOptions
-from .result import Counts
 
 _LOG = logger("solvers")
 _ROUNDS = 60

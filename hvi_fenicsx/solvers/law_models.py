@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ..laws import ConvexPart, Superpotential
+from ..system.system import System
 from ..typing import Array, Integers
 from .thresholds import DEFAULT, BranchThresholds
 
@@ -194,3 +195,8 @@ class TangentAtRest:
     def second(self, x: Array) -> Array:
         """H''(0)."""
         return self.law.convex.second(np.zeros_like(x))
+
+
+def smooth_models(system: System) -> list[ExactLaw]:
+    """The laws with their true curvature, by term; they have no kinks, so each has one cell."""
+    return [ExactLaw(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]

@@ -24,7 +24,7 @@ from ..reduced.condensation import Condensation
 from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking
 from ..system.system import System
-from .result import Borne
+from .method import Borne
 from .thresholds import PathThresholds
 
 

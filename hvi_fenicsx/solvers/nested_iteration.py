@@ -18,17 +18,14 @@ from ..mesh.transfer import DegreeTransfer, Transfer
 from ..problem.compose import Model
 from ..rigid import Solvability
 from ..runtime.log import logger
-from ..system.assemble import assemble
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..system.linear_settings import LinearSettings
-from ..system.system import System
+from ..system.system import System, assemble
 from . import coarse_start, registry
 from .coarse_start import CoarseStart
-from .context import RunControl, SolveContext
-from .method import Method
-from .options import SolverOptions
+from .context import RunControl, SolveContext, SolverOptions
+from .method import Counts, Method, SolveResult
 from .quadratic import LinearSolve
-from .result import Counts, SolveResult
 from .thresholds import ActiveSetThresholds
 
 _LOG = logger("solvers")

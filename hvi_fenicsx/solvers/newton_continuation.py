@@ -20,7 +20,7 @@ from ..laws.smoothing import QUADRATIC
 from ..typing import Array
 from .branch import BranchIteration
 from .context import SolveContext
-from .result import Counts, SolveResult
+from .method import Counts, SolveResult
 
 _SPRING = LinearSpring(stiffness=1.0)
 """In units of E0/L."""

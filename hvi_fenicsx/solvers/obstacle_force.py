@@ -22,10 +22,9 @@ from ..system.system import System
 from ..typing import Array
 from . import coarse_start, nested_iteration, registry
 from .coarse_start import CoarseStart
-from .context import RunControl, SolveContext
+from .context import RunControl, SolveContext, SolverOptions
+from .method import Counts
 from .nested_iteration import LevelSolution
-from .options import SolverOptions
-from .result import Counts
 
 _LOG = logger("solvers")
 _MOST = 60

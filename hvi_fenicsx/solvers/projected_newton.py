@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 from petsc4py import PETSc
 
+from ..system.equations import LawModel
 from ..system.held_solver import Goal
-from ..system.law_model import LawModel
 from ..typing import Array
 from .active_set import ActiveSetSolver
 from .convergence import Outcome

@@ -12,14 +12,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..system.system import System
-from .closed_start import resting_start
 from .convergence import Outcome
 from .fallbacks import Attempt, first_success
-from .law_models import ExactLaw
-from .method import Method
-from .result import Counts, SolveResult
-from .rigid_start import at_rest
-from .smooth_method import smooth_models
+from .law_models import ExactLaw, smooth_models
+from .method import Counts, Method, SolveResult
+from .resting_start import at_rest, resting_start
 
 
 def is_equation(system: System) -> bool:

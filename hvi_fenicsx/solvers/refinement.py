@@ -16,9 +16,8 @@ from ..system.levels import Levels
 from ..system.system import System
 from ..typing import Array
 from . import registry
-from .context import RunControl, SolveContext
-from .options import SolverOptions
-from .result import Counts, SolveResult
+from .context import RunControl, SolveContext, SolverOptions
+from .method import Counts, SolveResult
 
 _LOG = logger("solvers")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..class_registry import hint
 from ..errors import InputError
 from ..system.system import System
+from .context import SolverOptions
 from .method import Method, load_all
-from .options import SolverOptions
 from .quadratic import ConvexProgramme, LinearSolve, is_equation, is_quadratic
 
 

@@ -193,8 +193,6 @@ class Thresholds:
             Newton steps at most.
         touching: distance (of u0, or relative to a kink further away) from a convex kink within which a rigid position
             is on it.
-        foundation: stiffness per area, in units of E0/L, that keeps the preconditioner of ``tao`` regular where the
-            body is free to move.
         evaluations: evaluations of the functions in ``condensed`` at most: the paper's limit of lsqnonlin's iterations.
         least_decrease: relative decrease of the merit function at which ``condensed`` stops.
         least_step: relative step at which ``condensed`` stops.
@@ -214,7 +212,6 @@ class Thresholds:
     linear_solves: int = 3
     programme_attempts: Sequence[tuple[str, int]] = PROGRAMME_ATTEMPTS
     touching: float = 1e-7
-    foundation: float = 1e-3
     evaluations: int = 100
     least_decrease: float = 1e-10
     least_step: float = 1e-14

@@ -7,17 +7,18 @@ factors are far smaller with the averaged pressures as further unknowns (:mod:`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
 from typing_extensions import override
 
 from ..mesh import nodes
+from ..problem.nodal_averaging import Dilatation
+from ..runtime.timing import Timer
 from ..typing import Array, Entities, Integers
-from . import factor_counts
 from .contact_rows import ContactRows
 from .petsc_options import CHOLESKY, default_options, prefix
-from .saddle_point import nested, without_dilatation
 from .system import System
 
 
@@ -226,7 +227,7 @@ class Factorisation:
     @property
     def negative(self) -> int:
         """The number of negative eigenvalues of the system's matrix. Collective."""
-        return factor_counts.negative_pivots(self.pc) - int(self._form.system.comm.allreduce(self._form.pressures))
+        return negative_pivots(self.pc) - int(self._form.system.comm.allreduce(self._form.pressures))
 
     @property
     def is_singular(self) -> bool:
@@ -242,3 +243,103 @@ class Factorisation:
         """Free the PETSc objects."""
         for thing in (self.pc, self._matrix, self._given, self._found):
             thing.destroy()
+
+
+_FACTOR_FLOPS = 3  # RINFOG: operations of the elimination
+_FACTOR_ENTRIES = 29  # INFOG: numbers in the factors; in millions with a minus, where they are many
+_NEGATIVE_PIVOTS = 12  # INFOG
+_FLOPS_PER_ENTRY = 4.0  # a solve multiplies and adds each number twice, forth and back
+_LEAST = 30.0  # solves; measured: 13 to 45 in the plane, where other things than operations take the time
+
+
+def entries(pc: PETSc.PC) -> float:
+    """Numbers in the factors, over all ranks; infinite where the solver does not tell.
+
+    Args:
+        pc: a factorised matrix.
+    """
+    if pc.getFactorSolverType() != "mumps":
+        return np.inf
+    count = pc.getFactorMatrix().getMumpsInfog(_FACTOR_ENTRIES)
+    return float(count if count >= 0 else -1e6 * count)
+
+
+def negative_pivots(pc: PETSc.PC) -> int:
+    """The number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia).
+
+    Args:
+        pc: a symmetric matrix, factorised by MUMPS.
+    """
+    return int(pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
+
+
+def solves_worth(pc: PETSc.PC) -> float:
+    """Number of right-hand sides whose solution costs as much as the factorisation; 0 where the solver does not tell.
+
+    By operations. In space, by processor time, it is 0.8 to 1.2 of this (648 to 14,739 unknowns).
+
+    Args:
+        pc: a factorised matrix.
+    """
+    if pc.getFactorSolverType() != "mumps":
+        return 0.0
+    flops = pc.getFactorMatrix().getMumpsRinfog(_FACTOR_FLOPS)
+    return float(max(_LEAST, flops / (_FLOPS_PER_ENTRY * max(entries(pc), 1.0))))
+
+
+def without_dilatation(system: System) -> System:
+    """The system without the volumetric part. Collective.
+
+    Args:
+        system: of a body whose div u is averaged.
+    """
+    problem = replace(system.problem, bulk=system.problem.bulk.without_dilatation())
+    return System(problem, Timer(), system.thresholds)
+
+
+def nested(system: System, shear: System, parts: Sequence[Dilatation]) -> PETSc.Mat:
+    """The matrix of displacements and pressures, in blocks. Collective.
+
+    Args:
+        system: the system.
+        shear: the same without the volumetric part; its matrix is the first block.
+        parts: the regions that are averaged.
+    """
+    divergences = [_in_unknowns(part.divergence, system) for part in parts]
+    transposed, compliances = [d.transpose(PETSc.Mat()) for d in divergences], [_compliance(part) for part in parts]
+    rows = [
+        [d, *(compliance if i == k else None for i in range(len(parts)))]
+        for k, (d, compliance) in enumerate(zip(divergences, compliances, strict=True))
+    ]
+    found = PETSc.Mat().createNest([[shear.jacobian.matrix, *transposed], *rows], comm=system.comm)
+    for block in (*divergences, *transposed, *compliances):
+        block.destroy()  # they are found's alone
+    return found
+
+
+def _in_unknowns(divergence: PETSc.Mat, system: System) -> PETSc.Mat:
+    """D of the system's unknowns; prescribed ones have no part in it. Collective."""
+    coupling, found = system.problem.coupling, divergence.copy()
+    for step in (coupling and coupling.matrix, system.rotation):
+        if step is not None:
+            product = found.matMult(step)
+            found.destroy()
+            found = product
+    mask = system.load.duplicate()
+    mask.set(1.0)
+    mask.array[system.problem.fixed_here] = 0.0
+    found.diagonalScale(None, mask)
+    mask.destroy()
+    return found
+
+
+def _compliance(part: Dilatation) -> PETSc.Mat:
+    """-V/λ; -1 at the vertices outside of the region, whose pressure is zero. Collective."""
+    rate, found = part.stiffness.array_r, part.stiffness.duplicate()
+    found.array[:] = -np.divide(1.0, rate, out=np.ones_like(rate), where=rate > 0)
+    sizes = part.stiffness.getSizes()
+    matrix = PETSc.Mat().createAIJ((sizes, sizes), nnz=(1, 0), comm=found.comm)
+    matrix.setDiagonal(found)
+    matrix.assemble()
+    found.destroy()
+    return matrix

@@ -9,7 +9,7 @@ which they are held by their diagonals (:meth:`.Jacobian.hold`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,14 +19,12 @@ from petsc4py import PETSc
 
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
-from . import factor_counts, free_rows, schur
-from .algebraic import Algebraic
+from . import direct, factorisation
 from .direct import Direct
 from .factorisation import FactorForm, form_of
 from .levels import Levels
 from .linear_settings import Kind, LinearSettings
-from .mixed_multigrid import MixedMultigrid
-from .multigrid import Multigrid
+from .multigrid import Algebraic, MixedMultigrid, Multigrid
 from .petsc_options import configure
 from .system import System
 
@@ -60,7 +58,7 @@ class Goal:
     """
 
     rtol: float
-    reached: free_rows.Reached | None = None
+    reached: Reached | None = None
 
 
 class HeldPreconditioner:
@@ -144,17 +142,17 @@ class HeldPreconditioner:
         """Whether the body is to be condensed. Collective."""
         if not isinstance(self._preconditioner, Direct):
             return self._condensed
-        worth = self.settings.thresholds.condensing * factor_counts.solves_worth(self._preconditioner.factors)
-        return schur.is_worthwhile(self.system, self._factorised * worth)
+        worth = self.settings.thresholds.condensing * factorisation.solves_worth(self._preconditioner.factors)
+        return direct.is_worthwhile(self.system, self._factorised * worth)
 
     @property
     def _condensed(self) -> bool:
-        return isinstance(self._preconditioner, schur.SchurDirect)
+        return isinstance(self._preconditioner, direct.SchurDirect)
 
     def _new(self, *, condensing: bool) -> Preconditioner:
         """A new preconditioner; condensing, one factorisation of the body serves all matrices that differ on Γc."""
         if condensing:
-            return schur.SchurDirect(self._factored_form, self.settings.pc)
+            return direct.SchurDirect(self._factored_form, self.settings.pc)
         if self.settings.kind == "mg":
             return Multigrid(self.system, self.levels, self.settings.pc)
         if self.settings.kind == "mixed":
@@ -248,7 +246,7 @@ class HeldPreconditioner:
             ksp.solve(load, x)
         if self.system.free_motions is not None:
             self.system.free_motions.null_space.remove(x)
-        iterations, reason = free_rows.iterations(ksp), int(ksp.getConvergedReason())
+        iterations, reason = iterations_of(ksp), int(ksp.getConvergedReason())
         ksp.destroy()
         self.report(iterations, failed=reason < 0)
         return iterations + self.inner_iterations - before, reason
@@ -268,7 +266,7 @@ class HeldPreconditioner:
             if reached is not None:
                 ksp.setTolerances(rtol=settings.thresholds.surplus * goal.rtol)
             held = np.union1d(self._wanted, self.system.pins)
-            free_rows.set_up(ksp, self.system.jacobian.matrix, self._preconditioner.pc, held, reached)
+            set_up(ksp, self.system.jacobian.matrix, self._preconditioner.pc, held, reached)
         return ksp
 
 
@@ -278,3 +276,71 @@ def consecutive_runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:
     for run in np.split(np.arange(len(chosen)), breaks) if len(chosen) else []:
         begin, end = int(run[0]), int(run[-1]) + 1
         yield slice(int(chosen[begin]), int(chosen[end - 1]) + 1), slice(begin, end)
+
+
+Reached = Callable[[Array], bool]
+"""Whether a residual (n,) is small enough; collective."""
+
+
+class _Matrix:
+    """The context of the matrix."""
+
+    def __init__(self, whole: PETSc.Mat, held: Entities) -> None:
+        self._whole, self._held = whole, held
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Multiply y = J x. Collective."""
+        self._whole.mult(x, y)
+        y.array[self._held] = 0.0
+
+
+class _Preconditioner:
+    """The context of the PC.
+
+    Attributes:
+        ended: whether it has ended the method.
+    """
+
+    def __init__(self, inner: PETSc.PC, held: Entities, reached: Reached | None) -> None:
+        self._inner, self._held, self._reached, self._begun = inner, held, reached, False
+        self.ended = False
+
+    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Apply the inner preconditioner to the residual x, or write zero into y. Collective."""
+        self.ended = self._begun and self._reached is not None and self._reached(x.array_r)
+        self._begun = True
+        if self.ended:
+            y.set(0.0)
+            return
+        self._inner.apply(x, y)
+        y.array[self._held] = 0.0
+
+    def view(self, _: PETSc.PC, viewer: PETSc.Viewer) -> None:
+        """Show the inner preconditioner."""
+        self._inner.view(viewer)
+
+
+def set_up(ksp: PETSc.KSP, whole: PETSc.Mat, inner: PETSc.PC, held: Entities, reached: Reached | None) -> None:
+    """Give a method its matrix and preconditioner, for one solve from zero. Collective.
+
+    Args:
+        ksp: the method.
+        whole: J.
+        inner: a preconditioner of it; one of a J with other held unknowns and another tangent will do.
+        held: the unknowns that are held (local, owned).
+        reached: ends the method of conjugate gradients; the first residual never does. None: only its own tests do.
+    """
+    matrix = PETSc.Mat().createPython(whole.getSizes(), _Matrix(whole, held), comm=whole.comm)
+    matrix.setUp()
+    pc = PETSc.PC().create(whole.comm)
+    pc.setType(PETSc.PC.Type.PYTHON)
+    pc.setPythonContext(_Preconditioner(inner, held, reached))
+    ksp.setPC(pc)
+    ksp.setOperators(matrix)
+
+
+def iterations_of(ksp: PETSc.KSP) -> int:
+    """Iterations of a finished solve; PETSc counts one more where the preconditioner ended it."""
+    pc = ksp.getPC()
+    context = pc.getPythonContext() if pc.getType() == PETSc.PC.Type.PYTHON else None  # PETSc crashes of other types
+    return int(ksp.getIterationNumber()) - (isinstance(context, _Preconditioner) and context.ended)

@@ -14,9 +14,12 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..problem.bodies import whole
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
+from ..problem.vectors import new_vector, null_space, turn
+from ..rigid import rigid_fields
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
 from .thresholds import DEFAULT, Thresholds
@@ -150,3 +153,21 @@ def _completed(rows: dict[int, Array], d: int) -> Array:
         best = candidates[i] if np.linalg.norm(candidates[i]) > 0.1 else max(candidates, key=np.linalg.norm)
         frame[i] = best / np.linalg.norm(best)
     return frame
+
+
+def rigid_modes(problem: Problem, rotation: PETSc.Mat | None) -> PETSc.NullSpace:
+    """All rigid motions of the body without supports, orthonormal, in the components of the unknowns. Collective.
+
+    Args:
+        problem: the problem.
+        rotation: Q with u = Q û for unknowns û in local components; None where there are none.
+    """
+    body, vectors = whole(problem.domain), []
+    owned = problem.points[: problem.space.dofmap.index_map.size_local]
+    fields = rigid_fields(np.asarray(owned / problem.scales.length), body)
+    for number in range(body.motions):
+        vector = new_vector(problem.space)
+        vector.array[:] = problem.relative(fields[:, number].ravel())[: vector.local_size]
+        turn(vector, rotation)
+        vectors.append(vector)
+    return null_space(vectors)

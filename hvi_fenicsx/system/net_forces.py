@@ -16,7 +16,7 @@ from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..typing import Array, Entities, Mask
-from .supported_body import Motions
+from .free_motions import Motions
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import ctypes
 import re
+import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any
+from typing import Any, Protocol
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..errors import InputError
-from .petsc_errors import raise_python_error
 
 CHOLESKY: Mapping[str, object] = {
     "pc_type": "cholesky",
@@ -185,3 +186,64 @@ def unread(text: str) -> Iterator[str]:
                 f"--petsc: nothing has read {word}; options of this program's solvers begin with -{prefix()}, like "
                 f"-{prefix()}ksp_type, and each is read only where such a solver is in use (docs/cluster.md)"
             )
+
+
+_OF_SOLVES = (PETSc.Error, ArithmeticError, np.linalg.LinAlgError)
+"""What a solve from a bad start may end with: PETSc's own errors, overflow, singular matrices."""
+
+
+def raise_python_error(error: PETSc.Error) -> None:
+    """Raise what a Python function has raised within a solve; nothing where the solve itself has failed.
+
+    A request to stop at once is such an error, and a mistake in a law or in this program.
+
+    Args:
+        error: of the solve.
+
+    Raises:
+        BaseException: that of the function.
+    """
+    cause: BaseException | None = error
+    while isinstance(cause, PETSc.Error):
+        cause = cause.__cause__
+    if cause is not None and not isinstance(cause, _OF_SOLVES):
+        raise cause
+
+
+class Solver(Protocol):
+    """What solves a system."""
+
+    def apply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve the system. Collective.
+
+        Args:
+            x: the load.
+            y: where the solution goes.
+        """
+
+
+class _Context:
+    """The context of the PC, which refers to its owner weakly: nothing would free a circle via PETSc."""
+
+    def __init__(self, owner: Solver) -> None:
+        self._owner = weakref.ref(owner)
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve for y of the load x."""
+        owner = self._owner()
+        assert owner is not None
+        owner.apply(x, y)
+
+
+def applied_by(owner: Solver, matrix: PETSc.Mat) -> PETSc.PC:
+    """The PC. Collective.
+
+    Args:
+        owner: what applies it; it must not have a method ``destroy``, which petsc4py would call with every PC.
+        matrix: what it preconditions.
+    """
+    pc = PETSc.PC().create(matrix.comm)
+    pc.setOperators(matrix)
+    pc.setType(PETSc.PC.Type.PYTHON)
+    pc.setPythonContext(_Context(owner))
+    return pc

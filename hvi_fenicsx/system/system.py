@@ -16,18 +16,21 @@ from dolfinx.fem.petsc import set_bc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..problem import references
+from ..effects import load_name
+from ..errors import InputError
+from ..mesh.domain import Domain
+from ..problem import references, scaling
+from ..problem.compose import Model, compose
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.vectors import assembled, new_vector, product, turn
 from ..rigid import Mode
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
-from . import existence, free_motions, local_frames, near_null_space
-from .equations import Equations
+from . import existence, free_motions, local_frames
+from .contact_rows import HoldingForces
+from .equations import Equations, Jacobian
 from .free_motions import FreeMotions
-from .holding_forces import HoldingForces
-from .jacobian import Jacobian
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -107,7 +110,7 @@ class System:
     @cached_property
     def near_null(self) -> PETSc.NullSpace:
         """The rigid motions, which algebraic multigrid must keep. Collective when first used."""
-        return near_null_space.rigid_modes(self.problem, self.rotation)
+        return local_frames.rigid_modes(self.problem, self.rotation)
 
     def _in_local_components(
         self, stiffness: PETSc.Mat
@@ -271,3 +274,32 @@ class System:
         self.jacobian.free()
         self.holding.free()
         self.free_leftovers()
+
+
+def assemble(domain: Domain, model: Model, timer: Timer, thresholds: Thresholds = DEFAULT) -> System:
+    """Compose a model on a domain, compile its forms and assemble them. Collective.
+
+    Args:
+        domain: the body and its mesh.
+        model: the effects and their places.
+        timer: where time goes.
+        thresholds: the numbers that tune the linear solvers.
+
+    Raises:
+        InputError: the model does not fit the mesh, on all ranks alike.
+    """
+    with timer("jit"):
+        problem = compose(domain, model)
+        problem.compile()
+    system = System(problem, timer, thresholds)
+    _require_finite(system)
+    return system
+
+
+def _require_finite(system: System) -> None:
+    """Refuse loads that are not finite where they are integrated, between the vertices. Collective."""
+    stated = [(where, effect) for where, effect, _ in system.problem.contributions]
+    for name, force in system.forces.items():
+        if not np.isfinite(force.norm()):
+            place = next(scaling.place(p) for p in stated if load_name(*p) == name)
+            raise InputError(f"{place}: the formula is not finite everywhere there, between the vertices of the mesh")

@@ -17,10 +17,10 @@ from ..runtime.log import logger, warn
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..scene_model import model_of, options_of
-from ..solvers.options import SolverOptions
+from ..solvers.context import SolverOptions
 from ..solvers.thresholds import Thresholds as SolverThresholds
 from ..system import existence
-from ..system.assemble import assemble
+from ..system.system import assemble
 from ..system.system import System
 
 _LOG = logger("preparation")

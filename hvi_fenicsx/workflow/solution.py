@@ -16,7 +16,7 @@ from ..rigid import Solvability
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solvers.obstacle_force import ObstacleBalance
-from ..solvers.result import SolveResult
+from ..solvers.method import SolveResult
 from ..typing import Array
 
 

@@ -21,7 +21,7 @@ from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import LevelSolution
 from ..solvers.obstacle_force import ObstacleBalance
-from ..solvers.result import SolveResult
+from ..solvers.method import SolveResult
 from ..system import free_motions
 from ..system.levels import Levels
 from .preparation import DEFAULT, Preparation, Thresholds, prepare

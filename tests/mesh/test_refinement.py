@@ -32,8 +32,7 @@ from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import solve_from_coarser
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import levels
-from hvi_fenicsx.system.assemble import assemble
-from hvi_fenicsx.system.system import System
+from hvi_fenicsx.system.system import System, assemble
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 
 

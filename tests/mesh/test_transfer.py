@@ -20,9 +20,9 @@ from hvi_fenicsx import InputError, read_scene, workflow
 from hvi_fenicsx.mesh.blocks import block, coarser_cells
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.closed_start import contact_dofs
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import coarser_levels
+from hvi_fenicsx.solvers.resting_start import contact_dofs
 from hvi_fenicsx.system import held_solver as linear
 from hvi_fenicsx.system.levels import Levels
 from hvi_fenicsx.system.linear_settings import Kind, LinearSettings

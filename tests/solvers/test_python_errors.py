@@ -13,11 +13,11 @@ from scenes import P, model, quadratic_linear, solved
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.closed_start import resting_start
+from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.solvers.smooth_method import smooth_models
 from hvi_fenicsx.system.equations import Equations
 from hvi_fenicsx.system.linear_settings import LinearSettings
-from hvi_fenicsx.system.petsc_errors import raise_python_error
+from hvi_fenicsx.system.petsc_options import raise_python_error
 from hvi_fenicsx.workflow import prepare
 
 

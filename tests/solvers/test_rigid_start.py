@@ -13,7 +13,7 @@ from runs import on_ranks
 from scenes import context_of
 
 from hvi_fenicsx import Scene, prepare, solve
-from hvi_fenicsx.solvers.rigid_start import at_rest
+from hvi_fenicsx.solvers.resting_start import at_rest
 
 WEIGHT = 8.0e4
 FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}

@@ -10,9 +10,8 @@ from scenes import model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.active_set import ActiveSetSolver, StallTest
 from hvi_fenicsx.solvers.law_models import Cells, ExactLaw
-from hvi_fenicsx.solvers.stalls import StallTest
 from hvi_fenicsx.solvers.thresholds import ActiveSetThresholds
 from hvi_fenicsx.system.linear_settings import LinearSettings
 

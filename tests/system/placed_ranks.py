@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx.system.fewer_ranks import PlacedMatrix
+from hvi_fenicsx.system.multigrid import PlacedMatrix
 
 COMM = MPI.COMM_WORLD
 FINE, COARSE = 14, 6

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.system import schur
+from hvi_fenicsx.system import direct
 from hvi_fenicsx.system.factorisation import form_of
 from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
 from hvi_fenicsx.system.linear_settings import LinearSettings
@@ -36,7 +36,7 @@ def main() -> None:
     load.array[:] = np.cos(np.arange(*load.owner_range))
     expected.set(0.0)
     whole = HeldPreconditioner(system, (), LinearSettings("lu"), Timer())
-    condensed = schur.SchurDirect(form_of(system), {"pc_type": "cholesky"})
+    condensed = direct.SchurDirect(form_of(system), {"pc_type": "cholesky"})
     whole.prepare(held)
     whole.solve(load, expected, Goal(rtol=1e-12))
     condensed.prepare(held)

@@ -13,7 +13,7 @@ from runs import on_ranks
 from scenes import quadratic_linear, solved, two_blocks
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.system import factor_counts
+from hvi_fenicsx.system import factorisation
 from hvi_fenicsx.system.factorisation import FactorForm, Factorisation, form_of
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 
@@ -75,7 +75,7 @@ def test_they_have_fewer_numbers() -> None:
     for form in (form_of(system), FactorForm(system)):
         factors = Factorisation(form, form.matrix(), CHOLESKY)
         factors.factorise(system.jacobian.rows.dofs)
-        entries.append(factor_counts.entries(factors.pc))
+        entries.append(factorisation.entries(factors.pc))
     assert entries[0] < entries[1] / 2.5
 
 

@@ -7,7 +7,7 @@ import pytest
 from placed_ranks import COARSE, FINE, dense
 from runs import on_ranks
 
-from hvi_fenicsx.system.fewer_ranks import joined_ranks
+from hvi_fenicsx.system.multigrid import joined_ranks
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.system import factor_counts, schur
+from hvi_fenicsx.system import direct, factorisation
 from hvi_fenicsx.system.direct import Direct
 from hvi_fenicsx.system.factorisation import FactorForm, form_of
 from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
@@ -46,7 +46,7 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
     expected.set(0.0)
     whole, condensed = (
         HeldPreconditioner(system, (), DIRECT, Timer()),
-        schur.SchurDirect(form_of(system), {"pc_type": "cholesky"}),
+        direct.SchurDirect(form_of(system), {"pc_type": "cholesky"}),
     )
     whole.prepare(held)
     whole.solve(load, expected, Goal(rtol=1e-12))
@@ -68,8 +68,8 @@ def test_what_mumps_counts_is_below_that_of_full_factors() -> None:
     system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
     copy = Direct(FactorForm(system), CHOLESKY)
     copy.prepare(system.jacobian.rows.dofs[:0].astype(np.int32))
-    assert system.dofs**2 / 4 < factor_counts.entries(copy.pc) < system.dofs**2 / 2
-    assert system.dofs / 12 < factor_counts.solves_worth(copy.pc) < system.dofs / 6
+    assert system.dofs**2 / 4 < factorisation.entries(copy.pc) < system.dofs**2 / 2
+    assert system.dofs / 12 < factorisation.solves_worth(copy.pc) < system.dofs / 6
 
 
 def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_solver() -> None:
@@ -107,9 +107,9 @@ def test_multigrid_that_does_not_converge_gives_way_soon() -> None:
 
 
 def test_a_run_that_condenses_ends_where_one_that_does_not_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[schur.SchurDirect] = []
-    begin = schur.SchurDirect.__init__
-    monkeypatch.setattr(schur.SchurDirect, "__init__", lambda self, *args: (made.append(self), begin(self, *args))[1])
+    made: list[direct.SchurDirect] = []
+    begin = direct.SchurDirect.__init__
+    monkeypatch.setattr(direct.SchurDirect, "__init__", lambda self, *args: (made.append(self), begin(self, *args))[1])
     found: list[npt.NDArray[np.float64]] = []
     for worth in (0, 1_000):  # never; from the second factorisation on
         thresholds = Thresholds(solvers=SolverThresholds(linear=LinearThresholds(condensing=worth)))

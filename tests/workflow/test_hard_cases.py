@@ -20,8 +20,8 @@ from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.path.following import Control, PathRun
 from hvi_fenicsx.scene import PathTable
 from hvi_fenicsx.solvers import refinement
+from hvi_fenicsx.solvers.method import SolveResult
 from hvi_fenicsx.solvers.refinement import refined
-from hvi_fenicsx.solvers.result import SolveResult
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.bodies import Equilibria
 
