@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import hard_scenes
+import petsc_methods  # noqa: F401  (tao and ssls are known then)
 from covering import Case
 from dolfinx import fem
 from mpi4py import MPI
@@ -30,7 +31,7 @@ Record = dict[str, Any]
 
 
 def methods() -> list[str]:
-    """All methods there are."""
+    """All methods there are, and PETSc's own, which the plugin adds."""
     return list(registry.available())
 
 

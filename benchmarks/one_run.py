@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import petsc_methods  # noqa: F401  (tao and ssls are known then)
 from mpi4py import MPI
 
 from hvi_fenicsx import read_scene

@@ -5,8 +5,8 @@
 ``tao`` is TAO's bound-constrained Newton line search (``bnls``): it sees the true gradient and the true, perhaps
 indefinite Hessian, and its preconditioner is that of the law's convex part. ``ssls`` is SNES VI's semismooth Newton
 method (``vinewtonssls``): its own test has accepted points that are no solutions, so here the residual of the
-inequality decides, at the iterate moved onto the bounds that it nearly touches. Both differentiate the law, so they refuse kinks.
-Any option may be overridden under the prefix ``hvi_`` (``-hvi_tao_type bntr``).
+inequality decides, at the iterate moved onto the bounds that it nearly touches. Both differentiate the law, so they
+refuse kinks. Any option may be overridden under the prefix ``hvi_`` (``-hvi_tao_type bntr``).
 """
 
 from __future__ import annotations

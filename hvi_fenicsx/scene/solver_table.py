@@ -48,7 +48,7 @@ class SolverTable(Table):
     `--accuracy` or `--time-budget` the cheaper one"""
     method: str = "auto"
     """the method: auto chooses linear, convex or branch by the effects; branch solves the exact law; condensed is the
-    procedure of the paper; snes_vi, tao and ssls are for comparison; or the name of your own method"""
+    procedure of the paper; snes_vi is for comparison; or the name of your own method"""
     smoothing: Annotated[str | None, OneOf(smoothings)] = None
     """the plus function that smooths the kinks of the law; paper is the S of the paper; without it the law is exact"""
     epsilon: Positive | None = None

@@ -155,8 +155,8 @@ WRONG = {
     "broken.py": ("x = 1\ny = x +\n", "broken.py:2: SyntaxError"),
     "raises.py": ("\n\nraise ValueError('no such steel')\n", "raises.py:3: ValueError: no such steel"),
     "taken.py": (
-        "from hvi_fenicsx.solvers import Method\nclass M(Method):\n    name = 'tao'\n",
-        "taken.py:2: InputError: method class M: the name 'tao' is taken",
+        "from hvi_fenicsx.solvers import Method\nclass M(Method):\n    name = 'branch'\n",
+        "taken.py:2: InputError: method class M: the name 'branch' is taken",
     ),
 }
 

@@ -169,8 +169,8 @@ def test_a_linear_scene_takes_coarser_levels_for_its_multigrid_only() -> None:
 
 
 def test_a_method_that_is_named_is_the_one() -> None:
-    ready = prepare(Scene.model_validate(rolling() | {"solver": {"method": "tao"}}))
-    assert choose(ready.options, ready.system).name == "tao"
+    ready = prepare(Scene.model_validate(rolling() | {"solver": {"method": "condensed"}}))
+    assert choose(ready.options, ready.system).name == "condensed"
 
 
 def test_check_tells_effect_by_effect_what_is_added(tmp_path: Path) -> None:

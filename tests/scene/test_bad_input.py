@@ -60,7 +60,7 @@ TABLE: dict[str, tuple[str, str]] = {
         '--set solver.method: "branch" solves the law without smoothing',
     ),
     "start of another method": (
-        "solver={method='tao', epsilon=0.1, start='broken'}",
+        "solver={method='condensed', epsilon=0.1, start='broken'}",
         "--set solver.start: is for the branch iteration",
     ),
     "a table that there is not": ("solvr.tolerance=1e-3", 'hvi: --set solvr: unknown key "solvr"; did you mean'),

@@ -13,8 +13,8 @@ from scenes import P, model, quadratic_linear, solved
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
+from hvi_fenicsx.solvers.law_models import smooth_models
 from hvi_fenicsx.solvers.resting_start import resting_start
-from hvi_fenicsx.solvers.smooth_method import smooth_models
 from hvi_fenicsx.system.equations import Equations
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.petsc_options import raise_python_error
@@ -33,7 +33,7 @@ def failing_at(number: int, function: Callable[..., object], raised: BaseExcepti
     return failing
 
 
-@pytest.mark.parametrize("method", ["auto", "tao", "ssls", "condensed"])
+@pytest.mark.parametrize("method", ["auto", "condensed"])
 @pytest.mark.parametrize("raised", [ValueError("of a law"), KeyboardInterrupt()])
 def test_an_error_in_a_residual_ends_the_run(
     method: str, raised: BaseException, monkeypatch: pytest.MonkeyPatch

@@ -105,7 +105,7 @@ _EFFECTS = [
     {"contact": {"obstacle": {"point": [0, 0], "normal": [0, 1]}}}, {},
 ]  # fmt: skip
 _SOLVER = {
-    "method": ["auto", "snes_vi", "branch", "tao", "ssls", "condensed", "newton"],
+    "method": ["auto", "snes_vi", "branch", "condensed", "newton"],
     "smoothing": ["quadratic", "paper", "chks", "log_exp", "none"],
     "epsilon": [1e-300, 1e-12, 1e6, 1e300, 0],
     "epsilon_absolute": [1e-300, 0.1, 1e300],
