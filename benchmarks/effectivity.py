@@ -29,8 +29,7 @@ from hvi_fenicsx.problem.spaces import displacement_space
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, refined_levels, solve, solve_from_coarser
-from hvi_fenicsx.system.system import assemble
-from hvi_fenicsx.system.system import System
+from hvi_fenicsx.system.system import System, assemble
 from hvi_fenicsx.workflow import prepare
 
 DEMOS = Path(__file__).resolve().parents[1] / "demos"

@@ -28,12 +28,11 @@ from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.scene_model import model_of, options_of
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system import petsc_options
-from hvi_fenicsx.system.system import assemble
 from hvi_fenicsx.system.linear_settings import LinearSettings
-from hvi_fenicsx.system.system import System
+from hvi_fenicsx.system.system import System, assemble
 from hvi_fenicsx.workflow import finish, prepare
 
 COMM = MPI.COMM_WORLD

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from petsc4py import PETSc
 
+from hvi_fenicsx.compat import NOT_A_NUMBER
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.solvers.condensed import onto_bounds
 from hvi_fenicsx.solvers.context import SolveContext
@@ -307,7 +308,7 @@ class _SslsRun(SolverRun):
         self.stopped = self.solver.interrupted()
         if self.stopped:
             return SNES_REASON.DIVERGED_FUNCTION_COUNT
-        return SNES_REASON.CONVERGED_ITERATING if np.isfinite(measure) else SNES_REASON.DIVERGED_FNORM_NAN
+        return SNES_REASON.CONVERGED_ITERATING if np.isfinite(measure) else NOT_A_NUMBER
 
 
 class SemismoothNewton(SmoothMethod):

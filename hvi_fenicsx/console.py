@@ -12,12 +12,12 @@ from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
 from .load_path import LoadPath
 from .problem import effect_summary
+from .reduced import loading
 from .rigid import AnyBody, LoadFactors, Mode
 from .runtime.terminal import percent
 from .scene import PathTable
 from .solvers import nested_iteration, registry
 from .solvers.method import Counts
-from .reduced import loading
 from .workflow import Preparation, Solution
 
 NO_HISTORY = (

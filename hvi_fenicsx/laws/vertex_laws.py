@@ -134,8 +134,8 @@ class VertexLaws:
 
     def _chords(self, ends: Array) -> TractionGraph:
         places = np.outer(self.factors, np.append(ends, self._memory[:, :2])).ravel()
-        places = np.union1d(self.law.breaks, places)
-        return TractionGraph.chords(places, self.law.left(places), self.law.right(places))
+        known = np.union1d(self.law.breaks, places)
+        return TractionGraph.chords(known, self.law.left(known), self.law.right(known))
 
     def _limits(self, x: Array) -> tuple[Array, Array]:
         at, forward = self.factors * x, self.factors > 0.0

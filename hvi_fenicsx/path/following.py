@@ -19,11 +19,12 @@ from ..errors import InputError
 from ..load_path import LoadPath, PathRow
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
+from ..reduced import loading
+from ..reduced.condensation import Condensation
 from ..runtime.journal import Record
 from ..scene import PathTable
 from ..solvers import obstacle_force
-from ..system import existence, loading
-from ..reduced.condensation import Condensation
+from ..system import existence
 from ..workflow import Preparation
 from . import records
 from .certifying import Certifier, Verdict

@@ -16,12 +16,12 @@ from ..equilibrium_paths.state import End
 from ..errors import InputError, SolverError
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
+from ..reduced import loading
 from ..runtime.log import logger
 from ..scene import PathTable
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.context import never
 from ..solvers.method import Borne
-from ..reduced import loading
 from ..workflow import LastBorne, Preparation, Solution
 
 _LOG = logger("path")

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..certify.uniqueness import is_convex
 from ..errors import SolverError
+from ..reduced.condensation import Condensation
 from ..runtime.mpi import agree
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.method import SolveResult
-from ..reduced.condensation import Condensation
 from ..typing import Array
 from ..workflow import Preparation, Solution, certified, finish
 from .condensed_form import scalar_problem

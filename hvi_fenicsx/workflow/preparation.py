@@ -20,8 +20,7 @@ from ..scene_model import model_of, options_of
 from ..solvers.context import SolverOptions
 from ..solvers.thresholds import Thresholds as SolverThresholds
 from ..system import existence
-from ..system.system import assemble
-from ..system.system import System
+from ..system.system import System, assemble
 
 _LOG = logger("preparation")
 

@@ -15,8 +15,8 @@ from ..problem.problem import Problem
 from ..rigid import Solvability
 from ..runtime.timing import Timer
 from ..scene import Scene
-from ..solvers.obstacle_force import ObstacleBalance
 from ..solvers.method import SolveResult
+from ..solvers.obstacle_force import ObstacleBalance
 from ..typing import Array
 
 

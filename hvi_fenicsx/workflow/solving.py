@@ -19,9 +19,9 @@ from ..scene import Scene
 from ..solvers import frozen_mixity, nested_iteration, obstacle_force, refinement
 from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
+from ..solvers.method import SolveResult
 from ..solvers.nested_iteration import LevelSolution
 from ..solvers.obstacle_force import ObstacleBalance
-from ..solvers.method import SolveResult
 from ..system import free_motions
 from ..system.levels import Levels
 from .preparation import DEFAULT, Preparation, Thresholds, prepare

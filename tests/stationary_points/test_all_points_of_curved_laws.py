@@ -14,12 +14,12 @@ from scenes import Table, model, quadratic_linear
 from scipy.optimize import root
 
 from hvi_fenicsx import Scene, laws
+from hvi_fenicsx.reduced.condensation import Condensation
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
 from hvi_fenicsx.stationary_points.found import Found, Wanted
 from hvi_fenicsx.stationary_points.search import find
-from hvi_fenicsx.reduced.condensation import Condensation
-from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.typing import Array
 from hvi_fenicsx.workflow import prepare
 

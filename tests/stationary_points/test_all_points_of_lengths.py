@@ -14,6 +14,7 @@ from test_lengths import glued, random_graph, random_problem
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.laws.traction_graph import TractionGraph
+from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.arcs import FREE, chain
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
@@ -22,7 +23,6 @@ from hvi_fenicsx.stationary_points.lengths import Lengths
 from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
-from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.workflow import prepare
 
 Array = npt.NDArray[np.float64]
