@@ -15,8 +15,7 @@ from mpi4py import MPI
 
 from .. import console, results
 from ..report.html.render import NAME as PAGE
-from ..results import finished
-from ..results.folder import inputs_of
+from ..results.folder import inputs_of, read_finished
 from ..results.output_folder import existing
 from ..runtime import log, terminal
 from ..runtime.mpi import Interrupt, on_root
@@ -131,7 +130,7 @@ def execute(
 
 def _finished(target: Path, scene: Scene, command: Command) -> int | None:
     """The exit code of a finished result of the same scene, which is told; None where there is none. Rank 0 only."""
-    record, fault = finished.read(target, scene)
+    record, fault = read_finished(target, scene)
     if fault is not None:
         terminal.say(f"{target}: {fault}; {command.again}")
     if record is None or not command.done(record):

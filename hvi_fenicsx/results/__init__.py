@@ -1,8 +1,7 @@
 """A solution as files: by the contract, written aside and moved in, so that a result is whole or not there."""
 
-from . import finished
 from .folder import ResultFolder
 from .output_folder import resolved
 from .summary import plain
 
-__all__ = ["ResultFolder", "finished", "plain", "resolved"]
+__all__ = ["ResultFolder", "plain", "resolved"]

@@ -1,23 +1,26 @@
-"""The folder of a run: refused when it holds a result, written aside, moved in when whole. Rank 0 moves files."""
+"""The folder of a result: refused when it holds one, written aside, moved in when whole; whether it is finished."""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 from mpi4py import MPI
 
 from ..errors import InputError, NotWrittenError
 from ..runtime import manifest
+from ..runtime.manifest import MARKS
 from ..runtime.mpi import on_root
-from ..scene import Scene
+from ..scene import Scene, dump_scene
 from .output_folder import Existing, OutputFolder, placed
 
 _XML, _PNG = b"</VTKFile>", b"IEND\xaeB`\x82"
 _ENDS = {".pvd": _XML, ".vtu": _XML, ".pvtu": _XML, ".png": _PNG, ".html": b"</html>"}
 _LONGEST_END = 64
+_READ = ("scene.toml", MARKS["result"])
 
 
 class ResultFolder:
@@ -132,3 +135,37 @@ def _is_whole(file: Path) -> bool:
     with file.open("rb") as stream:
         stream.seek(max(0, file.stat().st_size - _LONGEST_END))
         return stream.read().rstrip().endswith(end)
+
+
+class Finished(NamedTuple):
+    """A folder that should hold a result of a scene.
+
+    Attributes:
+        record: what ``summary.json`` says; None where there is no such result, or not as it was written.
+        fault: why a result that is there cannot be kept; None where nothing is wrong with it.
+    """
+
+    record: dict[str, Any] | None = None
+    fault: str | None = None
+
+
+def read_finished(target: Path, scene: Scene) -> Finished:
+    """The result of a scene in a folder, if one is there, whole and of the same mesh files and plugins.
+
+    Args:
+        target: the folder, without symbolic links.
+        scene: the scene.
+    """
+    found = manifest.read(target)
+    if found is None or found.kind != "result":
+        return Finished()
+    damaged = found.damaged(target)
+    if damaged is None:
+        damaged = next((name for name in _READ if not found.files.get(name)), None)  # listed without what was in it
+    if damaged is not None:
+        return Finished(fault=f"{damaged} is not as it was written")
+    if (target / "scene.toml").read_text(encoding="utf-8") != dump_scene(scene, target):
+        return Finished()
+    if found.inputs != inputs_of(scene, target):
+        return Finished(fault="a file that the scene reads has changed")
+    return Finished(json.loads((target / MARKS["result"]).read_text(encoding="utf-8")))

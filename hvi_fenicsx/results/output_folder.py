@@ -12,8 +12,6 @@ import contextlib
 import errno
 import glob
 import os
-import re
-import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -21,9 +19,9 @@ from typing import Literal
 
 from ..errors import InputError, NotWrittenError
 from ..runtime import manifest, processes, writing
-from ..runtime.folder_lock import FolderLock
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.processes import SIGNALS
+from .folder_lock import FolderLock
 from .moving import discard, is_folder, move_in
 
 Existing = Literal["refuse", "replace", "resume"]
@@ -64,18 +62,17 @@ class OutputFolder:
             self._made = [folder for folder in self.target.parents if not folder.exists()]
             self.target.parent.mkdir(parents=True, exist_ok=True)
             self._lock = FolderLock(self.target)
+            around = self.target if os.path.ismount(self.target) else self.target.parent
+            self._hidden = around / f".{self.target.name}.hvi-new"
             with self._closed_on_error():
                 self._recover()
 
     def _recover(self) -> None:
         """Go on where a killed process was: a whole result is moved in, another one removed."""
-        name = self._lock.left or ""
-        if re.fullmatch(re.escape(f".{self.target.name}.hvi-") + "[0-9a-f]{8}", name):
-            for left in (self.target.parent / name, self.target / name):
-                if is_folder(left):
-                    self._left = True  # until it is done, the next one must find it too
-                    self._finish(left)
-                    self._left = False
+        if self._lock.was_left and is_folder(self._hidden):
+            self._left = True  # until it is done, the next one must find it too
+            self._finish(self._hidden)
+            self._left = False
         self._remove_half()
 
     def _remove_half(self) -> None:
@@ -134,13 +131,10 @@ class OutputFolder:
         Raises:
             InputError: it cannot be made.
         """
-        name = f".{self.target.name}.hvi-{secrets.token_hex(4)}"
-        work = (self.target if os.path.ismount(self.target) else self.target.parent) / name
         with self.told(), self._closed_on_error():
-            self._lock.note(name)
-            work.mkdir()
-        self.work = work
-        return work
+            self._hidden.mkdir()
+        self.work = self._hidden
+        return self.work
 
     def announce(self, name: str) -> Path:
         """A file in the folder itself, to be written while the others are not there yet, and listed at once.

@@ -197,7 +197,8 @@ def test_without_flock_nothing_of_others_is_removed(tmp_path: Path, monkeypatch:
         raise OSError(38, "Function not implemented")
 
     monkeypatch.setattr("fcntl.flock", refused)
-    written(tmp_path / "r", summary="1")
+    with pytest.raises(InputError, match="File exists"):
+        written(tmp_path / "r", summary="1")
     assert work.is_dir()
 
 
