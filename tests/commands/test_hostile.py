@@ -14,7 +14,7 @@ from hostile import driver
 
 pytestmark = pytest.mark.long
 
-SEED, CASES = int(os.environ.get("HVI_SEED", "1")), int(os.environ.get("HVI_CASES", "54"))
+SEED, CASES = int(os.environ.get("HVI_SEED", "1")), int(os.environ.get("HVI_CASES", "24"))
 
 
 def test_hostile_inputs_are_refused_or_solved(tmp_path: Path) -> None:

@@ -54,12 +54,3 @@ def write(folder: Path, content: Table | str | None = None, name: str = SCENE) -
     found = table() if content is None else content
     text = found if isinstance(found, str) else tomli_w.dumps(found)
     (folder / name).write_bytes(text.encode("utf-8", "surrogateescape"))
-
-
-def odd_name(chance: random.Random) -> str:
-    """A name that file systems allow and programs dislike."""
-    shells = [" ", "a b", "it's", 'a"b', "a;touch HARM", "$(touch HARM)", "`touch HARM`", "-x", "--help", "~", "*", "?"]
-    controls = ["a\nb", "a\tb", "a\rb", "a\x1b[31mb", "a\x7fb", "\u202egnp", "\udce9", "é", "e\u0301", "𝟙"]
-    formats = ["%s%n", "{0}", "a\\b", "[red]a[bold]", "<b>&amp;", "#a", "a,b", "a=b", "a:b"]
-    dots = ["a.", "a..b", ".hidden", "a.tar.toml", "CON", "x" * 200]
-    return chance.choice([*shells, *controls, *formats, *dots])

@@ -25,11 +25,11 @@ from runs import command
 from hvi_fenicsx.cli import main
 from hvi_fenicsx.runtime.processes import SIGNALS
 
-from . import folders, meshes, plugins, surroundings, texts
+from . import folders, surroundings
 from .case import Case
 from .judge import Outcome, faults, owned, snapshot
 
-KINDS = [*meshes.KINDS, *texts.KINDS, *plugins.KINDS, *folders.KINDS, *surroundings.KINDS]
+KINDS = [*folders.KINDS, *surroundings.KINDS]
 LIMIT = 200.0
 """Seconds that a case may take in a process of its own."""
 
