@@ -106,6 +106,10 @@ def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
 def save(path: Path, arrays: SolutionArrays) -> None:
     """Write a solution, whole or not at all.
 
+    Args:
+        path: the file.
+        arrays: the solution.
+
     Raises:
         NotWrittenError: it cannot be written.
     """

@@ -19,7 +19,7 @@ from hvi_fenicsx import prepare, read_scene
 from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.load_path import LoadPath
 from hvi_fenicsx.path.following import Control, PathRun
-from hvi_fenicsx.runtime import journal
+from hvi_fenicsx.results import path_files
 from hvi_fenicsx.runtime.journal import Record
 from hvi_fenicsx.scene import PathTable
 
@@ -55,7 +55,7 @@ def test_the_strength_of_a_short_glued_bar_and_what_the_folder_holds(tmp_path: P
     assert (out / "path.csv").read_text(encoding="utf-8").splitlines()[0] == COLUMNS
     assert rows(out)[0]["event"] == "start"
     assert {f.name for f in out.iterdir()} >= {"path.png", "displacement.pvd", "scene.toml", "run.log", "report.html"}
-    assert journal.NAME not in {f.name for f in out.iterdir()}
+    assert path_files.JOURNAL not in {f.name for f in out.iterdir()}
     refused = hvi("path", BAR, "--out", out, *SHORT)
     assert refused.returncode == 2
     assert "already holds a result" in refused.stderr
@@ -187,7 +187,7 @@ def test_a_killed_path_is_resumed_to_the_same_rows(
     if seed % 2:
         time.sleep(chance.uniform(0.0, duration))
     else:
-        wait_for(process, out / journal.NAME, chance.randrange(200, 20_000))
+        wait_for(process, out / path_files.JOURNAL, chance.randrange(200, 20_000))
     process.send_signal(signal.SIGKILL)
     process.wait()
     done = hvi(*KILLED, "--out", out, "--resume")
