@@ -202,7 +202,7 @@ def accuracy(reached: AccuracyResult) -> Iterator[str]:
         yield f"accuracy not reached: {reached.why}"
     if not steps:
         return
-    last, asked = steps[-1], "" if goal.accuracy is None else f" ({_part(goal.accuracy)} was asked for)"
+    last, asked = steps[-1], f" ({_part(goal.accuracy)} was asked for)"
     what = quantities.find(goal.quantity).description
     epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
     yield (

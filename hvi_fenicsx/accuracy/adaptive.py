@@ -13,10 +13,13 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..certify.estimate import boundary_data, bubbles
 from ..certify.estimate.estimator import Estimate
-from ..mesh import refinement
+from ..certify.estimate.thresholds import DEFAULT as SAMPLING
+from ..mesh import nodes, refinement
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
+from ..problem.problem import Problem
 from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
@@ -25,10 +28,12 @@ from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import refined_levels
 from ..system.levels import Level, Levels
-from ..typing import Entities
+from ..typing import Array, Entities
 from ..workflow import DEFAULT, Preparation, Solution, Thresholds, find_solution, prepare
-from . import first_mesh
 from .thresholds import CONTROL, ControlThresholds
+
+_ROUNDING = float(np.sqrt(np.finfo(float).eps))
+"""Deviations so small beside the largest value are rounding."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,8 +119,8 @@ class AdaptiveSolver:
         """
         comm = domain.mesh.comm
         prepared = prepare(scene, comm, self.timer, domain, thresholds=self.thresholds)
-        while prepared.system.dofs < thresholds.first_unknowns:
-            cells = first_mesh.unresolved(prepared.problem, thresholds)
+        while prepared.system.dofs < thresholds.small:
+            cells = unresolved(prepared.problem, thresholds)
             if not comm.allreduce(len(cells)):
                 break
             domain = refinement.marked(prepared.problem.domain, cells).domain
@@ -210,7 +215,7 @@ def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
         return refinement.marked(domain, marked(level.comm, estimate, bulk))
 
 
-def refined_with_neighbours(level: AdaptiveLevel, share: float, thresholds: ControlThresholds = CONTROL) -> Refinement:
+def refined_with_neighbours(level: AdaptiveLevel, share: float) -> Refinement:
     """Refine a part of the squared error, including the neighbours that are cut with marked cells. Collective.
 
     On coarse meshes these neighbours are many: with that part marked, far more than it would be refined.
@@ -218,15 +223,10 @@ def refined_with_neighbours(level: AdaptiveLevel, share: float, thresholds: Cont
     Args:
         level: the mesh, with its estimate.
         share: part of the squared error to be refined in all.
-        thresholds: how near to that part is near enough.
     """
-    bulk, step = share, refined(level, share)
-    for _ in range(thresholds.corrections):
-        if (reached := _refined_share(level, step, bulk)) <= thresholds.close * share:
-            break
-        bulk *= share / reached
-        step = refined(level, bulk)
-    return step
+    step = refined(level, share)
+    reached = _refined_share(level, step, share)
+    return step if reached <= share else refined(level, share * share / reached)
 
 
 def _refined_share(level: AdaptiveLevel, step: Refinement, bulk: float) -> float:
@@ -260,3 +260,32 @@ def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:
 def coarsest(scene: Scene) -> Scene:
     """The scene on the mesh to begin with: its own, made coarser as far as its shape allows."""
     return scene.changed(domain=scene.domain.coarsest())
+
+
+def unresolved(problem: Problem, thresholds: ControlThresholds = CONTROL) -> Entities:
+    """The owned cells at whose facets data vary otherwise than linearly, while on the part they do so. Collective.
+
+    What no mesh has seen no estimate is sure of: a gap is first of all known at vertices. A load that jumps at one
+    place does so within one facet of any mesh: it is the part as a whole that decides.
+
+    Args:
+        problem: the data and the mesh.
+        thresholds: which deviation is too much.
+    """
+    space = bubbles.space(problem.space.mesh, nodes.degree(problem.space))
+    found: list[Entities] = [np.empty(0, dtype=np.int32)]
+    for facets, value in boundary_data.everything(problem):
+        at = boundary_data.sample(problem, space, facets, SAMPLING)
+        squares, area = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas
+        allowed = _allowed(problem.domain.mesh.comm, at.of(value), thresholds) ** 2
+        whole, deviation = (total(problem.domain.mesh.comm, float(np.sum(x))) for x in (area, area * squares))
+        if deviation > allowed * whole:
+            found.append(at.facets.cells[squares > allowed])
+    return np.unique(np.concatenate(found)).astype(np.int32)
+
+
+def _allowed(comm: MPI.Comm, values: Array, thresholds: ControlThresholds) -> float:
+    """The root mean square deviation that sampled values of a part may have. Collective."""
+    low = comm.allreduce(float(np.min(values, initial=np.inf)), op=MPI.MIN)
+    high = comm.allreduce(float(np.max(values, initial=-np.inf)), op=MPI.MAX)
+    return max(thresholds.unresolved * (high - low), _ROUNDING * max(abs(low), abs(high)))

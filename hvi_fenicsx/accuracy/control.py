@@ -1,18 +1,27 @@
-"""Solve to a given accuracy, or within a given time: degree, mesh, ε and tolerances follow from the estimated error."""
+"""Solve to a given accuracy: degree, mesh, ε and tolerances follow from the estimated error."""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from mpi4py import MPI
 
+from ..mesh import nodes
+from ..mesh.domain import Domain
+from ..runtime import memory
+from ..runtime.mpi import largest
 from ..scene import Scene
-from . import degree_choice
-from .adaptive import AdaptiveSolver
-from .adaptive_run import AdaptiveRun
-from .goal import AccuracyResult, DegreeChoice, Goal
+from . import adaptive, quantities
+from .adaptive import AdaptiveLevel, AdaptiveSolver
+from .error_balance import Elements, ErrorBalance
+from .goal import AccuracyResult, AdaptiveStep, DegreeChoice, Goal
 from .thresholds import CONTROL, ControlThresholds
+
+_LARGEST = 2**31 - 1
+"""Unknowns that PETSc's default integers can number."""
 
 
 def solve_to_goal(
@@ -31,7 +40,7 @@ def solve_to_goal(
         goal: what is asked for.
         solver: timer, progress and interruption.
         report: called with a line about each mesh.
-        thresholds: how mesh, smoothing and tolerance follow from the error.
+        thresholds: how degree, mesh and smoothing follow from the error.
 
     Raises:
         InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
@@ -50,25 +59,196 @@ def solve_to_goal(
         run.begin()
         return run
 
-    run, choice = _begun(scene, begun, quadratic=degree_choice.at_once(goal, domain))
+    run, choice = _at_cheaper_degree(scene, goal, domain, begun, thresholds)
     if choice is not None:
         report(str(choice))
     found = run.finish()
     return replace(found, solution=replace(found.solution, scene=scene), choice=choice)
 
 
-def _begun(
-    scene: Scene, begun: Callable[[int], AdaptiveRun], *, quadratic: bool
+def _at_cheaper_degree(
+    scene: Scene, goal: Goal, domain: Domain, begun: Callable[[int], AdaptiveRun], thresholds: ControlThresholds
 ) -> tuple[AdaptiveRun, DegreeChoice | None]:
-    """The run on its first mesh, and how its degree was chosen where both were tried. Collective."""
+    """The run on its first mesh, and how its degree was chosen where both were tried. Collective.
+
+    A run begins at degree 2 where the first mesh is small: there to try degree 1 first costs as much. Else both are
+    solved on the first mesh, and from its error each is expected to converge at its best rate.
+    """
     if scene.solver.degree is not None:
         return begun(scene.solver.degree), None
-    other = begun(2) if quadratic else None
-    if other is not None and other.steps and other.quantity.known_from_one_mesh:
-        return other, None
-    run = begun(1)
-    if not degree_choice.worthwhile(run):
-        return run, None
-    other = other or begun(2)
-    choice = degree_choice.between(run, other)
-    return (other if choice.degree == 2 else run), choice
+    unknowns = domain.dimension * nodes.count(domain.mesh, 2)
+    quadratic = None
+    if quantities.find(goal.quantity).estimated and unknowns <= thresholds.small:
+        quadratic = begun(2)
+        if quadratic.steps and quadratic.quantity.known_from_one_mesh:
+            return quadratic, None
+    linear = begun(1)
+    undecided = linear.open and linear.steps and linear.quantity.known_from_one_mesh
+    if not undecided or Elements(dimension=domain.dimension, degree=2).memory(unknowns) > linear.room:
+        return linear, None
+    quadratic = quadratic or begun(2)
+    choice = DegreeChoice(unknowns={1: linear.needed(), 2: quadratic.needed()}, price=thresholds.price)
+    return (quadratic if choice.degree == 2 else linear), choice
+
+
+@dataclass(kw_only=True)
+class AdaptiveRun:
+    """One run to a goal at one degree. Everything it decides on is the same on all ranks.
+
+    Attributes:
+        scene: what to solve; its ε is the largest.
+        domain: the body on the first mesh (:meth:`.AdaptiveSolver.first_domain`).
+        goal: what is asked for.
+        solver: timer, progress and interruption.
+        report: called with a line about each mesh.
+        thresholds: how mesh and smoothing follow from the error.
+        steps: the meshes whose error is known.
+    """
+
+    scene: Scene
+    domain: Domain
+    goal: Goal
+    solver: AdaptiveSolver
+    report: Callable[[str], None]
+    thresholds: ControlThresholds = CONTROL
+    steps: list[AdaptiveStep] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.comm: MPI.Comm = self.domain.mesh.comm
+        self.elements = Elements(dimension=self.scene.dimension, degree=self.scene.solver.degree or 1)
+        self.room = memory.room(self.comm) - memory.peak(self.comm)
+        self.quantity = quantities.find(self.goal.quantity)()
+        self.solver = replace(self.solver, existence=self.quantity.needs_existence)
+        self.balance = ErrorBalance(
+            accuracy=self.goal.accuracy, quantity=self.quantity, elements=self.elements, thresholds=self.thresholds
+        )
+        self._failures = 0
+        self._why: str | None = None
+        self.level: AdaptiveLevel
+        self._estimated: AdaptiveLevel | None = None
+
+    def begin(self) -> None:
+        """Solve on the first mesh, the coarsest that sees the data. Collective.
+
+        Raises:
+            InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
+        """
+        start = time.perf_counter()
+        self.level = self.solver.begin_resolved(adaptive.coarsest(self.scene), self.domain, self.thresholds)
+        self._why = self._record(self.level, start)
+
+    @property
+    def open(self) -> bool:
+        """Whether there is more to do."""
+        return self._why is None and not (self._known and self.steps[-1].error <= self.goal.accuracy)
+
+    @property
+    def _known(self) -> bool:
+        """Whether the last mesh has an error."""
+        return bool(self.steps) and not self._failures
+
+    def needed(self) -> float:
+        """The unknowns that the accuracy takes at the best rate of convergence; infinite where no error is known."""
+        error = self.steps[-1].error if self.steps else math.inf
+        return self.elements.needed(self.level.dofs, error / self.goal.accuracy, self.quantity)
+
+    def finish(self) -> AccuracyResult:
+        """Refine until the goal is reached, or cannot be. Collective."""
+        while self.open:
+            start = time.perf_counter()
+            interrupted = self._estimated is not None and self.solver.interrupted()
+            found = "interrupted" if interrupted else self._next(self.level)
+            if not isinstance(found, str) and self._estimated is not None and _is_stopped(found):
+                found = "interrupted"
+            if not isinstance(found, str):
+                self.level = found
+                self._why = self._record(found, start)
+                continue
+            self._why = found
+            if found == "interrupted" and self._estimated is not None:  # the last mesh with an error is given
+                self.level, self._failures = self._estimated, 0
+                self.report(found)
+        return AccuracyResult(
+            goal=self.goal,
+            level=self.level,
+            solution=self.level.solution,
+            degree=self.elements.degree,
+            steps=tuple(self.steps),
+            why=self._why,
+            interrupted=self._why is not None and self.solver.interrupted(),
+        )
+
+    def _record(self, level: AdaptiveLevel, start: float) -> str | None:
+        """Record a level; why to stop at it, or None. Collective."""
+        solution = level.solution
+        if solution.solve_result is None or solution.solve_result.interrupted:
+            return solution.reason
+        self.quantity.add(level)
+        if solution.estimate is None and solution.converged:
+            return "the error of a law whose energy of separation depends on the mode is not estimated"
+        if solution.estimate is None:
+            self._failures += 1
+            self.report(f"{level.dofs:,} unknowns: {solution.reason}")
+            return solution.reason if self._failures >= self.thresholds.failures else None
+        self._failures, self._estimated = 0, level
+        self.steps.append(self._step(level, largest(self.comm, time.perf_counter() - start)))
+        self.report(_line(len(self.steps), self.steps[-1], self.solver.timer.total))
+        return None
+
+    def _step(self, level: AdaptiveLevel, seconds: float) -> AdaptiveStep:
+        estimate = level.solution.estimate
+        assert estimate is not None
+        norm, smoothing = estimate.energy_norm or 1.0, self.quantity.smoothing()
+        return AdaptiveStep(
+            dofs=level.dofs,
+            error=self.quantity.error(),
+            discretisation=estimate.discretisation / norm,
+            smoothing=smoothing,
+            algebraic=estimate.algebraic / norm,
+            epsilon=level.solution.epsilon,
+            tolerance=level.solution.scene.solver.tolerance,
+            seconds=seconds,
+            memory=memory.peak(self.comm),
+        )
+
+    def _next(self, level: AdaptiveLevel) -> AdaptiveLevel | str:
+        """The next level, or why there is none. Collective."""
+        if self._known and math.isfinite(self.steps[-1].error) and (too_many := self._too_many(self.needed())):
+            return too_many
+        scene = level.solution.scene
+        if self.steps:
+            scene = self.balance.next_scene(scene, self.steps[-1])
+        if self._known and self.balance.mesh_suffices(self.steps):
+            return self.solver.again(level, scene)
+        most = self.balance.largest_bulk
+        bulk = self.balance.bulk(self.steps[-1]) if self._known else most
+        refined = adaptive.refined(level, bulk) if bulk == most else adaptive.refined_with_neighbours(level, bulk)
+        unknowns = refined.domain.dimension * nodes.count(refined.domain.mesh, self.elements.degree)
+        return self._too_many(unknowns) or self.solver.refine(level, refined, scene, self.quantity.ahead())
+
+    def _too_many(self, dofs: float) -> str | None:
+        """Why so many unknowns cannot be solved for; None where they can."""
+        needed = self.elements.memory(dofs)
+        if dofs <= _LARGEST and needed <= self.room:
+            return None
+        if not math.isfinite(dofs):
+            return f"{self.goal.accuracy:g} is beyond any number of unknowns"
+        return (
+            f"{self.goal.accuracy:g} would need {dofs:.1e} unknowns or more and {needed / 1024:.3g} GB; "
+            f"{self.room / 1024:.3g} GB can be used"
+        )
+
+
+def _is_stopped(level: AdaptiveLevel) -> bool:
+    """Whether a solve was stopped by a signal."""
+    result = level.solution.solve_result
+    return result is not None and result.interrupted
+
+
+def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:
+    width = "" if step.epsilon is None else f", ε {step.epsilon:.2g}"
+    error = f"error {step.error:.2e}" if math.isfinite(step.error) else "no error yet"
+    return (
+        f"mesh {level}: {step.dofs:,} unknowns, {error} (energy norm: mesh {step.discretisation:.1e}, smoothing "
+        f"{step.smoothing:.1e}, solver {step.algebraic:.1e}), tolerance {step.tolerance:.0e}{width}, {elapsed:.1f} s"
+    )

@@ -6,10 +6,43 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..runtime import memory
 from ..scene import Scene
-from .cost_forecast import AdaptiveStep, Elements
+from .goal import AdaptiveStep
 from .quantity_base import Quantity
-from .thresholds import ControlThresholds
+from .thresholds import CONTROL, ControlThresholds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elements:
+    """What elements are refined.
+
+    Attributes:
+        dimension: d, 2 or 3.
+        degree: p, 1 or 2.
+    """
+
+    dimension: int
+    degree: int = 1
+
+    def memory(self, dofs: float) -> float:
+        """What so many unknowns take, about, on meshes refined where the error is, MB."""
+        known = memory.DEFAULT
+        return dofs * known.adaptive[self.dimension] * known.of_degree[self.degree] / 1024
+
+    def needed(self, dofs: int, times: float, quantity: Quantity) -> float:
+        """The unknowns that an error so many times smaller takes, at the best rate of convergence.
+
+        Args:
+            dofs: unknowns now.
+            times: the error now over the one wanted.
+            quantity: whose error it is.
+        """
+        rate = quantity.power_of_energy * self.degree / self.dimension
+        with np.errstate(over="ignore"):
+            return float(dofs * np.maximum(1.0, np.float64(times)) ** (1.0 / rate))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,23 +52,23 @@ class ErrorBalance:
     The mesh has the largest part; smoothing and solver get what is small beside it.
 
     Attributes:
-        accuracy: what is asked for, relative; None: as small as the time allows.
+        accuracy: what is asked for, relative.
         quantity: the target quantity.
         elements: that are refined.
         thresholds: how the parts are balanced.
     """
 
-    accuracy: float | None
+    accuracy: float
     quantity: Quantity
     elements: Elements
-    thresholds: ControlThresholds
+    thresholds: ControlThresholds = CONTROL
 
     @property
     def largest_bulk(self) -> float:
         """Part of the squared error that a step refines, unless it is the last one."""
-        if self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm:
-            return self.thresholds.bulk_on_contact
-        return self.thresholds.bulk_2d if self.elements.dimension == 2 else self.thresholds.bulk_3d
+        on_contact = self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm
+        in_plane = self.elements.dimension == 2 and not on_contact
+        return self.thresholds.bulk_in_plane if in_plane else self.thresholds.bulk
 
     def bulk(self, last: AdaptiveStep) -> float:
         """Part of the squared error to refine: no more than the aim needs.
@@ -43,13 +76,13 @@ class ErrorBalance:
         Args:
             last: the last step.
         """
-        if self.accuracy is None or not self.quantity.known_from_one_mesh:
-            return self.largest_bulk
         mesh, smoothing, _ = self.quantity.parts(last)
-        left = self._beside(smoothing) / mesh if mesh > 0 else 1.0
+        if not self.quantity.known_from_one_mesh or mesh <= 0.0:
+            return self.largest_bulk
+        left = self._beside(smoothing) / mesh
         # On Γc errors fall as the square of the energy norm's. Halving the edges of marked cells leaves 4^-p of it.
         needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.elements.degree)
-        return max(self.thresholds.smallest_bulk, needed) if needed <= self._largest_last_bulk else self.largest_bulk
+        return needed if 0.0 < needed <= self._largest_last_bulk else self.largest_bulk
 
     @property
     def _largest_last_bulk(self) -> float:
@@ -59,7 +92,7 @@ class ErrorBalance:
 
     def _beside(self, part: float) -> float:
         """The largest error beside a part with which both together are no larger than the aim."""
-        return math.sqrt(max((self.thresholds.aim * (self.accuracy or 0.0)) ** 2 - part**2, 0.0))
+        return math.sqrt(max((self.thresholds.aim * self.accuracy) ** 2 - part**2, 0.0))
 
     def mesh_suffices(self, steps: Sequence[AdaptiveStep]) -> bool:
         """Whether the next step must change ε or the tolerance, and not the mesh.
@@ -70,7 +103,7 @@ class ErrorBalance:
         mesh, smoothing, algebraic = self.quantity.parts(steps[-1])
         if smoothing > max(mesh, self._allowed_smoothing(mesh)):
             return self._smoothing_falls(steps)
-        wanted = self.thresholds.aim * (self.accuracy or 0.0)
+        wanted = self.thresholds.aim * self.accuracy
         return mesh <= wanted < max(smoothing, algebraic) * 2
 
     @staticmethod
@@ -81,8 +114,6 @@ class ErrorBalance:
 
     def _allowed_smoothing(self, mesh: float) -> float:
         """The error that smoothing may cause: a part of the accuracy, or all that a fine enough mesh leaves."""
-        if self.accuracy is None:
-            return self.thresholds.smoothing * mesh
         return max(self.thresholds.smoothing * self.accuracy, self._beside(mesh))
 
     def next_scene(self, scene: Scene, last: AdaptiveStep) -> Scene:
@@ -93,37 +124,10 @@ class ErrorBalance:
             last: the last step.
         """
         mesh, smoothing, _ = self.quantity.parts(last)
-        allowed = self._allowed_smoothing(mesh)
-        factor = max(0.8 * allowed / smoothing, self.thresholds.narrowest_step) if smoothing > allowed else 1.0
-        return narrowed(with_tolerance(scene, self._next_tolerance(last)), factor)
-
-    def _next_tolerance(self, last: AdaptiveStep) -> float:
-        estimate = last.discretisation if self.accuracy is None else self.accuracy
-        error = min(last.error, max(last.discretisation, estimate))
-        wanted = self.thresholds.algebraic * (error if self.quantity.in_energy_norm else min(error, estimate))
-        if last.algebraic > 0.1 * max(last.discretisation, estimate):
-            wanted = min(wanted, 0.1 * last.tolerance)
-        return min(max(wanted, self.thresholds.finest_tolerance), self.thresholds.coarsest_tolerance)
-
-
-def with_tolerance(scene: Scene, tolerance: float) -> Scene:
-    """The scene with another tolerance of the solver.
-
-    Args:
-        scene: what to solve.
-        tolerance: relative.
-    """
-    return scene.with_solver(tolerance=tolerance)
-
-
-def narrowed(scene: Scene, factor: float) -> Scene:
-    """The scene with a smaller ε; the same where it does not smooth.
-
-    Args:
-        scene: what to solve.
-        factor: on ε.
-    """
-    solver = scene.solver
-    widths = {name: getattr(solver, name) for name in ("epsilon", "epsilon_absolute")}
-    changed = {name: factor * width for name, width in widths.items() if width is not None}
-    return scene.with_solver(**changed)
+        solver, values = scene.solver, dict[str, float]()
+        if smoothing > self._allowed_smoothing(mesh):
+            widths = {name: getattr(solver, name) for name in ("epsilon", "epsilon_absolute")}
+            values = {name: self.thresholds.narrower * width for name, width in widths.items() if width is not None}
+        if 10 * last.algebraic > max(last.discretisation, self.accuracy):
+            values["tolerance"] = solver.tolerance / 10
+        return scene.with_solver(**values)

@@ -1,34 +1,62 @@
-"""What accuracy is asked for, and the result of a run to it."""
+"""What accuracy is asked for, the steps to it, and the result."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..errors import ExitCode
 from ..workflow import Solution
 from .adaptive import AdaptiveLevel
-from .cost_forecast import AdaptiveStep, Cost
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What is asked for: an accuracy of a quantity, or the best within a time, or both.
+    """What is asked for.
 
     Attributes:
-        accuracy: relative error; None: as small as the time allows.
+        accuracy: relative error.
         quantity: name of the target quantity.
-        seconds: time budget, s; None: no limit.
     """
 
-    accuracy: float | None
+    accuracy: float
     quantity: str = "energy"
-    seconds: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """For ``summary.json``."""
-        return {"requested": self.accuracy, "quantity": self.quantity, "time_budget": self.seconds}
+        return {"requested": self.accuracy, "quantity": self.quantity}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdaptiveStep:
+    """One adaptive step: its cost and what it gave.
+
+    Attributes:
+        dofs: unknowns.
+        error: estimated, relative, of the quantity asked for (infinite: none yet).
+        discretisation: the mesh's part of the error in the energy norm, relative.
+        smoothing: smoothing's part of the quantity's error, relative.
+        algebraic: the solver's part of the error in the energy norm, relative.
+        epsilon: relative width of the smoothing, or None.
+        tolerance: of the solver.
+        seconds: wall time of this step.
+        memory: the program's peak so far, MB.
+    """
+
+    dofs: int
+    error: float
+    discretisation: float
+    smoothing: float
+    algebraic: float
+    epsilon: float | None
+    tolerance: float
+    seconds: float
+    memory: float
+
+    def as_dict(self) -> dict[str, float | None]:
+        """For ``summary.json``."""
+        return asdict(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +64,17 @@ class DegreeChoice:
     """The degree that was chosen, and why.
 
     Attributes:
-        degree: 1 or 2.
-        unknowns: that each degree is forecast to need.
+        unknowns: that each degree is expected to need.
+        price: how many times as much an unknown of degree 2 costs as one of degree 1.
     """
 
-    degree: int
     unknowns: Mapping[int, float]
+    price: float
+
+    @property
+    def degree(self) -> int:
+        """1 or 2."""
+        return 2 if self.price * self.unknowns[2] < self.unknowns[1] else 1
 
     def __str__(self) -> str:
         needed = ", ".join(f"degree {degree} about {count:.1e}" for degree, count in self.unknowns.items())
@@ -59,8 +92,6 @@ class AccuracyResult:
         degree: of the elements.
         steps: all adaptive steps.
         why: why it ended without reaching the goal; None where it was reached.
-        more: what the accuracy asked for would cost, or a tenth of the error where it was reached or none was asked;
-            None where no error is known.
         interrupted: whether it ended because it was to stop.
         choice: how the degree was chosen; None where the scene states it, or there was no choice.
     """
@@ -71,17 +102,15 @@ class AccuracyResult:
     degree: int
     steps: tuple[AdaptiveStep, ...]
     why: str | None
-    more: Cost | None
     interrupted: bool
     choice: DegreeChoice | None = None
 
     @property
     def exit_code(self) -> int:
         """The solution's, or *interrupted* or *not converged* where the accuracy was not reached."""
-        missed = self.goal.accuracy is not None and self.why is not None
         if self.interrupted and not self.solution.exit_code:
             return ExitCode.INTERRUPTED
-        return self.solution.exit_code or (ExitCode.NOT_CONVERGED if missed else ExitCode.CERTIFIED)
+        return self.solution.exit_code or (ExitCode.NOT_CONVERGED if self.why else ExitCode.CERTIFIED)
 
     def as_dict(self) -> dict[str, Any]:
         """For ``summary.json``."""
@@ -95,6 +124,5 @@ class AccuracyResult:
             "unknowns_needed": self.choice and {f"degree_{p}": count for p, count in self.choice.unknowns.items()},
             "tolerance": last.tolerance if last else None,
             "epsilon": last.epsilon if last else None,
-            "ten_times_more": self.more.as_dict() if self.more else None,
             "levels": [step.as_dict() for step in self.steps],
         }

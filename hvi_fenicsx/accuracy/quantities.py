@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..certify.contact_state import ContactState
     from ..certify.estimate.contact_errors import ContactErrors
     from .adaptive import AdaptiveLevel
-    from .cost_forecast import AdaptiveStep
+    from .goal import AdaptiveStep
 
 
 class EnergyNorm(Quantity):

@@ -17,13 +17,20 @@ import numpy as np
 from ..class_registry import enter
 from ..errors import InputError
 from ..typing import Array
-from .thresholds import EXTRAPOLATION, ExtrapolationThresholds
 
 if TYPE_CHECKING:
     from dolfinx import fem
 
     from .adaptive import AdaptiveLevel
-    from .cost_forecast import AdaptiveStep
+    from .goal import AdaptiveStep
+
+ORDERS = (0.5, 2.0)
+"""The orders of convergence in h that are believed of a quantity: P1 has no larger one."""
+SAFETY = (1.25, 3.0)
+"""Safety factors of its error, where the order was observed and where it is assumed to be 1 (Roache 1994)."""
+
+_APART = math.sqrt(2)
+"""Ratio of the sizes of two meshes from which a difference tells something: twice the unknowns in the plane."""
 
 
 class Quantity(ABC):
@@ -118,9 +125,8 @@ class Observable(Quantity):
 
     power: ClassVar[int] = 2
 
-    def __init__(self, thresholds: ExtrapolationThresholds = EXTRAPOLATION) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._thresholds = thresholds
         self._values: list[MeshValue] = []
 
     @abstractmethod
@@ -161,17 +167,15 @@ class Observable(Quantity):
     def _change(self) -> float:
         """The error without smoothing's part. Collective."""
         own, *others = reversed(self._values)
-        least = self._thresholds.apart
-        apart = [other for other in others if other.size >= least * own.size]
+        apart = [other for other in others if other.size >= _APART * own.size]
         if not apart:
             return np.inf
         near = apart[0]
-        far = next((v for v in apart if v.size >= least * near.size), None)
+        far = next((v for v in apart if v.size >= _APART * near.size), None)
         largest = self._norm(own, None) or 1.0
         change = self._norm(own, near) / largest
         further = None if far is None else self._norm(own, far) / largest
-        sizes = own.size, near.size, far.size if far else np.nan
-        return extrapolated(sizes, change, further, self._thresholds)
+        return extrapolated((own.size, near.size, far.size if far else np.nan), change, further)
 
     def _norm(self, own: MeshValue, other: MeshValue | None) -> float:
         if isinstance(own.value, np.ndarray):
@@ -180,28 +184,21 @@ class Observable(Quantity):
         return contact_norm(self._last, difference, self.power)
 
 
-def extrapolated(
-    sizes: Sequence[float],
-    change: float,
-    further: float | None,
-    thresholds: ExtrapolationThresholds = EXTRAPOLATION,
-) -> float:
+def extrapolated(sizes: Sequence[float], change: float, further: float | None) -> float:
     """The error of a quantity on the finest of three meshes.
 
     Args:
         sizes: of the meshes, the finest first.
         change: of the quantity from the second to the first.
         further: the change from the third to the first; None where there is no third.
-        thresholds: which orders are believed, and the safety factors.
     """
     if change == 0.0:
         return 0.0
-    order = 1.0 if further is None else _order(sizes, further / change, thresholds)
-    safety = thresholds.assumed_safety if further is None else thresholds.observed_safety
-    return safety * change / ((sizes[1] / sizes[0]) ** order - 1.0)
+    order = 1.0 if further is None else _order(sizes, further / change)
+    return SAFETY[further is None] * change / ((sizes[1] / sizes[0]) ** order - 1.0)
 
 
-def _order(sizes: Sequence[float], ratio: float, thresholds: ExtrapolationThresholds) -> float:
+def _order(sizes: Sequence[float], ratio: float) -> float:
     """The order p at which (h3^p - h1^p)/(h2^p - h1^p) has this value, within what P1 can have."""
     from scipy.optimize import brentq
 
@@ -210,10 +207,9 @@ def _order(sizes: Sequence[float], ratio: float, thresholds: ExtrapolationThresh
     def excess(order: float) -> float:
         return float((far**order - 1.0) / (near**order - 1.0) - ratio)
 
-    low, high = thresholds.lowest_order, thresholds.highest_order
-    if excess(low) > 0:
-        return low
-    return high if excess(high) < 0 else float(brentq(excess, low, high))
+    if excess(ORDERS[0]) > 0:
+        return ORDERS[0]
+    return ORDERS[1] if excess(ORDERS[1]) < 0 else float(brentq(excess, *ORDERS))
 
 
 def contact_norm(level: AdaptiveLevel, values: Array, power: int) -> float:

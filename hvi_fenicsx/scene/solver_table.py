@@ -45,7 +45,7 @@ class SolverTable(Table):
 
     degree: Annotated[Degree | None, BeforeValidator(_degree)] = None
     """the degree of the elements: 1, or 2, which needs far fewer unknowns for the same accuracy; without it 1, but with
-    `--accuracy` or `--time-budget` the cheaper one"""
+    `--accuracy` the cheaper one"""
     method: str = "auto"
     """the method: auto chooses linear, convex or branch by the effects; branch solves the exact law; condensed is the
     procedure of the paper; snes_vi is for comparison; or the name of your own method"""

@@ -34,7 +34,6 @@ LIMIT = 600.0
 OPTIONS = (
     "--accuracy",
     "--quantity",
-    "--time-budget",
     "--axis",
     "--repeat",
     "--limit",
