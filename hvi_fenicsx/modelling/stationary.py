@@ -14,7 +14,6 @@ from ..runtime.mpi import time_over
 from ..scene import Scene
 from ..stationary_points import bodies
 from ..stationary_points.found import Found
-from ..stationary_points.passes import Pass
 from ..stationary_points.progress_words import Clock, certified_in_words
 from ..workflow import Solution
 from .model import Model
@@ -37,8 +36,6 @@ class Equilibria:
         proven: whether what was asked for is proven.
         nodes: boxes that were bounded or tested.
         reason: how the search ended, for people.
-        passes: the saddles that join two of the minimisers, by numbers of the solutions from 0; the barrier is the
-            difference of their energies.
     """
 
     solutions: tuple[ModelSolution, ...]
@@ -49,7 +46,6 @@ class Equilibria:
     proven: bool
     nodes: int
     reason: str
-    passes: tuple[Pass, ...]
 
     def __repr__(self) -> str:
         found = [f"{kind}: energy {one.energy:.10g}" for one, kind in zip(self.solutions, self.kinds, strict=True)]
@@ -69,7 +65,7 @@ def equilibria(
 
     Args:
         model: what to search; that all equilibria were found can be proven where the tractions of its laws are
-            polylines, or curves of one component each.
+            polylines of one component each.
         comm: the ranks of a scene; by default all. A model has those of its body.
         lowest: the lowest energy with a proof, instead of all equilibria.
         gap: what that proof may leave open, relative to the energy.
@@ -111,5 +107,4 @@ def _result(found: Found, solutions: Sequence[Solution], energy: float) -> Equil
         proven=found.proven,
         nodes=found.nodes,
         reason=found.reason,
-        passes=found.passes,
     )

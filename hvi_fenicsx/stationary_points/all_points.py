@@ -1,24 +1,24 @@
 """All stationary points: cells that no point satisfies are given up, the others divided until each has one at most.
 
 A cell gives each unknown an interval, or one joint of its law. It needs no division where its laws tell that it has one
-stationary point at most, and which (:mod:`.polyline_cells`, :mod:`.curved_cells`, :mod:`.smooth_proofs`). A drop is
-divided in three: before it, behind it, and on it, where the traction may have any value between. Of curved laws the
-tests that make cells smaller see polylines near the tractions, and allow for what these differ by. Where laws act on
-lengths, cells have intervals of these, too (:mod:`.length_cells`).
+stationary point at most, and which (:mod:`.polyline_cells`). A drop is divided in three: before it, behind it, and on
+it, where the traction may have any value between. Laws act on one component each, and their tractions are polylines.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from ..typing import Array
-from .boxes import Box
-from .component_cells import ComponentCells
-from .curved_laws import CurvedLaws
-from .divided import Cells
-from .length_cells import LengthCells
+from .balance_test import Look
+from .boxes import Box, fresh_box
+from .cell_parts import parts
+from .cell_tests import CellTests
 from .point_list import PointList, StationaryPoint
+from .polyline_cells import PolylineCells
 from .scalar_problem import ScalarProblem
 
 
@@ -27,32 +27,28 @@ class Enumeration:
     """A search for all stationary points.
 
     Attributes:
-        problem: the problem; of curved laws that of the polylines near them.
-        laws: the laws, where these are curved.
+        problem: the problem.
         cut: whether the test of a cell is to be cut short, since the search stops.
         points: found so far.
         cells: looked at so far.
         waiting: a stack of cells not yet decided.
-        undecided: cells too small to be divided that may have a point.
     """
 
     problem: ScalarProblem
-    laws: CurvedLaws | None = None
     cut: Callable[[], bool] = lambda: False
     points: PointList = field(init=False)
     cells: int = 0
     waiting: list[Box] = field(default_factory=list)
-    undecided: list[Box] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.points = PointList(self.problem.size, self.problem.thresholds.points.same)
-        self._cells: Cells = (
-            LengthCells(self.problem) if len(self.problem.lengths) else ComponentCells(self.problem, self.laws)
-        )
+        self._tests, self._laws = CellTests(self.problem), PolylineCells(self.problem)
 
     def start(self) -> None:
         """Begin with a cell that is far larger than the problem's displacements."""
-        cell = self._cells.first()
+        problem, far = self.problem, self.problem.far
+        low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
+        cell = self._tests.tightened(fresh_box(low, high, np.zeros(problem.size)))
         if cell is not None:
             self.waiting.append(cell)
 
@@ -67,32 +63,42 @@ class Enumeration:
             if stop():
                 return False
             self.cells += 1
-            found = self._cells.divided(self.waiting.pop(), self.points, self.cut)
-            for point in found.points:
-                self._enter(point)
-            self.undecided += found.undecided
-            self.waiting += found.parts
+            self._divide(self.waiting.pop())
             report(self)
         return True
 
-    @property
-    def open_cells(self) -> int:
-        """The number of cells that may hold further points."""
-        return len(self.undecided) + len(self.waiting)
-
     def enter(self, x: Array) -> None:
-        """Keep the stationary point at a place, or very near it, if there is one and it is new.
+        """Keep the stationary point at a place, if there is one and it is new.
 
         Args:
             x: the place, (n,).
         """
-        self._enter(self._cells.point(x))
+        self._enter(self._laws.point(x))
 
     def _enter(self, point: StationaryPoint | None) -> None:
-        if point is None or self.points.has(point.x):
-            return
-        k = self.points.nearest(point.x)
-        if k is None or not self._cells.joined(self.points.listed[k].x, point.x):
+        if point is not None and not self.points.has(point.x):
             self.points.add(point)
-        elif not point.isolated:
-            self.points.listed[k] = replace(self.points.listed[k], isolated=False)
+
+    def _divide(self, cell: Box) -> None:
+        """Test a cell, keep its point, and put the parts of what is left on the stack."""
+        look = self._looked(cell)
+        if look is None:
+            return
+        verdict = self._laws.verdict(look.cell)
+        self._enter(verdict.point)
+        if verdict.decided or self._tests.excludes(look.cell):
+            return
+        self.waiting += parts(self.problem, self._tests.pivots, look.cell, look.guide)
+
+    def _looked(self, cell: Box) -> Look | None:
+        """The cell made smaller, and where to divide it; None if no stationary point is in it."""
+        look, limits = None, self.problem.thresholds.cells
+        for _ in range(limits.most_looks):
+            if (tight := self._tests.tightened(cell)) is None:
+                return None
+            if (look := self._tests.weighed(tight, self.cut)) is None:
+                return None
+            cell = look.cell
+            if self.cut() or not np.any(cell.high - cell.low < limits.shorter_look * (tight.high - tight.low)):
+                break
+        return look

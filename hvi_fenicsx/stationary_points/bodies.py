@@ -109,10 +109,6 @@ class Equilibria:
         with self._prepared.timer("solve"):
             if self.problem.error and lowest and not wanted.no_lowest:
                 wanted = self._refined(self.problem, wanted, stop, report)
-            elif self.problem.error and not len(self.problem.lengths):
-                condensed = self._condensation.problem
-                near = scalar_problem(condensed, tractions=True, thresholds=self._thresholds)
-                wanted = replace(wanted, curved=CurvedLaws(near=near, problem=condensed))
             return find(self.problem, wanted, stop, report, saved, keep)
 
     @property
@@ -143,7 +139,7 @@ class Equilibria:
         return (self._condensation.restricted(found.solve_result.u),)
 
     def _exact(self, x: Array) -> StationaryPoint | None:
-        """The equilibrium near a point, where laws are polylines or act on lengths. Collective.
+        """The equilibrium near a point. Collective.
 
         Args:
             x: the point, (n,).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,17 +16,17 @@ from .boxes import Box
 from .scalar_problem import ScalarProblem
 
 
-def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guides: Sequence[Guide]) -> list[Box]:
+def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guide: Guide | None) -> list[Box]:
     """The parts of a cell, the one to look at first last; each has its share of the search.
 
     Args:
         problem: the problem.
         pivots: unknowns that fix the rigid motions.
         cell: the cell.
-        guides: where means are far from the graphs of laws and bounds; the first that tells is followed.
+        guide: where means are far from the graphs of laws and bounds; None where that is not known.
     """
     found = _far(problem, pivots, cell)
-    for guide in guides:
+    if guide is not None:
         found = found or _guided(problem, cell, guide)
     found = found or list(_any(problem, cell))
     return [replace(part, share=cell.share / len(found)) for part in found]

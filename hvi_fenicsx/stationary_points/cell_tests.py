@@ -1,4 +1,4 @@
-"""What tests leave of a cell: laws of one component each, of polylines or of curves that have polylines near them."""
+"""What tests leave of a cell."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from ..typing import Integers
 from . import monotone_radius
 from .balance_test import BalanceTest, Look
 from .boxes import Box
-from .curved_laws import CurvedLaws
 from .elastic_radius import ElasticRadius
 from .linear_test import LinearTest
 from .relaxation import Relaxation
@@ -25,20 +24,12 @@ class CellTests:
     """The tests of one problem.
 
     Args:
-        problem: the problem; of curved laws that of the polylines near them.
-        laws: the laws, where these are curved.
-        balance: of whole bodies, of the same stiffness; None: it is made.
-
-    Attributes:
         problem: the problem.
-        balance: of whole bodies.
     """
 
-    def __init__(
-        self, problem: ScalarProblem, laws: CurvedLaws | None = None, balance: RigidBalance | None = None
-    ) -> None:
+    def __init__(self, problem: ScalarProblem) -> None:
         self.problem, self._thresholds = problem, problem.thresholds.cells
-        self.balance = RigidBalance(problem, laws) if balance is None else balance.with_laws_of(problem)
+        self.balance = RigidBalance(problem)
         self._forces = ForceIntervals(problem, joints_at_ends=False)
         self._elastic = ElasticRadius(problem, self.balance)
         self._linear, self._relaxation = LinearTest(problem), Relaxation(problem)

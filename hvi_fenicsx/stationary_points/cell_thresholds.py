@@ -35,14 +35,6 @@ class CellThresholds:
         off_end: a place between joints is at least this share of the interval from its ends.
         regular: least pivot, relative to the largest, of a matrix that counts as positive definite.
         condition: condition number beyond which a linear system is singular.
-        least_width: ranges of slopes are widened to this share of the stiffness at least.
-        smallest: a cell whose sides are all shorter than this share of the displacements is not divided.
-        small: a cell shorter than this share of the displacements on a row of points in balance is not divided,
-        tiny: and one shorter than this is not where S plus slopes is next to singular.
-        straight: a range of slopes below this share of them is one slope.
-        shares: places between two points at which the balance is looked at.
-        image_steps: steps of Krawczyk's operator on a cell.
-        shorter_image: the next step is made while some side shrinks to this share.
         roundings: rounding errors of forces, in machine epsilons for each unknown and each part of their sizes.
     """
 
@@ -69,14 +61,6 @@ class CellThresholds:
     off_end: float = 0.2
     regular: float = 1e-6
     condition: float = 1e12
-    least_width: float = 1e-9
-    smallest: float = 1e-9
-    small: float = 1e-2
-    tiny: float = 1e-6
-    straight: float = 1e-13
-    shares: Sequence[float] = (0.2, 0.5, 0.8)
-    image_steps: int = 10
-    shorter_image: float = 0.7
     roundings: float = 8.0
 
 

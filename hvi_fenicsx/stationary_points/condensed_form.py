@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
 from .arcs import FREE, Chain, chain, total
-from .law_graphs import LawGraph, exact_graph, law_graph, near_graph
+from .law_graphs import LawGraph, exact_graph, law_graph
 from .lengths import Lengths
 from .rigid_motions import with_motions
 from .scalar_problem import ScalarProblem
@@ -26,7 +26,6 @@ def scalar_problem(
     factor: float = 1.0,
     *,
     tolerance: float | None = None,
-    tractions: bool = False,
     within: Array | None = None,
     thresholds: Thresholds = DEFAULT,
 ) -> ScalarProblem:
@@ -36,7 +35,6 @@ def scalar_problem(
         problem: the condensed problem.
         factor: λ.
         tolerance: energy by which curved laws may differ from their polylines, altogether; None: a coarse one.
-        tractions: whether the polylines are to be near the tractions, too; then `force_error` is how near.
         within: displacements up to which curved laws are followed, (n,); None: far beyond all that the laws tell apart.
         thresholds: the numbers that tune the search.
 
@@ -45,11 +43,7 @@ def scalar_problem(
     """
     polylines = thresholds.polylines
     far = np.full(problem.size, _far(problem.bonds, polylines.far)) if within is None else within
-    if tractions:
-        graphs = _near_graphs(problem.bonds, far, polylines)
-    else:
-        graphs = _graphs(problem.bonds, far, tolerance, polylines)
-    laws = _Laws.of(problem, graphs, problem.constant_at(factor), 1.0 + polylines.rounded)
+    laws = _Laws.of(problem, _graphs(problem.bonds, far, tolerance, polylines), problem.constant_at(factor))
     vectors = [argument for argument in laws.chains if argument.radial]
     _refuse_overlap(problem, laws.chains)
     unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
@@ -67,7 +61,6 @@ def scalar_problem(
         lengths=_lengths(vectors),
         constant=laws.constant,
         error=laws.error,
-        force_error=laws.force_error if tractions else 0.0,
         farthest=float(np.max(far)) if laws.error else math.inf,
         thresholds=thresholds,
     )
@@ -109,26 +102,23 @@ class _Laws:
         chains: those that act on an argument.
         constant: of the energy.
         error: of the energy, at most.
-        force_error: of the forces, at most, (n,).
     """
 
     chains: Mapping[_Argument, list[Chain]]
     constant: float
     error: float
-    force_error: Array
 
     @classmethod
-    def of(cls, problem: CondensedProblem, graphs: Iterable[LawGraph], constant: float, widened: float) -> _Laws:
-        """Gather the laws; the constant is that without them, errors of forces are widened for rounding."""
+    def of(cls, problem: CondensedProblem, graphs: Iterable[LawGraph], constant: float) -> _Laws:
+        """Gather the laws; the constant is that without them."""
         found: dict[_Argument, list[Chain]] = {}
-        error, force_error = 0.0, np.zeros(problem.size)
+        error = 0.0
         for bonds, law in zip(map(_frozen, problem.bonds), graphs, strict=True):
             area = float(bonds.weights.sum())
             constant, error = constant + area * law.offset, error + area * law.error
             for argument, sign, weight in _arguments(bonds):
                 found.setdefault(argument, []).append(chain(law.graph, weight, sign))
-                force_error[list(argument.unknowns)] += abs(sign) * weight * law.traction_error * widened
-        return cls(chains=found, constant=constant, error=error, force_error=force_error)
+        return cls(chains=found, constant=constant, error=error)
 
 
 def _arguments(bonds: Bonds) -> Iterator[tuple[_Argument, float, float]]:
@@ -161,12 +151,6 @@ def _graphs(
     for b in laws:
         aim = thresholds.coarse * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
         yield law_graph(b.law, _argument(b, far), aim, thresholds)
-
-
-def _near_graphs(laws: Sequence[Bonds], far: Array, thresholds: PolylineThresholds) -> Iterator[LawGraph]:
-    """The laws as polylines near their tractions."""
-    for b in laws:
-        yield near_graph(b.law, _argument(b, far), thresholds.near * b.law.traction_scale, thresholds)
 
 
 def _argument(bonds: Bonds, far: Array) -> float:

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..typing import Array
-from .curved_laws import CurvedLaws
-from .passes import Pass
 from .point_list import StationaryPoint
 from .progress_words import Unit
 
@@ -56,9 +54,7 @@ class Wanted:
         start: where the lowest is, as far as that is known.
         known: points near which equilibria are known to be, (n,) each.
         energies: the unit of energies in reports.
-        curved: the curved laws, by which cells are decided and points are made exact; None where no law is curved, one
-            acts on a length, or the lowest is wanted.
-        exact: makes a point near an equilibrium exact; None where there is none near it. Not for curved laws.
+        exact: makes a point near an equilibrium exact; None where there is none near it.
     """
 
     lowest: bool = False
@@ -69,7 +65,6 @@ class Wanted:
     start: Start | None = None
     known: tuple[Array, ...] = ()
     energies: Unit = field(default_factory=Unit)
-    curved: CurvedLaws | None = None
     exact: Callable[[Array], StationaryPoint | None] | None = None
 
 
@@ -93,8 +88,6 @@ class Found:
         nodes: boxes that were bounded or tested.
         reason: how it ended, for people.
         left: what is needed to go on; empty if there is nothing left.
-        passes: the saddles that join two of the minimisers, numbers of the points; none where points may be
-            missing.
     """
 
     points: tuple[StationaryPoint, ...]
@@ -104,7 +97,6 @@ class Found:
     nodes: int
     reason: str
     left: Saved = field(default_factory=dict)
-    passes: tuple[Pass, ...] = ()
 
     @property
     def gap(self) -> float | None:

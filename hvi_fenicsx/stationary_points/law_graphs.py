@@ -9,7 +9,6 @@ second, where the law tells its slopes. The smaller bound counts.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +20,6 @@ from ..laws.traction_graph import TractionGraph
 from ..typing import Array
 from .thresholds import DEFAULT, PolylineThresholds
 
-Difference = Callable[[Superpotential, Array, Array, int], tuple[Array, Array]]
-"""What a law and its polyline differ by on intervals, at least and at most: of law, begins, ends, samples."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class LawGraph:
@@ -33,13 +29,11 @@ class LawGraph:
         graph: the polyline; its energy is zero at zero.
         offset: the law's energy at zero.
         error: the law's energy differs from that of the polyline by this at most.
-        traction_error: the law's traction differs from the polyline by this at most.
     """
 
     graph: TractionGraph
     offset: float
     error: float
-    traction_error: float = 0.0
 
 
 def exact_graph(law: Superpotential) -> TractionGraph | None:
@@ -65,41 +59,20 @@ def law_graph(
     offset = float(law.value(np.zeros(1))[0])
     if (graph := exact_graph(law)) is not None:
         return LawGraph(graph=graph, offset=offset, error=0.0)
-    nodes, error = _nodes(law, far, tolerance, _errors, thresholds)
+    nodes, error = _nodes(law, far, tolerance, thresholds)
     return LawGraph(graph=_joined(law, nodes), offset=offset, error=error)
 
 
-def near_graph(
-    law: Superpotential, far: float, tolerance: float, thresholds: PolylineThresholds = DEFAULT.polylines
-) -> LawGraph:
-    """The polyline of a law whose traction is near the law's everywhere.
-
-    Args:
-        law: the law.
-        far: displacements beyond it do not matter.
-        tolerance: difference of tractions that is aimed at, where the law is curved.
-        thresholds: how many nodes and samples.
-    """
-    if (graph := exact_graph(law)) is not None:
-        return LawGraph(graph=graph, offset=float(law.value(np.zeros(1))[0]), error=0.0)
-    nodes, traction_error = _nodes(law, far, tolerance, _traction_errors, thresholds)
-    error = float(_errors(law, nodes[:-1], nodes[1:], thresholds.samples)[1].max())
-    offset = float(law.value(np.zeros(1))[0])
-    return LawGraph(graph=_joined(law, nodes), offset=offset, error=error, traction_error=traction_error)
-
-
-def _nodes(
-    law: Superpotential, far: float, tolerance: float, differences: Difference, thresholds: PolylineThresholds
-) -> tuple[Array, float]:
-    """Nodes between which energies or tractions differ by at most a tolerance, and how far they do."""
+def _nodes(law: Superpotential, far: float, tolerance: float, thresholds: PolylineThresholds) -> tuple[Array, float]:
+    """Nodes between which energies differ by at most a tolerance, and how far they do."""
     first = _first_nodes(law, far, thresholds.one_place)
     begin, end = first[:-1], first[1:]
     kept, worst = [first[-1:]], 0.0
     while begin.size:
         full = sum(map(len, kept)) + 2 * begin.size > thresholds.most_nodes
-        least, errors = differences(law, begin, end, thresholds.few_samples)
+        least, errors = _errors(law, begin, end, thresholds.few_samples)
         close = np.flatnonzero((errors > tolerance) & (full | (least <= tolerance)))
-        errors[close] = differences(law, begin[close], end[close], thresholds.samples)[1]
+        errors[close] = _errors(law, begin[close], end[close], thresholds.samples)[1]
         fine = (errors <= tolerance) | full
         worst = float(np.max(errors[fine], initial=worst))  # not a number stays so
         kept.append(begin[fine])
@@ -154,18 +127,6 @@ def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
     rounding = 4.0 * np.finfo(float).eps * np.abs(traction[:, 1:]) / step
     below, above = (ends.reshape(slope.shape) for ends in (least, most))
     return np.asarray(np.maximum(slope - below, above - slope) + rounding)
-
-
-def _traction_errors(law: Superpotential, begin: Array, end: Array, samples: int) -> tuple[Array, Array]:
-    """The difference of the tractions on intervals at samples, and bounds of it, (n,) each."""
-    share, x = _samples(begin, end, samples)
-    traction = _polyline(law, begin, end, share)[1]
-    after, before = (side(x.ravel()).reshape(x.shape) for side in (law.right, law.left))
-    at_samples = np.maximum(np.abs(after - traction)[:, :-1], np.abs(before - traction)[:, 1:])
-    between = 0.5 * np.diff(x, axis=1) * _slopes_apart(law, x, traction)
-    most = at_samples + np.minimum(between, _rises(law, x) + np.abs(np.diff(traction, axis=1)))
-    rounding = 4.0 * np.finfo(float).eps * np.abs(after).max(axis=1)
-    return np.asarray(at_samples.max(axis=1) - rounding), np.asarray(most.max(axis=1) + rounding)
 
 
 def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> tuple[Array, Array]:

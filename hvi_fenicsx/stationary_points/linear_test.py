@@ -84,7 +84,7 @@ class LinearTest:
         np.minimum.at(least, corners.owner, values)
         sizes = (np.abs(problem.stiffness) @ np.abs(y))[corners.owner] * np.abs(corners.x)
         rounding = np.finfo(float).eps * problem.size * (sizes.sum() + np.abs(y) @ np.abs(problem.force))
-        return float(least.sum() - y @ problem.force - rounding - np.sum(np.abs(y) * problem.force_error))
+        return float(least.sum() - y @ problem.force - rounding)
 
     def _corners(self, low: Array, high: Array) -> _Corners:
         problem = self._problem

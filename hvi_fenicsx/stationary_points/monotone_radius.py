@@ -67,5 +67,4 @@ def least_products(problem: ScalarProblem, box: Box, y: Array, added: Array) -> 
         middle = np.clip(np.where(curve > 0.0, at - 0.5 * start / curve, low), low, high)
         values = [(x - at) * (start + curve * (x - at)) for x in (low, high, middle)]
     least = np.where(arcs.meets(box.low, box.high), np.minimum(np.minimum(values[0], values[1]), values[2]), np.inf)
-    apart = problem.force_error * np.maximum(np.abs(box.low - y), np.abs(box.high - y))
-    return np.asarray(np.where(box.low == box.high, 0.0, least.min(axis=1) - apart))
+    return np.asarray(np.where(box.low == box.high, 0.0, least.min(axis=1)))

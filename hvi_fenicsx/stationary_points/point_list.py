@@ -58,14 +58,6 @@ class PointList:
         """
         return np.asarray(np.abs(self._places[: len(self)] - x).max(axis=1, initial=0.0))
 
-    def nearest(self, x: Array) -> int | None:
-        """The place in the list of the nearest point; None where the list is empty.
-
-        Args:
-            x: a point, (n,).
-        """
-        return int(np.argmin(self.distances(x))) if len(self) else None
-
     def has(self, x: Array) -> bool:
         """Whether a point is in the list.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 
@@ -9,12 +11,28 @@ from ..typing import Array, Integers
 from . import length_kinds
 from .boxes import Box
 from .cell_parts import at_bounds
-from .cell_verdict import Verdict
 from .convex_programme import Chains, minimise
 from .linear_points import is_singular, some_solution
-from .point_list import PointList, StationaryPoint
+from .point_list import StationaryPoint
 from .relaxation import envelopes
 from .scalar_problem import ScalarProblem
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What is known of a cell.
+
+    Attributes:
+        point: a stationary point in the cell; None where none is found.
+        decided: whether there is no other one.
+    """
+
+    point: StationaryPoint | None = None
+    decided: bool = True
+
+
+OPEN = Verdict(decided=False)
+"""What is known of a cell that is to be divided."""
 
 
 class PolylineCells:
@@ -22,18 +40,16 @@ class PolylineCells:
 
     Args:
         problem: the problem.
-        whole: the problem by which points are judged, where this one is the same in some cells only.
     """
 
-    def __init__(self, problem: ScalarProblem, whole: ScalarProblem | None = None) -> None:
-        self._problem, self._whole = problem, problem if whole is None else whole
+    def __init__(self, problem: ScalarProblem) -> None:
+        self._problem = problem
 
-    def verdict(self, cell: Box, known: PointList) -> Verdict:
+    def verdict(self, cell: Box) -> Verdict:
         """What is known of a cell.
 
         Args:
             cell: the cell.
-            known: points that were found before; they are not needed.
         """
         arcs, problem = self._problem.arcs, self._problem
         fixed = cell.low == cell.high
@@ -41,13 +57,13 @@ class PolylineCells:
         if not free.size:
             return self._done(cell.low)
         if np.any(arcs.drops(cell.low, cell.high) > 0.0):
-            return Verdict(left=cell)
+            return OPEN
         slopes = arcs.least_slope(cell.low, cell.high)
         matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
         if _positive(matrix, problem.thresholds.cells.regular):
             return self._done(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
         if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(at_bounds(problem, cell)[free]):
-            return Verdict(left=cell)
+            return OPEN
         return self._linear(cell, free, matrix)
 
     def point(self, x: Array, *, isolated: bool = True) -> StationaryPoint | None:
@@ -57,26 +73,16 @@ class PolylineCells:
             x: the place, (n,).
             isolated: False where it is one of a continuum.
         """
-        problem = self._whole
+        problem = self._problem
         x = np.clip(x, problem.lower, problem.upper)
         if length_kinds.imbalance(problem, x) > problem.thresholds.points.accuracy:
             return None
         kind = length_kinds.kind_of(problem, x)
         return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
 
-    def joined(self, x: Array, y: Array) -> bool:
-        """Whether two points are parts of one continuum; this is not known here, where each piece has one point.
-
-        Args:
-            x: a stationary point, (n,).
-            y: another one, (n,).
-        """
-        return False
-
     def _done(self, x: Array, *, isolated: bool = True) -> Verdict:
         """Nothing is left of a cell but perhaps this point."""
-        point = self.point(x, isolated=isolated)
-        return Verdict() if point is None else Verdict(points=[point])
+        return Verdict(point=self.point(x, isolated=isolated))
 
     def _minimum(self, cell: Box, added: Array) -> Array:
         """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""

@@ -12,12 +12,9 @@ beyond rounding counts, and so does what I - T_p - GS is off zero.
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 
 from ..typing import Array, Integers
-from .curved_laws import CurvedLaws
 from .elastic_parts import ElasticParts
 from .graph_clip import GraphClip, clipped_again
 from .rigid_motions import RigidMotions
@@ -30,8 +27,7 @@ class RigidBalance:
     """What net balance and elasticity leave of a cell.
 
     Args:
-        problem: the problem; of curved laws that of the polylines near them.
-        laws: the laws, where these are curved.
+        problem: the problem.
 
     Attributes:
         pivots: unknowns that fix the rigid motions, one for each.
@@ -40,8 +36,8 @@ class RigidBalance:
         softness: the largest square of each e whose elastic energy is ½, (n,); where this is exact.
     """
 
-    def __init__(self, problem: ScalarProblem, laws: CurvedLaws | None = None) -> None:
-        self._problem, self._laws, n = problem, laws, problem.size
+    def __init__(self, problem: ScalarProblem) -> None:
+        self._problem, n = problem, problem.size
         self._widened = problem.thresholds.cells.widened
         self._arcs = ArcTable.of(problem.chains[:n])
         self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
@@ -58,18 +54,6 @@ class RigidBalance:
         self._rest = self._error()
         self.exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
         self.softness = np.diag(self._flexibility) + 2.0 * np.diag(self._rest @ np.abs(self._flexibility))
-
-    def with_laws_of(self, problem: ScalarProblem) -> RigidBalance:
-        """The same of a problem with other laws, which are polylines.
-
-        Args:
-            problem: the problem, of the same stiffness and motions.
-        """
-        other = copy.copy(self)
-        other._problem, other._laws = problem, None
-        other._arcs = ArcTable.of(problem.chains[: problem.size])
-        other._graphs = GraphClip(problem, np.zeros(problem.size), joints_at_ends=False)
-        return other
 
     def _error(self) -> Array:
         """How far G is off the inverse on elastic parts, for exact numbers, rounding included, (n, n)."""
@@ -103,8 +87,7 @@ class RigidBalance:
         if (forces := self.forces(low, high)) is None:
             return None
         rounding = self._widened * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
-        slack = rounding + self._problem.force_error
-        ends = self._graphs.clipped(low, high, forces[0] - slack, forces[1] + slack)
+        ends = self._graphs.clipped(low, high, forces[0] - rounding, forces[1] + rounding)
         if ends is None or not np.all(np.isfinite(forces)):
             return ends
         parts = self._elastic_parts(*ends, *forces)
@@ -136,11 +119,7 @@ class RigidBalance:
         least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
         most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
         wide = self._widened * (np.abs(least) + np.abs(most))
-        least, most = least - wide - problem.force_error, most + wide + problem.force_error
-        if self._laws is not None:
-            first, last = self._laws.forces(low, high)
-            wide = self._widened * (np.abs(first) + np.abs(last))
-            least, most = np.maximum(least, first - wide), np.minimum(most, last + wide)
+        least, most = least - wide, most + wide
         return np.where(low <= problem.lower, -np.inf, least), np.where(high >= problem.upper, np.inf, most)
 
     def _balanced(self, least: Array, most: Array, low: Array, high: Array) -> tuple[Array, Array] | None:

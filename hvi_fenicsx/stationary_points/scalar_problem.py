@@ -32,7 +32,6 @@ class ScalarProblem:
         lengths: of vectors of unknowns which have no law of their own.
         constant: a part of the energy that x does not change.
         error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
-        force_error: the forces of the laws differ from those of the chains by this at most, (n,).
         farthest: displacements up to which this is known.
         motions: the rigid motions, which S does not resist; None where they are not told.
         thresholds: the numbers that tune the search.
@@ -46,7 +45,6 @@ class ScalarProblem:
     lengths: Lengths = field(default_factory=Lengths.none)
     constant: float = 0.0
     error: float = 0.0
-    force_error: Array | float = 0.0
     farthest: float = INF
     motions: RigidMotions | None = None
     thresholds: Thresholds = DEFAULT

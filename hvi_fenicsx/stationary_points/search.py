@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,8 +13,6 @@ from . import systematic
 from .all_points import Enumeration
 from .boxes import fresh_box
 from .found import Found, Keep, Saved, Wanted, forget
-from .landscapes import CurvedLandscape, Landscape, PolylineLandscape
-from .passes import passes
 from .point_list import PointList, StationaryPoint
 from .progress_words import Clock, all_in_words, counted
 from .scalar_problem import ScalarProblem
@@ -56,8 +53,7 @@ def find(
     task = Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
     if wanted.lowest:
         return lowest(task)
-    curved = wanted.curved
-    provable = curved.bounded if curved is not None else wanted.has_potential and not problem.error
+    provable = wanted.has_potential and not problem.error and not len(problem.lengths)
     return _all(task) if provable else _without_proof(task)
 
 
@@ -76,22 +72,15 @@ def _only(problem: ScalarProblem) -> Found:
 
 
 def _left_of_all(search: Enumeration) -> Saved:
-    cells = [*search.undecided, *search.waiting]
-    boxes = {name: np.array([getattr(cell, name) for cell in cells]) for name in ("low", "high", "weights")}
+    boxes = {name: np.array([getattr(cell, name) for cell in search.waiting]) for name in ("low", "high", "weights")}
     points = [p.x for p in sorted(search.points, key=lambda p: p.energy)]
     found = np.array(points) if points else np.empty((0, search.problem.size))
     return {"lowest": np.array(False), "x": found, **boxes}
 
 
-def _fresh(task: Task) -> Enumeration:
-    """A search for all points; of curved laws with polylines near their tractions."""
-    curved = task.wanted.curved
-    return Enumeration(problem=task.problem if curved is None else curved.near, laws=curved, cut=task.stop)
-
-
 def _resumed(task: Task, saved: Saved) -> Enumeration:
     """A search for all points to go on with."""
-    search = _fresh(task)
+    search = Enumeration(problem=task.problem, cut=task.stop)
     for x in saved["x"]:
         search.enter(x)
     low, high = saved["low"], saved["high"]
@@ -99,19 +88,6 @@ def _resumed(task: Task, saved: Saved) -> Enumeration:
     cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])[:n]) for i in range(len(low))]
     search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
     return search
-
-
-def _entered(task: Task, search: Enumeration) -> list[StationaryPoint]:
-    """Keep what is found without a proof. Told is what the solver made exact: points of laws of lengths."""
-    if len(task.problem.lengths):
-        solved = systematic.near_stationary(task.problem, [*task.wanted.known], task.stop, task.wanted.exact)
-        for point in solved:
-            search.enter(point.x)
-        return solved
-    over = _patience(task, search.points)
-    for x in systematic.candidates(search.problem, search.points.listed, over, task.stop):
-        search.enter(x)
-    return []
 
 
 def _patience(task: Task, known: PointList) -> Callable[[], bool]:
@@ -128,7 +104,7 @@ def _patience(task: Task, known: PointList) -> Callable[[], bool]:
 
 
 def _all(task: Task) -> Found:
-    search = _fresh(task) if task.saved is None else _resumed(task, task.saved)
+    search = Enumeration(problem=task.problem, cut=task.stop) if task.saved is None else _resumed(task, task.saved)
     clock = Clock()
 
     def tell(now: Enumeration) -> None:
@@ -144,13 +120,14 @@ def _all(task: Task) -> Found:
     below = None if few else bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)
-    solved = _entered(task, search) if task.saved is None and not few else []
-    complete = search.run(task.stop, tell) and not search.undecided
-    others = [] if complete else [p for p in solved if not search.points.has(p.x)]
-    points = tuple(sorted([*search.points, *others], key=lambda p: p.energy))
+    if task.saved is None and not few:
+        over = _patience(task, search.points)
+        for x in systematic.candidates(search.problem, search.points.listed, over, task.stop):
+            search.enter(x)
+    complete = search.run(task.stop, tell)
+    points = tuple(sorted(search.points, key=lambda p: p.energy))
     bound = points[0].energy if complete and points and task.wanted.bounded else None
     bound = bound if complete or below is None else below.progress().lower
-    landscape = _landscape(task)
     return Found(
         points=points,
         complete=complete,
@@ -159,73 +136,31 @@ def _all(task: Task) -> Found:
         nodes=search.cells,
         reason=_in_words(points) if complete else _open_in_words(search),
         left={} if complete else _left_of_all(search),
-        passes=passes(landscape, points) if complete and landscape is not None else (),
     )
-
-
-def _landscape(task: Task) -> Landscape | None:
-    """The energy, where descents from saddles know it: not with laws of lengths."""
-    curved = task.wanted.curved
-    if len(task.problem.lengths):
-        return None
-    return PolylineLandscape(task.problem) if curved is None else CurvedLandscape(curved)
 
 
 def _without_proof(task: Task) -> Found:
     """What is found where it cannot be proven that these are all."""
     problem = task.problem
-    if cells := _cells_of_none(task, task.most_boxes):
-        return _none(cells)
     task.report("a search without a proof that nothing is missed")
     below = bounded(task, [])
     known = [*task.wanted.known, *([] if below is None else [below.x])]
-    if (curved := task.wanted.curved) is None:
-        points = tuple(systematic.near_stationary(problem, known, task.stop, task.wanted.exact))
-    else:
-        points = tuple(systematic.near_stationary(curved.near, known, task.stop, curved.point))
-    if not points and (cells := _cells_of_none(task)):
-        return _none(cells)
+    points = tuple(systematic.near_stationary(problem, known, task.stop, task.wanted.exact))
     return Found(
         points=points,
         complete=False,
         lower_bound=None if below is None else below.progress().lower - problem.error,
         proven=False,
         nodes=0 if below is None else below.boxes,
-        reason=f"{len(points)} found, and there may be more: of {_unproven(task)} it cannot be proven that these are "
-        "all",
+        reason=f"{len(points)} found, and there may be more: {_unproven(task)} are searched without a proof",
     )
 
 
 def _unproven(task: Task) -> str:
-    """The laws of which nothing can be proven."""
+    """The laws of which nothing is proven."""
     if not task.wanted.has_potential:
         return "laws whose energy of separation depends on the mode"
-    if len(task.problem.lengths):
-        return "smoothed or curved laws that act on a length"
-    return "laws that are curved, and do not bound their slopes,"
-
-
-def _none(cells: int) -> Found:
-    return Found(points=(), complete=True, lower_bound=None, proven=True, nodes=cells, reason=NO_POINT)
-
-
-def _cells_of_none(task: Task, most: float = math.inf) -> int:
-    """The number of cells by which it is proven that laws of one component, curved ones too, have no point; else 0.
-
-    Args:
-        task: the search.
-        most: cells after which the proof is given up.
-    """
-    if task.wanted.bounded or task.wanted.curved is None or not task.wanted.curved.near_enough:
-        return 0
-    search, clock = _fresh(task), Clock()
-    search.start()
-
-    def over() -> bool:
-        return bool(search.undecided) or search.cells >= most or task.stop()
-
-    none = search.run(over, lambda now: task.report(all_in_words(now, clock)))
-    return max(search.cells, 1) if none and not search.undecided else 0
+    return "laws that act on a length" if len(task.problem.lengths) else "curved laws"
 
 
 def _in_words(points: tuple[StationaryPoint, ...]) -> str:
@@ -239,12 +174,7 @@ def _in_words(points: tuple[StationaryPoint, ...]) -> str:
 
 def _open_in_words(search: Enumeration) -> str:
     """What is found, and why it is not proven that this is all."""
-    told = f"{len(search.points)} found, and {counted(search.open_cells, 'cell is', 'cells are')} open"
-    if search.waiting:
-        return told
-    continua = sum(not p.isolated for p in search.points)
-    rows = f", of these {counted(continua, 'stands', 'stand')} for a continuum" if continua else ""
-    return f"{told}{rows}: too small to be divided, where points nearly meet or are not isolated"
+    return f"{len(search.points)} found, and {counted(len(search.waiting), 'cell is', 'cells are')} open"
 
 
 def falls_passed(problem: ScalarProblem, x: Array) -> int:

@@ -124,30 +124,6 @@ def kind_at(problem: ScalarProblem, x: Array, here: Subdifferential) -> Kind:
     return Kind.SADDLE if _definite(problem, surely, here.most[surely]) < 0 else Kind.UNDECIDED
 
 
-def unstable_directions(problem: ScalarProblem, x: Array, here: Subdifferential) -> Array | None:
-    """Displacements along which the energy falls from a stationary point, on both sides, (n, k); None if undecided.
-
-    One for each unknown on a drop, and one for each negative eigenvalue while these stay.
-
-    Args:
-        problem: the stiffness and the force.
-        x: a stationary point, (n,).
-        here: what the laws and bounds allow there.
-    """
-    surely, perhaps = _free(problem, x, here)
-    drops, free = np.flatnonzero(here.falls), np.setdiff1d(surely, np.flatnonzero(here.falls))
-    if len(np.setdiff1d(perhaps, drops)) > len(free) or np.any(here.least[free] != here.most[free]):
-        return None
-    matrix = problem.stiffness[np.ix_(free, free)] + np.diag(here.least[free])
-    values, vectors = np.linalg.eigh(matrix) if free.size else (np.empty(0), np.empty((0, 0)))
-    limit = _zero(problem, float(np.max(values, initial=0.0)))
-    if np.any(np.abs(values) <= limit):
-        return None
-    moves = np.zeros((problem.size, int(np.count_nonzero(values < 0.0))))
-    moves[free] = vectors[:, values < 0.0]
-    return np.column_stack([np.eye(problem.size)[:, drops], moves])
-
-
 def _free(problem: ScalarProblem, x: Array, here: Subdifferential) -> tuple[Integers, Integers]:
     """Unknowns that can move to first order for certain, and those that perhaps can."""
     force = problem.force - problem.stiffness @ x

@@ -19,8 +19,6 @@ class PolylineThresholds:
         far: ends of the first box, relative to the problem's displacements; what is found must stay off them.
         bent: a share of the largest traction by which a traction bends or jumps where it has a joint.
         coarse: error of the energy of curved laws, relative to their scale, with which the first search is made.
-        near: error of the tractions of curved laws, relative to their scale, in the search for all equilibria.
-        rounded: widening of this error by rounding.
         samples: intervals of an interval between two nodes on which the difference is bounded.
         few_samples: the same where so few decide.
         most_nodes: nodes are not made denser beyond this number.
@@ -31,8 +29,6 @@ class PolylineThresholds:
     far: float = 1e6
     bent: float = 0.01
     coarse: float = 1e-4
-    near: float = 5e-4
-    rounded: float = 1e-12
     samples: int = 512
     few_samples: int = 32
     most_nodes: int = 2_000
@@ -84,9 +80,7 @@ class PointThresholds:
             more than 1/e.
         longest: way from the polylines' point, relative to its displacements, beyond which a point is another one.
         roundings: rounding errors of forces, in machine epsilons for each unknown and each part of their sizes.
-        soft: an eigenvalue of S plus slopes below this share of the largest stiffness is next to zero.
         singular: singular values below this share of the largest are zero where a matrix cannot be factorised.
-        one_place: kinks nearer than this share of their distance from zero to an end are on it.
     """
 
     accuracy: float = 1e-9
@@ -96,41 +90,24 @@ class PointThresholds:
     faster: float = 0.5
     longest: float = 0.1
     roundings: float = 64.0
-    soft: float = 1e-4
     singular: float = 1e-12
-    one_place: float = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
 class DescentThresholds:
-    """How the energy is lowered, and when a way down has reached a minimiser.
+    """How the energy is lowered.
 
     Attributes:
         most_steps: convex programmes of one descent.
         reach: falls as large as the last one with which an energy is reached at most.
         slow: where laws act on lengths, a fall of the energy below this share of its parts is the last.
         rounding: a fall of the energy below this share of its parts is none.
-        curved_steps: convex programmes of one descent of curved laws.
-        first_interval: the first interval on which slopes of curved laws are bounded, as a share of the least length.
-        growth: how these intervals grow.
-        most_descents: descents from a saddle that are made one after the other, each of several steps.
-        first_steps: lengths of the first step off a saddle, relative to the displacements; the first that lowers the
-            energy is taken.
-        shares: of this step at which the energy must be lower than at the saddle.
-        near: a descent that ends nearer than this share of the displacements to a minimiser has reached it, too.
     """
 
     most_steps: int = 60
     reach: float = 10.0
     slow: float = 1e-12
     rounding: float = 1e-13
-    curved_steps: int = 10
-    first_interval: float = 1e-3
-    growth: float = 4.0
-    most_descents: int = 60
-    first_steps: Sequence[float] = tuple(10.0**-k for k in range(2, 10))
-    shares: Sequence[float] = (0.25, 0.5, 0.75, 1.0)
-    near: float = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)

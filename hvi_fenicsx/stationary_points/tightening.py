@@ -78,5 +78,5 @@ class ForceIntervals:
         least = force - self._positive @ high - self._negative @ low - others
         most = force - self._positive @ low - self._negative @ high + others
         widened = self._problem.thresholds.cells.widened
-        slack = widened * (np.abs(least) + np.abs(most) + np.abs(force)) + self._problem.force_error
+        slack = widened * (np.abs(least) + np.abs(most) + np.abs(force))
         return self._graphs.clipped(low, high, least - slack, most + slack)

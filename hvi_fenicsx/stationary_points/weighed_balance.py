@@ -172,7 +172,6 @@ def weighed(problem: ScalarProblem, split: Split, ends: tuple[Array, Array], wei
     b, c = graphs.offset + along[:, None] + y[:, None] * graphs.slope, y[:, None] * graphs.offset
     least = _least(graphs, a, b, c)
     off = _rounding(problem, split, graphs, (low, high), y, point)
-    off += float(np.sum(problem.force_error * np.maximum(np.abs(low + y), np.abs(high + y))))
     total = float(least.sum() - point @ bent - y @ problem.force) - off
     cells = problem.thresholds.cells
     return Weighed(graphs=graphs, a=a, b=b, c=c, least=least, total=total, rounding=off, thresholds=cells)

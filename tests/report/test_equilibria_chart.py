@@ -28,7 +28,7 @@ def search(folder: Path, energies: list[float]) -> EquilibriaResult:
         {"index": str(k + 1), "energy": repr(energy), "kind": kind, "folder": "1", "broken": "3"}
         for k, (energy, kind) in enumerate(zip(energies, kinds, strict=True))
     ]
-    summary = {"equilibria": {"complete": True, "proven": True, "barriers": []}}
+    summary = {"equilibria": {"complete": True, "proven": True}}
     return EquilibriaResult(folder=folder, scene={"title": "t"}, summary=summary, rows=rows)
 
 

@@ -6,15 +6,26 @@ import itertools
 
 import numpy as np
 import pytest
-from curved import LAWS
 from plain_envelope import envelope
 
+from hvi_fenicsx import laws
+from hvi_fenicsx.laws.smoothing import registered
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.stationary_points.arcs import Chain, arcs_of, chain, energy
 from hvi_fenicsx.stationary_points.envelopes import envelopes
-from hvi_fenicsx.stationary_points.law_graphs import near_graph
+from hvi_fenicsx.stationary_points.law_graphs import law_graph
 from hvi_fenicsx.stationary_points.majorants import majorants
 from hvi_fenicsx.stationary_points.scalar_problem import ArcTable
+
+MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
+LAWS = {
+    "chks": registered()["chks"]().relative(MODEL, 0.05),
+    "narrow chks": registered()["chks"]().relative(MODEL, 0.002),
+    "teeth": registered()["log_exp"]().relative(laws.Sawtooth(3.0, 1.0, 0.5, 3), 0.02),
+    "paper": registered()["paper"]().relative(MODEL, 0.1),
+    "exponential": laws.Exponential(2.0, 0.5, 1.0),
+    "smoothed exponential": registered()["chks"]().relative(laws.Exponential(2.0, 0.5, 1.0), 0.01),
+}
 
 
 def random_graph(random: np.random.Generator) -> TractionGraph:
@@ -52,7 +63,7 @@ def test_envelopes_of_polylines_are_those_found_arc_by_arc(seed: int) -> None:
 @pytest.mark.parametrize("name", LAWS)
 def test_envelopes_of_curved_laws_are_those_found_arc_by_arc(name: str) -> None:
     random, law = np.random.default_rng(0), LAWS[name]
-    one = chain(near_graph(law, 1e6, 1e-3 * law.traction_scale).graph, 0.7, -1.0)
+    one = chain(law_graph(law, 1e6, 1e-5 * law.energy_scale).graph, 0.7, -1.0)
     joints = [a.high for a in one[:-1]]
     for _ in range(25):
         low, high = np.sort([random.choice(joints), random.uniform(-4.0, 4.0) * 10.0 ** random.integers(-3, 4)])
@@ -60,7 +71,7 @@ def test_envelopes_of_curved_laws_are_those_found_arc_by_arc(name: str) -> None:
 
 
 def test_an_interval_that_is_a_point_has_the_energy_there() -> None:
-    one = chain(near_graph(LAWS["teeth"], 1e6, 1e-2).graph, 0.7, 1.0)
+    one = chain(law_graph(LAWS["teeth"], 1e6, 1e-3).graph, 0.7, 1.0)
     for x in (0.3, one[3].high):
         (arc,) = arcs_of(envelopes(ArcTable.of([one]), np.array([x]), np.array([x]), np.array([0.4]))[0])
         assert (arc.low, arc.high) == (x, x)

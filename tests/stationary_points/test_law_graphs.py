@@ -12,10 +12,8 @@ from scipy.optimize import minimize
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.laws.smoothing import registered
-from hvi_fenicsx.stationary_points.all_points import Enumeration
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
-from hvi_fenicsx.stationary_points.curved_laws import CurvedLaws
-from hvi_fenicsx.stationary_points.law_graphs import law_graph, near_graph
+from hvi_fenicsx.stationary_points.law_graphs import law_graph
 from hvi_fenicsx.stationary_points.lowest import LowestSearch
 from hvi_fenicsx.typing import Array
 
@@ -67,41 +65,6 @@ def test_the_straight_part_of_a_smoothed_spring_needs_few_nodes(name: str) -> No
     assert len(found.graph.breaks) < 1000
 
 
-@pytest.mark.parametrize("law", CURVED, ids=lambda law: law.name)
-def test_the_tractions_of_a_curved_law_are_as_near_as_is_said(law: laws.Superpotential) -> None:
-    tolerance = 1e-3 * law.traction_scale
-    found = near_graph(law, 1e6, tolerance)
-    x = near_and_far()
-    difference = np.abs(found.graph.traction(x, "right") - law.right(x))
-    assert np.max(difference) <= found.traction_error <= tolerance
-    assert np.max(difference) > 0.05 * found.traction_error  # the bound is not idle
-
-
-@pytest.mark.parametrize("law", CURVED, ids=lambda law: law.name)
-def test_two_bonds_on_a_spring_have_no_equilibrium_only_where_a_scan_finds_none(law: laws.Superpotential) -> None:
-    """The balance of the first gives the second's displacement, so the net force is a function of one unknown."""
-    spring, x = 0.4, np.linspace(-60.0, 60.0, 200_001)
-    most = float(law.right(x).max())
-    proven = 0
-    for share in (0.97, 0.75):
-        for apart in (0.0, 0.5):
-            pull = most * np.array([share + apart, share - apart])
-            second = x - (pull[0] - law.right(x)) / spring
-            net = pull.sum() - law.right(x) - law.right(second)
-            exists = bool(net.min() <= 0.0)
-            bonds = condensed.bonds(law, [0, 1])
-            near = condensed.problem(spring * np.array([[1.0, -1.0], [-1.0, 1.0]]), pull, bonds)
-            polylines = scalar_problem(near, tractions=True)
-            search = Enumeration(problem=polylines, laws=CurvedLaws(near=polylines, problem=near))
-            search.start()
-            assert search.run(lambda: False, lambda _: None)
-            assert not search.undecided
-            none = not len(search.points)
-            assert none != exists
-            proven += none
-    assert proven
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("law", CURVED, ids=lambda law: law.name)
 @pytest.mark.parametrize("seed", range(2))
@@ -151,15 +114,14 @@ def test_a_curved_scene_has_a_proven_lowest_energy(smoothing: str) -> None:
     assert found.solutions[0].energy <= hvi.solve(scene).energy * (1.0 - 1e-9)
 
 
-def test_the_equilibria_of_a_curved_scene_are_all() -> None:
+def test_the_equilibria_of_a_curved_scene_are_found_without_a_proof() -> None:
     """The paper's smoothing changes the law at zero slip, too; the smallest width leaves it near the other one."""
     scene = hvi.Scene.model_validate(model(3, 6e6, 1e6, quadratic_linear(3e6), smoothing="quadratic", epsilon=0.002))
     curved = hvi.Scene.model_validate(model(3, 6e6, 1e6, quadratic_linear(3e6), smoothing="paper", epsilon=0.002))
     found, near = hvi.equilibria(curved), hvi.equilibria(scene)
-    assert (found.complete, found.proven) == (True, True)
-    assert found.reason == "all equilibria, proven: 3"
+    assert (found.complete, found.proven) == (False, False)
+    assert found.reason == "3 found, and there may be more: curved laws are searched without a proof"
     assert near.complete
     assert all(s.converged for s in found.solutions)
     assert found.kinds == near.kinds
     assert [s.energy for s in found.solutions] == pytest.approx([s.energy for s in near.solutions], rel=1e-2)
-    assert found.lower_bound == pytest.approx(found.solutions[0].energy, rel=1e-12)

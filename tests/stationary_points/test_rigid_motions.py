@@ -5,7 +5,6 @@ from __future__ import annotations
 import condensed
 import numpy as np
 import pytest
-from curved import enumerated
 from scenes import Table, block, model
 
 from hvi_fenicsx import Scene, prepare
@@ -22,11 +21,6 @@ TRESCA = {"law": "tresca", "yield_traction": PEAK, "reference_slip": 1e-6}
 
 def of_scene(table: Table) -> CondensedProblem:
     return Condensation(prepare(Scene.model_validate(table)).system).problem
-
-
-def cells_and_points(problem: CondensedProblem) -> tuple[int, int]:
-    search = enumerated(problem)
-    return search.cells, len(search.points)
 
 
 def test_a_free_block_has_the_motions_of_geometry_and_no_resistance_to_them() -> None:
@@ -69,13 +63,3 @@ def test_a_tall_block_at_a_wall_that_is_lifted_by_little_has_no_equilibrium(lift
     search.start()
     assert search.run(lambda: search.cells > 50, lambda _: None)
     assert len(search.points) == points
-
-
-@pytest.mark.parametrize(("above", "points"), [(-1e-4, 1), (1e-7, 0)])
-def test_a_smoothed_law_never_bears_more_than_its_peak(above: float, points: int) -> None:
-    """The traction of this smoothing is below the peak everywhere, but polylines near it allow a little more."""
-    table = block(4, PEAK * (1.0 + above), 1e6, TRESCA, smoothing="chks", epsilon=0.1)
-    table["boundary"]["pull"]["traction"] = [f"{PEAK * (1.0 + above)!r}*(4 - 6*y)", 0.0]
-    cells, found = cells_and_points(of_scene(table))
-    assert found == points
-    assert cells <= 20

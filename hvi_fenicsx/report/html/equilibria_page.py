@@ -14,8 +14,6 @@ from .render import page_of
 
 MOST = 100
 """Equilibria in the table, those of lowest energy."""
-MOST_BARRIERS = 50
-"""Barriers in the table."""
 
 
 def write(folder: Path) -> Path:
@@ -37,7 +35,6 @@ def _content(result: EquilibriaResult) -> dict[str, Any]:
         "numbers": list(_numbers(result)),
         "equilibria": list(_rows(result)),
         "left_out": max(len(result.rows) - MOST, 0),
-        "barriers": [_barrier(one, result.unit) for one in known.get("barriers", [])[:MOST_BARRIERS]],
         "body": list(scene_text.body_of(result.scene)),
         "parts": list(scene_text.parts_of(result.scene)),
     }
@@ -73,9 +70,3 @@ def _rows(result: EquilibriaResult) -> Iterator[dict[str, str]]:
             "broken": row["broken"],
             "folder": row["folder"],
         }
-
-
-def _barrier(one: dict[str, Any], unit: str) -> dict[str, str]:
-    first, second = (quantity(height, unit) for height in one["heights"])
-    a, b = one["between"]
-    return {"between": f"{a} and {b}", "saddle": str(one["saddle"]), "first": first, "second": second}

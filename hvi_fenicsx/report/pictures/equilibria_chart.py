@@ -1,4 +1,4 @@
-"""The energies of all equilibria, the passes between minimisers, and beside each its state along Γc.
+"""The energies of all equilibria, and beside each its state along Γc.
 
 ``python3 -m hvi_fenicsx.report.pictures.equilibria_chart FOLDER`` draws it; it knows the folder alone, and no MPI.
 """
@@ -28,8 +28,8 @@ from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, PALE, PURPLE, VERMIL
 MOST = 16
 """Equilibria in the picture, those of lowest energy."""
 CAPTION = (
-    "The equilibria that were found, the lowest at the top. Left: the energy above the lowest found; a saddle is "
-    "joined to the two minimisers below it. Right: the state of each along the contact parts, vertex by vertex."
+    "The equilibria that were found, the lowest at the top. Left: the energy above the lowest found. Right: the state "
+    "of each along the contact parts, vertex by vertex."
 )
 ROW = 0.62
 """Height of a row, inches."""
@@ -69,11 +69,6 @@ def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None
     values = np.array(result.energies[: len(rows)]) - result.energies[0]
     unit = unit_for(float(values[-1]), result.unit)
     values = np.asarray(values / unit.size)
-    for one in result.known.get("barriers", []):
-        top, ends = one["saddle"] - 1, [m - 1 for m in one["between"]]
-        for end in ends:
-            if top < len(rows):
-                axes.plot([values[end], values[top]], [end, top], color=PALE, lw=1.6, zorder=0)
     for i, (row, value) in enumerate(zip(rows, values, strict=True)):
         mark, face = _KINDS.get(row["kind"], _OTHER)
         axes.plot(value, i, mark, color=INK, mfc=face, ms=9, clip_on=False)
