@@ -1,4 +1,4 @@
-"""The energy of one unknown's laws as a chain of parabolas.
+"""The energy of one unknown's laws as a chain of parabolas, and the chains of all unknowns as arrays.
 
 A polyline law's energy is continuous and quadratic between its breaks.
 """
@@ -9,13 +9,15 @@ import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 
 from ..laws.arc import Arc
 from ..laws.traction_graph import TractionGraph
-from ..typing import Array
+from ..typing import Array, Integers, Mask
 
 INF = math.inf
 ROUNDING = 1e-13
@@ -117,3 +119,233 @@ def apart(a: float, b: float) -> bool:
         b: the other.
     """
     return not (math.isfinite(a) and math.isfinite(b)) or b - a > ROUNDING * max(abs(a), abs(b))
+
+
+@dataclass(frozen=True)
+class ArcTable:
+    """Chains as arrays (n, m), of the whole line or of an interval; rows are padded with empty arcs at +inf.
+
+    Attributes:
+        low: begin of each arc.
+        high: end of each arc.
+        anchors: displacements.
+        values: energies at the anchors.
+        tractions: at the anchors.
+        slopes: of the tractions.
+    """
+
+    low: Array
+    high: Array
+    anchors: Array
+    values: Array
+    tractions: Array
+    slopes: Array
+
+    @classmethod
+    def of(cls, chains: Sequence[Sequence[Arc] | Array]) -> ArcTable:
+        """Stack chains.
+
+        Args:
+            chains: as arcs, or as arrays of these (k, 6).
+        """
+        table = np.full((len(chains), max(len(c) for c in chains), 6), Arc(INF, INF, 0.0, 0.0, 0.0, 0.0))
+        for rows, arcs in zip(table, chains, strict=True):
+            rows[: len(arcs)], rows[len(arcs) :, 2:] = arcs, arcs[-1][2:]
+        return cls(*np.moveaxis(table, 2, 0))
+
+    @cached_property
+    def before(self) -> Array:
+        """The traction at the end of each arc; at the anchor where that is infinite."""
+        return np.asarray(self.tractions + self.slopes * (_finite(self.high, self.anchors) - self.anchors))
+
+    @cached_property
+    def after(self) -> Array:
+        """The traction at the begin of each arc; at the anchor where that is infinite."""
+        return np.asarray(self.tractions + self.slopes * (_finite(self.low, self.anchors) - self.anchors))
+
+    @cached_property
+    def last(self) -> Array:
+        """Where the chains end, (n,)."""
+        return np.asarray(np.where(self.low < INF, self.high, -INF).max(axis=1))
+
+    @cached_property
+    def ends(self) -> Array:
+        """The begin of each chain and the ends of its arcs, (n, m + 1)."""
+        return np.column_stack([self.low[:, 0], self.high])
+
+    def rows(self, i: int) -> Array:
+        """The arcs of one chain, (k, 6)."""
+        there = self.low[i] < INF
+        return np.stack([part[i, there] for part in self._parts], axis=-1)
+
+    def on(self, low: Array, high: Array) -> ArcTable:
+        """The chains on intervals; where one is a point, its arc.
+
+        Args:
+            low: of the intervals, finite, (n,).
+            high: of the intervals, finite, (n,).
+        """
+        meets = self.meets(low, high)
+        count = meets.sum(axis=1)[:, None]
+        k = np.argmax(meets, axis=1)[:, None] + np.minimum(np.arange(count.max()), count - 1)
+        begin, end, *rest = (np.take_along_axis(part, k, axis=1) for part in self._parts)
+        there = np.arange(count.max()) < count
+        begin = np.where(there, np.maximum(begin, low[:, None]), INF)
+        return ArcTable(begin, np.where(there, np.minimum(end, high[:, None]), INF), *rest)
+
+    @property
+    def _parts(self) -> tuple[Array, ...]:
+        return self.low, self.high, self.anchors, self.values, self.tractions, self.slopes
+
+    @cached_property
+    def convex_part(self) -> ArcTable:
+        """H of a split φ = h - g into convex parts of laws over the whole line; at zero both have the same energy.
+
+        From zero on h' rises with φ', and does not fall with it.
+        """
+        zero = np.zeros(len(self.low))
+        k, middle = np.arange(self.low.shape[1]), self.at(zero)[:, None]
+        slopes, jumps = np.maximum(self.slopes, 0.0), np.maximum(self.after[:, 1:] - self.before[:, :-1], 0.0)
+        jumps = np.where(self.low[:, 1:] < INF, jumps, 0.0)
+        none, start, energy = zero[:, None], self.rates(zero)[1], self.energy(zero)
+        right = np.column_stack([np.where(k[:-1] >= middle, jumps, 0.0), none])
+        left = np.column_stack([none, np.where(k[1:] <= middle, jumps, 0.0)])[:, ::-1]
+        far, near = np.maximum(self.high, 0.0), np.maximum(self.low, 0.0)
+        values, rates = _onwards(near, far, slopes, right, start, energy)
+        far, near = -np.minimum(self.low, 0.0)[:, ::-1], -np.minimum(self.high, 0.0)[:, ::-1]
+        below, falls = _onwards(near, far, slopes[:, ::-1], left, -start, energy)
+        ahead = k >= middle
+        anchors = np.where(ahead, np.maximum(self.low, 0.0), self.high)
+        anchors = np.where(self.low < INF, anchors, 0.0)
+        values, rates = np.where(ahead, values, below[:, ::-1]), np.where(ahead, rates, -falls[:, ::-1])
+        return ArcTable(self.low, self.high, anchors, values, rates, slopes)
+
+    def states(self, z: Array, scale: Array) -> Integers:
+        """The state of each unknown, of convex chains: 2k at the end k, 2k + 1 on arc k.
+
+        Args:
+            z: x + t/scale, (n,).
+            scale: a stiffness, (n,).
+        """
+        marks = np.empty((len(z), 2 * self.ends.shape[1]))
+        before, after = self._around_ends
+        marks[:, 0::2] = self.ends + before / scale[:, None]
+        marks[:, 1::2] = self.ends + after / scale[:, None]
+        return np.asarray(np.maximum((marks <= z[:, None]).sum(axis=1) - 1, 0), dtype=np.int64)
+
+    @cached_property
+    def _around_ends(self) -> tuple[Array, Array]:
+        """The tractions left and right of the ends, beyond the chains infinite, (n, m + 1) each."""
+        infinite, there = np.full(len(self.low), INF), self.low < INF
+        before, after = (np.where(there, side, INF) for side in (self.before, self.after))
+        return np.column_stack([-infinite, before]), np.column_stack([after, infinite])
+
+    def interval(self, x: Array) -> tuple[Array, Array]:
+        """The subdifferential of each φᵢ at xᵢ, of convex chains, its ends (n,).
+
+        Args:
+            x: a point, (n,).
+        """
+        rows, k = np.arange(len(x)), self.at(x)
+        inside = self.tractions[rows, k] + self.slopes[rows, k] * (x - self.anchors[rows, k])
+        low = np.where(x <= self.low[:, 0], -INF, inside)
+        return low, np.where(x >= self.high[rows, k], self._around_ends[1][rows, k + 1], inside)
+
+    @cached_property
+    def rounding(self) -> Array:
+        """The size of a jump of the traction that is rounding, (n,)."""
+        return np.asarray(ROUNDING * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1))
+
+    def at(self, x: Array) -> Integers:
+        """The arc that holds x, of the two at a joint the left one; (n,)."""
+        return np.asarray((self.high[:, :-1] < x[:, None]).sum(axis=1), dtype=np.int64)
+
+    def energy(self, x: Array) -> Array:
+        """φᵢ(xᵢ), (n,)."""
+        rows, k = np.arange(len(x)), self.at(x)
+        d = x - self.anchors[rows, k]
+        return np.asarray(self.values[rows, k] + (self.tractions[rows, k] + 0.5 * self.slopes[rows, k] * d) * d)
+
+    def meets(self, low: Array, high: Array) -> Mask:
+        """Which arcs have more than a point in common with a box, (n, m); where the box is a point, its arc.
+
+        Args:
+            low: of the box, (n,).
+            high: of the box, (n,).
+        """
+        inside = (self.low < high[:, None]) & (self.high > low[:, None])
+        points = np.flatnonzero(low >= high)
+        inside[points] = False
+        inside[points, self.at(low)[points]] = True
+        return np.asarray(inside)
+
+    def drops(self, low: Array, high: Array) -> Array:
+        """The largest drop of the traction strictly inside a box, (n,); 0 where it only rises.
+
+        Args:
+            low: of the box, (n,).
+            high: of the box, (n,).
+        """
+        inside = (self.high[:, :-1] > low[:, None]) & (self.high[:, :-1] < high[:, None])
+        fall = np.where(inside, self.before[:, :-1] - self.after[:, 1:], 0.0)
+        fall = np.where(fall > self.rounding[:, None], fall, 0.0)
+        return np.asarray(fall.max(axis=1, initial=0.0))
+
+    def least_slope(self, low: Array, high: Array) -> Array:
+        """The least slope of the arcs that meet a box, (n,).
+
+        Args:
+            low: of the box, (n,).
+            high: of the box, (n,).
+        """
+        return np.asarray(np.where(self.meets(low, high), self.slopes, np.inf).min(axis=1))
+
+    def rates(self, t: Array) -> tuple[Array, Array]:
+        """The tractions right of and left of t, (n,) each."""
+        rows = np.arange(len(t))
+        behind, k = np.asarray((self.high <= t[:, None]).sum(axis=1), dtype=np.int64), self.at(t)
+        after, before = (
+            self.tractions[rows, i] + self.slopes[rows, i] * (t - self.anchors[rows, i]) for i in (behind, k)
+        )
+        return np.asarray(after), np.asarray(before)
+
+    def least(self, low: Array, high: Array, added: Array, force: Array) -> tuple[Array, Array]:
+        """The least of φ + ½ d t² - force t over an interval, and the t where it is taken, (n,) each.
+
+        Args:
+            low: of the intervals, finite, (n,).
+            high: of the intervals, finite, (n,).
+            added: d, (n,).
+            force: (n,).
+        """
+        first, last = np.maximum(self.low, low[:, None]), np.minimum(self.high, high[:, None])
+        slope, offset = self.slopes + added[:, None], self.tractions - self.slopes * self.anchors - force[:, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            turn = np.clip(np.where(slope > 0.0, -offset / slope, first), first, last)
+            places = np.stack([first, last, turn])
+            d = places - self.anchors
+            values = self.values + (self.tractions + 0.5 * self.slopes * d) * d
+            values += (0.5 * added[:, None] * places - force[:, None]) * places
+        values = np.where(first <= last, values, np.inf)
+        flat = np.moveaxis(values, 0, 1).reshape(len(low), -1)
+        k = np.argmin(flat, axis=1)[:, None]
+        at = np.moveaxis(places, 0, 1).reshape(len(low), -1)
+        return np.take_along_axis(flat, k, axis=1)[:, 0], np.take_along_axis(at, k, axis=1)[:, 0]
+
+
+def _finite(ends: Array, others: Array) -> Array:
+    return np.where(np.isfinite(ends), ends, others)
+
+
+def _onwards(near: Array, far: Array, slopes: Array, jumps: Array, rate: Array, value: Array) -> tuple[Array, Array]:
+    """Energies and tractions at the begins of arcs one after the other, of which the last is endless, (n, m) each."""
+    long = np.where(np.isfinite(far), far, near) - np.where(np.isfinite(near), near, 0.0)
+    long = np.where(np.isfinite(long), long, 0.0)
+    rises = slopes * long
+    rates = rate[:, None] + _sums_before(rises + jumps)
+    return value[:, None] + _sums_before((rates + 0.5 * rises) * long), rates
+
+
+def _sums_before(parts: Array) -> Array:
+    """The sum of the parts before each, (n, m)."""
+    return np.cumsum(parts, axis=1) - parts

@@ -7,116 +7,15 @@ the states go round in circles, a proximal term is added, and taken away step by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ..laws.arc import Arc
 from ..typing import Array, Integers
+from .arcs import ArcTable
 from .thresholds import DEFAULT, ProgrammeThresholds
-
-
-@dataclass(frozen=True, kw_only=True)
-class Chains:
-    """The convex chains of all unknowns on finite intervals, as arrays; rows are padded with arcs beyond the last end.
-
-    Attributes:
-        ends: joints and ends, ascending (n, m + 1), padded with +inf.
-        anchors: of the arcs, (n, m).
-        values: at the anchors, (n, m).
-        tractions: at the anchors, (n, m).
-        slopes: of the arcs, (n, m).
-        before: traction left of each end, (n, m + 1); -inf at the first.
-        after: traction right of each end, (n, m + 1); +inf at the last.
-        high: the last ends, (n,).
-    """
-
-    ends: Array
-    anchors: Array
-    values: Array
-    tractions: Array
-    slopes: Array
-    before: Array
-    after: Array
-    high: Array
-
-    @classmethod
-    def of(cls, chains: Sequence[Sequence[Arc] | Array]) -> Chains:
-        """Stack chains, one of each unknown.
-
-        Args:
-            chains: with finite ends; as arcs, or as arrays of these (k, 6).
-        """
-        counts = np.array([len(c) for c in chains])
-        m = int(counts.max())
-        table = np.empty((len(chains), m, 6))
-        for rows, arcs in zip(table, chains, strict=True):
-            rows[: len(arcs)], rows[len(arcs) :] = arcs, arcs[-1]
-        low, high, anchors, values, tractions, slopes = np.moveaxis(table, 2, 0)
-        padded = np.arange(m) >= counts[:, None]
-        start = np.where(padded, np.inf, tractions + slopes * (low - anchors))
-        stop = np.where(padded, np.inf, tractions + slopes * (high - anchors))
-        infinite = np.full(len(chains), np.inf)
-        return cls(
-            ends=np.column_stack([low[:, 0], np.where(padded, np.inf, high)]),
-            anchors=anchors,
-            values=values,
-            tractions=tractions,
-            slopes=slopes,
-            before=np.column_stack([-infinite, stop]),
-            after=np.column_stack([start, infinite]),
-            high=high[np.arange(len(chains)), counts - 1],
-        )
-
-    @property
-    def low(self) -> Array:
-        """The first ends, (n,)."""
-        return self.ends[:, 0]
-
-    def states(self, z: Array, scale: Array) -> Integers:
-        """The state of each unknown: 2k at the end k, 2k + 1 on arc k.
-
-        Args:
-            z: x + t/scale, (n,).
-            scale: a stiffness, (n,).
-        """
-        marks = np.empty((len(z), 2 * self.ends.shape[1]))
-        marks[:, 0::2] = self.ends + self.before / scale[:, None]
-        marks[:, 1::2] = self.ends + self.after / scale[:, None]
-        return np.asarray(np.maximum((marks <= z[:, None]).sum(axis=1) - 1, 0), dtype=np.int64)
-
-    def arc_at(self, x: Array) -> Integers:
-        """The arc that holds x, of the two at a joint the left one; (n,).
-
-        Args:
-            x: a point, (n,).
-        """
-        inner = self.ends[:, 1:-1] if self.ends.shape[1] > 2 else self.ends[:, :0]
-        return np.asarray((inner < x[:, None]).sum(axis=1), dtype=np.int64)
-
-    def energy(self, x: Array) -> Array:
-        """φᵢ(xᵢ), (n,).
-
-        Args:
-            x: a point, (n,).
-        """
-        rows, k = np.arange(len(x)), self.arc_at(x)
-        d = x - self.anchors[rows, k]
-        return np.asarray(self.values[rows, k] + (self.tractions[rows, k] + 0.5 * self.slopes[rows, k] * d) * d)
-
-    def interval(self, x: Array) -> tuple[Array, Array]:
-        """The subdifferential of each φᵢ at xᵢ, its ends (n,).
-
-        Args:
-            x: a point, (n,).
-        """
-        rows, k = np.arange(len(x)), self.arc_at(x)
-        inside = self.tractions[rows, k] + self.slopes[rows, k] * (x - self.anchors[rows, k])
-        at_low, at_high = x <= self.low, x >= self.ends[rows, k + 1]
-        low = np.where(at_low, -np.inf, inside)
-        return low, np.where(at_high, self.after[rows, k + 1], inside)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +47,7 @@ def never() -> bool:
 def minimise(
     a: Array,
     b: Array,
-    chains: Chains,
+    chains: ArcTable,
     start: Array,
     thresholds: ProgrammeThresholds = DEFAULT.programmes,
     cut: Callable[[], bool] = never,
@@ -164,7 +63,7 @@ def minimise(
         cut: whether to end with the point that is there, since the search stops.
     """
     programme = _Programme(a, b, chains, thresholds, cut)
-    found = programme.active_set(np.clip(start, chains.low, chains.high))
+    found = programme.active_set(np.clip(start, chains.low[:, 0], chains.last))
     if not found.done and not cut():
         found = programme.proximal(found)
     return programme.bounded(found)
@@ -174,7 +73,7 @@ class _Programme:
     """One programme."""
 
     def __init__(
-        self, a: Array, b: Array, chains: Chains, thresholds: ProgrammeThresholds, cut: Callable[[], bool]
+        self, a: Array, b: Array, chains: ArcTable, thresholds: ProgrammeThresholds, cut: Callable[[], bool]
     ) -> None:
         self._a, self._b, self._chains, self._thresholds, self._cut = a, b, chains, thresholds, cut
         diagonal = np.diag(a)
@@ -192,7 +91,7 @@ class _Programme:
             if solved is None:
                 return _Iterate(x=x, done=False)
             y, following = solved
-            x = np.clip(y, chains.low, chains.high)
+            x = np.clip(y, chains.low[:, 0], chains.last)
             if np.array_equal(following, states) or self._stationary(x):
                 return _Iterate(x=x, done=True)
             if following.tobytes() in seen or self._cut():
@@ -259,7 +158,7 @@ class _Programme:
         """
         x, chains = found.x, self._chains
         value, r = self._objective(x), self._residual(x)
-        lost = np.where(r > 0.0, r * (chains.high - x), r * (chains.low - x))
+        lost = np.where(r > 0.0, r * (chains.last - x), r * (chains.low[:, 0] - x))
         sizes = 0.5 * np.abs(x) @ (np.abs(self._a) @ np.abs(x)) + np.abs(self._b) @ np.abs(x)
         safety = np.finfo(float).eps * len(x) * float(sizes + np.abs(chains.energy(x)).sum())
         bound = float(value - lost.sum() - safety)

@@ -8,10 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..typing import Array
-from .convex_programme import Chains, minimise, never
+from .convex_programme import minimise, never
 from .length_newton import LengthNewton
 from .length_programme import LengthProgramme
-from .majorants import majorants
 from .scalar_problem import ScalarProblem
 
 
@@ -37,9 +36,7 @@ def descend(
     for _ in range(limits.most_steps):
         if cut():
             break
-        at = problem.arguments(x)
-        chains = majorants(problem.arcs, np.minimum(low, at), np.maximum(high, at), at)
-        found = _minimiser(problem, chains, x, cut)
+        found = _minimiser(problem, low, high, x, cut)
         after = problem.energy(found)
         fall, size = energy - after, problem.energy_size(x)
         if not fall > limits.rounding * size:
@@ -50,30 +47,18 @@ def descend(
     return np.asarray(x), energy
 
 
-def _minimiser(problem: ScalarProblem, chains: list[Array], x: Array, cut: Callable[[], bool]) -> Array:
-    """The minimiser of a majorant. Of a law of a length ψ, the part that would fall is linearised along the vector."""
-    lengths, n = problem.lengths, problem.size
+def _minimiser(problem: ScalarProblem, low: Array, high: Array, x: Array, cut: Callable[[], bool]) -> Array:
+    """The minimiser of a majorant: with φ = h - g and both convex, g is replaced by its tangent at x."""
+    lengths, n, at = problem.lengths, problem.size, problem.arguments(x)
+    rising = problem.arcs.convex_part
+    pull = rising.rates(at)[1] - problem.arcs.rates(at)[1]
+    force = problem.force + pull[:n]
+    chains = rising.on(np.minimum(low, at), np.maximum(high, at))
     if not len(lengths):
-        limits = problem.thresholds.programmes
-        return minimise(problem.stiffness, problem.force, Chains.of(chains), x, limits, cut).x
-    slopes = np.array([max(-_first_rate(c), 0.0) for c in chains[n:]])
-    size = lengths.of(x)
-    felt = lengths.felt(lengths.vectors(x)) * lengths.factors
-    pull = np.divide(slopes, size, out=np.zeros_like(size), where=size > 0.0)[:, None] * felt
-    force = problem.force.copy()
-    force[lengths.members] += pull[lengths.there]
-    risen = [_steeper(c, slope) for c, slope in zip(chains[n:], slopes, strict=True)]
-    programme = LengthProgramme.of(problem, problem.stiffness, force, [*chains[:n], *risen], np.zeros(len(lengths)))
+        return minimise(problem.stiffness, force, chains, x, problem.thresholds.programmes, cut).x
+    size, felt = at[n:], lengths.felt(lengths.vectors(x)) * lengths.factors
+    along = np.divide(pull[n:], size, out=np.zeros_like(size), where=size > 0.0)[:, None] * felt
+    force[lengths.members] += along[lengths.there]
+    laws = [chains.rows(i) for i in range(len(at))]
+    programme = LengthProgramme.of(problem, problem.stiffness, force, laws, np.zeros(len(lengths)))
     return LengthNewton(programme, cut).minimiser(x)
-
-
-def _first_rate(chain: Array) -> float:
-    """The traction at the begin of a chain (k, 6)."""
-    low, _, anchor, _, traction, slope = chain[0]
-    return float(traction + slope * (low - anchor))
-
-
-def _steeper(chain: Array, slope: float) -> Array:
-    """A chain (k, 6) with a line through zero added."""
-    low, high, anchor, value, traction, curvature = chain.T
-    return np.column_stack([low, high, anchor, value + slope * anchor, traction + slope, curvature])

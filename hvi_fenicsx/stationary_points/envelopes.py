@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array, Integers, Mask
-from .arcs import ROUNDING, apart
+from .arcs import ROUNDING, ArcTable, apart
 from .common_tangent import Run, tangent
-from .scalar_problem import ArcTable
 
 LOW, HIGH = 0, 1
 

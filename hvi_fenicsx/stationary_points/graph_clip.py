@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..typing import Array, Mask
+from .arcs import ArcTable
 from .cell_thresholds import CellThresholds
-from .scalar_problem import ArcTable, ScalarProblem
+from .scalar_problem import ScalarProblem
 
 Clip = Callable[[Array, Array], tuple[Array, Array] | None]
 """A pass over intervals: smaller ones, or None if one is empty."""

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array
-from .convex_programme import Chains, minimise
+from .arcs import ArcTable
+from .convex_programme import minimise
 from .length_frames import left_out
 from .length_programme import LengthProgramme
 
@@ -26,7 +27,7 @@ def with_held_forces(programme: LengthProgramme, x: Array, springs: Array) -> tu
     """
     held = _forces(programme, x)
     pull = programme.b - held + springs @ x
-    chains = Chains.of(_without_lengths(programme, x))
+    chains = ArcTable.of(_without_lengths(programme, x))
     y = minimise(programme.a + springs, pull, chains, x, programme.thresholds).x
     return y, programme.bound_forces(y, held)
 

@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Mask
-from .convex_programme import Chains, minimise, never
+from .arcs import ArcTable
+from .convex_programme import minimise, never
 from .length_frames import Frames, left_out, parts, unknowns_of
 from .length_programme import LengthProgramme
 
@@ -143,7 +144,7 @@ class LengthNewton:
     def _step(self, x: Array, here: Tangent) -> Array:
         """The solution of the programme in the frames, as unknowns."""
         frames, lengths = here.frames, self._lengths
-        chains = Chains.of(self._local(here))
+        chains = ArcTable.of(self._local(here))
         matrix, force = frames.matrix(self._a), frames.forces(self._b)
         found = minimise(matrix, force, chains, frames.into(x), self._limits, self._cut)
         y = parts(lengths, found.x)

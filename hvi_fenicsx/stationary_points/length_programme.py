@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Mask
-from .convex_programme import Chains
+from .arcs import ArcTable
 from .length_frames import unknowns_of
 from .lengths import Lengths
 from .scalar_problem import ScalarProblem
@@ -66,14 +66,14 @@ class LengthProgramme:
         )
 
     @cached_property
-    def stack(self) -> Chains:
+    def stack(self) -> ArcTable:
         """ψ as arrays."""
-        return Chains.of(self.chains)
+        return ArcTable.of(self.chains)
 
     @cached_property
     def radius(self) -> Array:
         """The largest lengths that are allowed, (m,)."""
-        return self.stack.high[len(self.b) :]
+        return self.stack.last[len(self.b) :]
 
     def value(self, x: Array) -> float:
         """The objective.
@@ -105,7 +105,7 @@ class LengthProgramme:
             size: the lengths, (m,).
         """
         n = len(self.b)
-        low, _ = self.stack.interval(np.concatenate([self.stack.low[:n], np.minimum(size, self.radius)]))
+        low, _ = self.stack.interval(np.concatenate([self.stack.low[:n, 0], np.minimum(size, self.radius)]))
         return np.maximum(low[n:], 0.0), np.maximum(self.stack.after[n:, 0], 0.0)
 
     def admissible(self, x: Array) -> Array:
@@ -114,7 +114,7 @@ class LengthProgramme:
         Args:
             x: a point, (n,).
         """
-        low, high = self.stack.low[: len(x)], self.stack.high[: len(x)]
+        low, high = self.stack.low[: len(x), 0], self.stack.last[: len(x)]
         x = np.where(self._own, np.clip(x, low, high), np.clip(x, self.lower, self.upper))
         size = self.lengths.of(x)
         share = np.divide(self.radius, size, out=np.ones_like(size), where=size > self.radius)

@@ -9,9 +9,10 @@ from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Integers
 from . import length_kinds
+from .arcs import ArcTable
 from .boxes import Box
 from .cell_parts import at_bounds
-from .convex_programme import Chains, minimise
+from .convex_programme import minimise
 from .linear_points import is_singular, some_solution
 from .point_list import StationaryPoint
 from .relaxation import envelopes
@@ -86,7 +87,7 @@ class PolylineCells:
 
     def _minimum(self, cell: Box, added: Array) -> Array:
         """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
-        problem, chains = self._problem, Chains.of(envelopes(self._problem, cell.low, cell.high, added))
+        problem, chains = self._problem, ArcTable.of(envelopes(self._problem, cell.low, cell.high, added))
         programmes = problem.thresholds.programmes
         return minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x, programmes).x
 

@@ -11,8 +11,9 @@ import numpy as np
 from ..typing import Array, Integers, Mask
 from . import envelopes as convex
 from . import motions
+from .arcs import ArcTable
 from .boxes import Box
-from .convex_programme import Chains, minimise, never
+from .convex_programme import minimise, never
 from .curvature import Curvature, CurvatureShare
 from .dual_bound import DualBound
 from .held_forces import with_held_forces
@@ -115,7 +116,7 @@ class Relaxation:
         curvature, wanted = self._curvature(box, undecided, weights, part, lost)
         chains = envelopes(problem, box.low, box.high, curvature.added)
         lent = self.lent(box, curvature)
-        stack = Chains.of(chains)
+        stack = ArcTable.of(chains)
         x, value, bound = self._minimised(box, curvature, lent, chains, stack)
         gaps = np.zeros(len(box.motion_low))
         gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), self._thresholds.tight * problem.energy_size(x))
@@ -165,7 +166,7 @@ class Relaxation:
         return Lent(shapes=self._share.shapes[:, used], stiffness=curvature.lent[used], low=ends[0], high=ends[1])
 
     def _minimised(
-        self, box: Box, curvature: Curvature, lent: Lent, chains: list[Array], stack: Chains
+        self, box: Box, curvature: Curvature, lent: Lent, chains: list[Array], stack: ArcTable
     ) -> tuple[Array, float, float]:
         """The minimiser, and two lower bounds: that of the point and a better one."""
         problem = self.problem
@@ -198,11 +199,11 @@ class Relaxation:
         weights[undecided] = strength * (seen / most + self._thresholds.least_weight if most > 0.0 else 1.0)
         return weights
 
-    def _examined(self, box: Box, x: Array, stack: Chains, curvature: Curvature, undecided: Integers) -> Box:
+    def _examined(self, box: Box, x: Array, stack: ArcTable, curvature: Curvature, undecided: Integers) -> Box:
         """Where the envelope is not tight at x: the gaps, the chords, and the weights for the next D."""
         problem, at = self.problem, self.problem.arguments(x)
         rows = np.arange(len(at))
-        k = np.minimum(stack.arc_at(at), stack.slopes.shape[1] - 1)
+        k = np.minimum(stack.at(at), stack.slopes.shape[1] - 1)
         begin, end = stack.ends[rows, k], stack.ends[rows, k + 1]
         gaps = problem.arcs.energy(at) + 0.5 * curvature.added * at * at - stack.energy(at)
         loose = np.zeros(len(at), dtype=bool)

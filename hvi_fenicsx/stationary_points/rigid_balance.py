@@ -15,10 +15,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array, Integers
+from .arcs import ArcTable
 from .elastic_parts import ElasticParts
 from .graph_clip import GraphClip, clipped_again
 from .rigid_motions import RigidMotions
-from .scalar_problem import ArcTable, ScalarProblem
+from .scalar_problem import ScalarProblem
 
 EPSILON = float(np.finfo(float).eps)
 

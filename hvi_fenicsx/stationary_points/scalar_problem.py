@@ -5,15 +5,13 @@ An argument is an unknown, or the length of a vector of unknowns.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from ..laws.arc import Arc
-from ..typing import Array, Integers, Mask
-from .arcs import INF, ROUNDING, Chain
+from ..typing import Array
+from .arcs import INF, ArcTable, Chain
 from .lengths import Lengths
 from .rigid_motions import RigidMotions
 from .thresholds import DEFAULT, Thresholds
@@ -118,128 +116,3 @@ class ScalarProblem:
         """The sum of the sizes of all parts of the energy at x: what rounding is relative to."""
         elastic = 0.5 * np.abs(x) @ (np.abs(self.stiffness) @ np.abs(x)) + np.abs(self.force) @ np.abs(x)
         return float(elastic + np.abs(self.arcs.energy(self.arguments(x))).sum()) + abs(self.constant)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ArcTable:
-    """Chains over the whole line as arrays (n, m); rows are padded with empty arcs at +inf.
-
-    Attributes:
-        low: begin of each arc; -inf at the first.
-        high: end of each arc; inf at the last.
-        anchors: displacements.
-        values: energies at the anchors.
-        tractions: at the anchors.
-        slopes: of the tractions.
-        before: traction at the end of each arc.
-        after: traction at the begin of each arc.
-    """
-
-    low: Array
-    high: Array
-    anchors: Array
-    values: Array
-    tractions: Array
-    slopes: Array
-    before: Array
-    after: Array
-
-    @classmethod
-    def of(cls, chains: Sequence[Chain]) -> ArcTable:
-        """Stack chains."""
-        table = np.full((len(chains), max(len(c) for c in chains), 6), Arc(INF, INF, 0.0, 0.0, 0.0, 0.0))
-        for rows, arcs in zip(table, chains, strict=True):
-            rows[: len(arcs)] = arcs
-        low, high, anchors, values, tractions, slopes = np.moveaxis(table, 2, 0)
-        end, begin = np.where(np.isfinite(high), high, anchors), np.where(np.isfinite(low), low, anchors)
-        return cls(
-            low=low,
-            high=high,
-            anchors=anchors,
-            values=values,
-            tractions=tractions,
-            slopes=slopes,
-            before=tractions + slopes * (end - anchors),
-            after=tractions + slopes * (begin - anchors),
-        )
-
-    @cached_property
-    def rounding(self) -> Array:
-        """The size of a jump of the traction that is rounding, (n,)."""
-        return np.asarray(ROUNDING * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1))
-
-    def at(self, x: Array) -> Integers:
-        """The arc that holds x, of the two at a joint the left one; (n,)."""
-        return np.asarray((self.high < x[:, None]).sum(axis=1), dtype=np.int64)
-
-    def energy(self, x: Array) -> Array:
-        """φᵢ(xᵢ), (n,)."""
-        rows, k = np.arange(len(x)), self.at(x)
-        d = x - self.anchors[rows, k]
-        return np.asarray(self.values[rows, k] + (self.tractions[rows, k] + 0.5 * self.slopes[rows, k] * d) * d)
-
-    def meets(self, low: Array, high: Array) -> Mask:
-        """Which arcs have more than a point in common with a box, (n, m); where the box is a point, its arc.
-
-        Args:
-            low: of the box, (n,).
-            high: of the box, (n,).
-        """
-        inside = (self.low < high[:, None]) & (self.high > low[:, None])
-        points = np.flatnonzero(low >= high)
-        inside[points] = False
-        inside[points, self.at(low)[points]] = True
-        return np.asarray(inside)
-
-    def drops(self, low: Array, high: Array) -> Array:
-        """The largest drop of the traction strictly inside a box, (n,); 0 where it only rises.
-
-        Args:
-            low: of the box, (n,).
-            high: of the box, (n,).
-        """
-        inside = (self.high[:, :-1] > low[:, None]) & (self.high[:, :-1] < high[:, None])
-        fall = np.where(inside, self.before[:, :-1] - self.after[:, 1:], 0.0)
-        fall = np.where(fall > self.rounding[:, None], fall, 0.0)
-        return np.asarray(fall.max(axis=1, initial=0.0))
-
-    def least_slope(self, low: Array, high: Array) -> Array:
-        """The least slope of the arcs that meet a box, (n,).
-
-        Args:
-            low: of the box, (n,).
-            high: of the box, (n,).
-        """
-        return np.asarray(np.where(self.meets(low, high), self.slopes, np.inf).min(axis=1))
-
-    def rates(self, t: Array) -> tuple[Array, Array]:
-        """The tractions right of and left of t, (n,) each."""
-        rows = np.arange(len(t))
-        behind, k = np.asarray((self.high <= t[:, None]).sum(axis=1), dtype=np.int64), self.at(t)
-        after, before = (
-            self.tractions[rows, i] + self.slopes[rows, i] * (t - self.anchors[rows, i]) for i in (behind, k)
-        )
-        return np.asarray(after), np.asarray(before)
-
-    def least(self, low: Array, high: Array, added: Array, force: Array) -> tuple[Array, Array]:
-        """The least of φ + ½ d t² - force t over an interval, and the t where it is taken, (n,) each.
-
-        Args:
-            low: of the intervals, finite, (n,).
-            high: of the intervals, finite, (n,).
-            added: d, (n,).
-            force: (n,).
-        """
-        first, last = np.maximum(self.low, low[:, None]), np.minimum(self.high, high[:, None])
-        slope, offset = self.slopes + added[:, None], self.tractions - self.slopes * self.anchors - force[:, None]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            turn = np.clip(np.where(slope > 0.0, -offset / slope, first), first, last)
-            places = np.stack([first, last, turn])
-            d = places - self.anchors
-            values = self.values + (self.tractions + 0.5 * self.slopes * d) * d
-            values += (0.5 * added[:, None] * places - force[:, None]) * places
-        values = np.where(first <= last, values, np.inf)
-        flat = np.moveaxis(values, 0, 1).reshape(len(low), -1)
-        k = np.argmin(flat, axis=1)[:, None]
-        at = np.moveaxis(places, 0, 1).reshape(len(low), -1)
-        return np.take_along_axis(flat, k, axis=1)[:, 0], np.take_along_axis(at, k, axis=1)[:, 0]

@@ -28,7 +28,7 @@ class PolylineThresholds:
 
     far: float = 1e6
     bent: float = 0.01
-    coarse: float = 1e-4
+    coarse: float = 1e-6
     samples: int = 512
     few_samples: int = 32
     most_nodes: int = 2_000

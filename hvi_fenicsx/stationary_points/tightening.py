@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array
+from .arcs import ArcTable
 from .graph_clip import GraphClip, clipped_again
-from .scalar_problem import ArcTable, ScalarProblem
+from .scalar_problem import ScalarProblem
 
 
 class ForceIntervals:

@@ -22,7 +22,7 @@ from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.reduced.condensed_problem import Bonds
 from hvi_fenicsx.stationary_points.all_points import Enumeration
-from hvi_fenicsx.stationary_points.arcs import FREE, arcs_of, chain, energy, total
+from hvi_fenicsx.stationary_points.arcs import FREE, ArcTable, arcs_of, chain, energy, total
 from hvi_fenicsx.stationary_points.boxes import fresh_box
 from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.stationary_points.envelopes import envelopes
@@ -32,7 +32,7 @@ from hvi_fenicsx.stationary_points.point_list import StationaryPoint
 from hvi_fenicsx.stationary_points.progress_words import Clock, Unit, lowest_in_words
 from hvi_fenicsx.stationary_points.relaxation import Relaxation
 from hvi_fenicsx.stationary_points.rigid_balance import RigidBalance
-from hvi_fenicsx.stationary_points.scalar_problem import ArcTable, ScalarProblem
+from hvi_fenicsx.stationary_points.scalar_problem import ScalarProblem
 from hvi_fenicsx.stationary_points.stationarity import Kind
 
 Array = npt.NDArray[np.float64]
