@@ -3,9 +3,6 @@
     ./hvi exec python3 benchmarks/paths.py [--only WORDS] [--write]
 
 ``balance``: the work of forces on displacements of path.csv (trapezoidal sums; where a grip moves, the column ``work``)
-minus what is stored, dissipated and released, at every row, relative to the largest work. ``other follower``: the
-predictor-corrector on the same problem: by how much its peak factor differs from the exact one, relative to it; bold
-where it ends otherwise. ``--write`` puts the table into docs/benchmarks/paths.md.
 """
 
 from __future__ import annotations
@@ -23,10 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.equilibrium_paths.arc_length.follower import ArcLengthFollower
-from hvi_fenicsx.equilibrium_paths.state import Follow, PathOptions
 from hvi_fenicsx.modelling.following import ModelPath
-from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.scene.overrides import override
 
 LIST = Path(__file__).with_suffix(".toml")
@@ -42,7 +36,6 @@ HEAD = (
     "certified",
     "whole body",
     "balance",
-    "other follower",
     "processor time, s",
 )
 
@@ -79,18 +72,6 @@ def _largest(path: ModelPath, work: npt.NDArray[np.float64], potential: npt.NDAr
     return float(np.max(np.abs(left - left[0])) / max(np.max(np.abs(work)), np.ptp(stored), 1e-300))
 
 
-def other_follower(path: ModelPath) -> str:
-    """By how much the peak factor by predictor and corrector differs, relative to it."""
-    wanted = path.run.wanted
-    problem = Condensation(path.run.prepared.system, path.scaled).problem
-    remember = range(len(problem.bonds) if wanted.memory else 0)
-    options = PathOptions(programme=wanted.to, follow=Follow(wanted.follow), remember=remember)
-    follower = ArcLengthFollower(problem, options)
-    factors = [state.factor for state in follower.states()]
-    differs = abs(max(factors) / path.factor.max() - 1.0)
-    return f"{differs:.0e}" if follower.end == path.end else f"**{follower.end}** ({follower.reason})"
-
-
 def followed(name: str, given: hvi.Scene) -> tuple[Any, ...]:
     """The row of one path."""
     start = time.process_time()
@@ -100,7 +81,7 @@ def followed(name: str, given: hvi.Scene) -> tuple[Any, ...]:
     certified = "all" if not path.uncertified else f"**{len(path.rows) - path.uncertified}**"
     kinds = (len(path.folds), len(path.jumps), f"{path.peak_factor:.6g}")
     end = path.end if path.end in ("reached", "escapes") else f"**{path.end}** ({path.reason})"
-    figures = (certified, path.examined, f"{imbalance(path):.0e}", other_follower(path), f"{seconds:.1f}")
+    figures = (certified, path.examined, f"{imbalance(path):.0e}", f"{seconds:.1f}")
     return (name, vertices, len(path.rows), *kinds, end, *figures)
 
 
@@ -116,8 +97,7 @@ def main() -> None:
         rows.append(followed(name, scene(tables, base, changes)))
         print(*rows[-1], sep="\t", flush=True)
     lost = sum("**" in str(row[6]) for row in rows)
-    apart = sum("**" in str(row[-2]) or float(row[-2]) > 1e-6 for row in rows)
-    print(f"{len(rows)} paths, {lost} lost; the followers differ on {apart}", file=sys.stderr)
+    print(f"{len(rows)} paths, {lost} lost", file=sys.stderr)
     if options.write:
         common.insert(PAGE, "paths", common.table(HEAD, rows))
 

@@ -10,7 +10,7 @@ from .accuracy import quantities
 from .accuracy.goal import AccuracyResult
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
-from .load_path import LoadPath
+from .paths.load_path import LoadPath
 from .problem import effect_summary
 from .reduced import loading
 from .rigid import AnyBody, LoadFactors, Mode

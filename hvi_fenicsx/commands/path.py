@@ -6,9 +6,9 @@ import argparse
 from typing import Any
 
 from .. import console
-from ..equilibrium_paths.state import End
-from ..load_path import PathRow
-from ..path.following import Control, PathRun
+from ..load_paths.following import Control, PathRun
+from ..paths.load_path import PathRow
+from ..paths.state import End
 from ..results import path_files
 from ..runtime import journal
 from ..runtime.journal import Journal

@@ -13,7 +13,7 @@ from ..accuracy import control, quantities
 from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.goal import AccuracyResult, Goal
 from ..errors import ExitCode, InputError
-from ..path import last_borne
+from ..load_paths import last_borne
 from ..results.whole import BegunResult, begin_whole, picture_process
 from ..runtime.timing import Timer
 from ..workflow import Solution, find_solution, prepare

@@ -17,8 +17,8 @@ from pydantic import ValidationError
 
 from .. import console
 from ..errors import InputError
-from ..load_path import LoadPath
-from ..path.following import Control, PathRun
+from ..load_paths.following import Control, PathRun
+from ..paths.load_path import LoadPath
 from ..report.path_reader import PathResult
 from ..results import ResultFolder, path_files
 from ..results.output_folder import existing

@@ -13,9 +13,9 @@ from pydantic import ValidationError
 
 from .. import console, workflow
 from ..errors import InputError
-from ..load_path import LoadPath
+from ..load_paths import last_borne
 from ..mesh.domain import Domain
-from ..path import last_borne
+from ..paths.load_path import LoadPath
 from ..problem import spaces
 from ..runtime.argument_checks import require_kind, require_switch
 from ..runtime.log import newton_step

@@ -9,9 +9,9 @@ from typing import Any
 from dolfinx import fem
 
 from ..certify import certificate
-from ..equilibrium_paths.state import End, Event
-from ..load_path import LoadPath
-from ..path.following import PathRun
+from ..load_paths.following import PathRun
+from ..paths.load_path import LoadPath
+from ..paths.state import End, Event
 from ..report.html import path_page
 from ..runtime import writing
 from ..runtime.mpi import on_root

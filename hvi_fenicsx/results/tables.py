@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..certify import placed_forces
-from ..load_path import LoadPath, PathRow
+from ..paths.load_path import LoadPath, PathRow
 from ..problem import part_areas, spaces
 from ..problem.nodal_forces import NodalForces
 from ..report.contact_part import ContactPart

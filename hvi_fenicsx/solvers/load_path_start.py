@@ -1,7 +1,7 @@
 """A start from the load path: the equilibrium to which loading in proportion leads, on the condensed system.
 
 Where laws soften, starts of the iteration are far from the equilibria that loading leads to, and where a state is
-metastable there may be none. The path (:mod:`..equilibrium_paths`) tells: it leads to an equilibrium under the whole
+metastable there may be none. The path (:mod:`..paths`) tells: it leads to an equilibrium under the whole
 load, or it ends before.
 """
 
@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from ..equilibrium_paths.bonds import is_piecewise_linear
-from ..equilibrium_paths.full_load import FullLoad, at_full_load
-from ..equilibrium_paths.watch import Watch
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
 from ..laws.smoothing.base import SmoothedLaw
+from ..paths.full_load import FullLoad, at_full_load
+from ..paths.graphs import is_straight
+from ..paths.state import Watch
 from ..reduced.condensation import Condensation
 from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking
@@ -123,7 +123,7 @@ def _on_first_rank(
 
 def _is_short(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> bool:
     """Whether the path is piecewise linear, or a curve of few unknowns that softening makes worth while."""
-    return is_piecewise_linear(problem) or problem.size <= _most_on_curve([t.exact for t in system.terms], thresholds)
+    return is_straight(problem) or problem.size <= _most_on_curve([t.exact for t in system.terms], thresholds)
 
 
 def _most_on_curve(laws: Sequence[Superpotential], thresholds: PathThresholds) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ..equilibrium_paths.thresholds import Thresholds as FollowingThresholds
+from ..paths.thresholds import Thresholds as FollowingThresholds
 from ..system.thresholds import Thresholds as LinearThresholds
 
 FULL_STEPS = "basic"

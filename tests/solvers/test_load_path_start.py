@@ -9,9 +9,9 @@ import pytest
 from scenes import Table, solved
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.equilibrium_paths.eliminated import without_fixed
-from hvi_fenicsx.equilibrium_paths.kinds import kind_of
-from hvi_fenicsx.equilibrium_paths.state import PathOptions
+from hvi_fenicsx.paths.follower import Follower
+from hvi_fenicsx.paths.state import PathOptions
+from hvi_fenicsx.paths.substitutions import without_fixed
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.solvers import load_path_start
 
@@ -79,7 +79,7 @@ def anchor(load: float) -> Table:
 def largest_factor(table: Table) -> float:
     """The factor at which the path of unsmoothed laws ends."""
     problem = Condensation(prepare(Scene.model_validate(table)).system).problem
-    return max(state.factor for state in kind_of(problem).follower(problem, PathOptions(programme=(9.0,))).states())
+    return max(state.factor for state in Follower(problem, PathOptions(programme=(9.0,))).states())
 
 
 def said_factor(reason: str) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hvi_fenicsx.load_path import PathRow
+from hvi_fenicsx.paths.load_path import PathRow
 
 
 def path_row(factor: float, event: str = "kink") -> PathRow:

@@ -9,8 +9,8 @@ import numpy as np
 from mpi4py import MPI
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.load_path import LoadPath
-from hvi_fenicsx.path.following import PathRun
+from hvi_fenicsx.load_paths.following import PathRun
+from hvi_fenicsx.paths.load_path import LoadPath
 from hvi_fenicsx.solvers.thresholds import PathThresholds
 from hvi_fenicsx.workflow import DEFAULT
 

@@ -14,8 +14,8 @@ from runs import LONG_RANKS, on_ranks
 from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.equilibrium_paths.bonds import is_piecewise_linear
 from hvi_fenicsx.errors import InputError, SolverError
+from hvi_fenicsx.paths.graphs import is_straight
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.system.factorisation import form_of
 from hvi_fenicsx.system.interior import Interior
@@ -149,7 +149,7 @@ def test_only_what_carries_a_bound_or_a_law_is_kept(name: str) -> None:
 
 def test_a_spring_on_a_length_is_springs_on_its_components() -> None:
     assert any(bonds.radial for bonds in condensed("in_space")[1].problem.bonds)
-    assert is_piecewise_linear(condensed("on_springs")[1].problem)
+    assert is_straight(condensed("on_springs")[1].problem)
 
 
 def test_a_slide_that_nothing_resists_needs_no_unknown_whether_or_not_a_load_works_on_it() -> None:

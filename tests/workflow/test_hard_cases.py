@@ -17,7 +17,7 @@ from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear, solved
 
 from hvi_fenicsx.certify import certificate
-from hvi_fenicsx.path.following import Control, PathRun
+from hvi_fenicsx.load_paths.following import Control, PathRun
 from hvi_fenicsx.scene import PathTable
 from hvi_fenicsx.solvers import refinement
 from hvi_fenicsx.solvers.method import SolveResult

@@ -1,0 +1,238 @@
+"""A prepared scene followed over its load factor: states, certified, as rows in SI."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+
+from ..errors import InputError
+from ..paths.follower import Follower
+from ..paths.graphs import is_straight
+from ..paths.load_path import LoadPath, PathRow
+from ..paths.state import End, Event, Follow, PathOptions, PathState, Watch
+from ..problem.factored_problem import FactoredProblem
+from ..problem.problem import Problem
+from ..reduced import loading
+from ..reduced.condensation import Condensation
+from ..runtime.journal import Record
+from ..scene import PathTable
+from ..solvers import obstacle_force
+from ..system import existence
+from ..workflow import Preparation
+from . import records
+from .certifying import Certifier, Verdict
+from .measures import Measures
+
+
+@dataclass(frozen=True, kw_only=True)
+class Control:
+    """What a path is followed with.
+
+    Attributes:
+        keep: is given the record of each new state, on all ranks.
+        progress: is told each new row.
+        interrupted: whether to stop (collective); asked at each state, and at each step of a jump.
+        jumping: is told the factor of a long jump and its steps so far.
+    """
+
+    keep: Callable[[Record], None] = lambda record: None
+    progress: Callable[[int, PathRow], None] = lambda number, row: None
+    interrupted: Callable[[], bool] = lambda: False
+    jumping: Callable[[float, int], None] = lambda factor, steps: None
+
+
+class PathRun:
+    """The path of a prepared scene. Creation is collective.
+
+    Args:
+        prepared: the scene, assembled.
+        wanted: what path is wanted.
+        interrupted: whether to stop (collective), asked while the body is condensed.
+
+    Raises:
+        InputError: on all ranks alike: the path cannot be followed.
+        Interrupted: on all ranks alike: it is to stop.
+
+    Attributes:
+        prepared: the scene.
+        wanted: what path is wanted.
+        scaled: the names of what the factor multiplies.
+        states: those found so far.
+    """
+
+    def __init__(
+        self, prepared: Preparation, wanted: PathTable, interrupted: Callable[[], bool] = lambda: False
+    ) -> None:
+        self.prepared, self.wanted = prepared, wanted
+        system = prepared.system
+        obstacle_force.refuse(system.problem, "no path is followed")
+        known = loading.names(system)
+        self.scaled = known if wanted.scaled is None else wanted.scaled
+        if not known:
+            raise InputError("path: nothing drives the body; add a load or a prescribed displacement")
+        with prepared.timer("setup"):
+            most = prepared.options.thresholds.path.largest_dense
+            self._condensation = Condensation(system, self.scaled, most, interrupted)
+            self._measures = Measures(system, self._condensation, self.scaled)
+        self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
+        self._factored = FactoredProblem(system.problem, self.scaled)
+        tolerance, largest = prepared.options.tolerance, max(wanted.to, key=abs)
+        parts = system, self._condensation, self._factored, tolerance, self._remember
+        self._certifier = Certifier(*parts, largest)
+        self.states: list[PathState] = []
+        self._verdicts: list[Verdict] = []
+        self._extremes: list[tuple[float, float]] = []
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the path is straight between two events."""
+        return is_straight(self._condensation.problem)
+
+    @property
+    def size(self) -> int:
+        """The number of unknowns of Γc that are followed."""
+        return self._condensation.problem.size
+
+    def follow(self, control: Control, known: Sequence[Record] = ()) -> LoadPath:
+        """Follow the path to its end. Collective.
+
+        Args:
+            control: what it is followed with.
+            known: the records of its first states, from which to go on.
+
+        Raises:
+            InputError: on all ranks alike: the path cannot be followed.
+        """
+        # why it ends is found again
+        for one in itertools.takewhile(lambda record: record["event"] != Event.END, known):
+            self._take(*records.state(one))
+        rows = list(self._rows())
+        follower = self._follower(control)
+        with self.prepared.timer("solve"):
+            for state in _finite(follower.states()):
+                if follower.end is End.INTERRUPTED:
+                    break  # the last state is no event: the path goes on from the one before
+                with self.prepared.timer("certificate"):
+                    verdict = self._certifier.verdict(state, len(self.states))
+                self._take(state, verdict)
+                control.keep(records.record(state, verdict))
+                rows.append(self._row(len(rows)))
+                control.progress(len(rows) - 1, rows[-1])
+        return LoadPath(
+            dimension=self.prepared.problem.scales.dimension,
+            scaled=self.scaled,
+            rows=tuple(rows),
+            end=str(follower.end or End.LOST),
+            reason=follower.reason,
+            examined=sum(verdict.whole for verdict in self._verdicts),
+        )
+
+    def _follower(self, control: Control) -> Follower:
+        wanted = self.wanted
+        options = PathOptions(
+            programme=wanted.to,
+            follow=Follow(wanted.follow),
+            remember=self._remember,
+            stops=wanted.contact_at,
+            thresholds=self.prepared.options.thresholds.path.following,
+            **self._limits(),
+        )
+        resume = self.states[-1] if self.states else None
+        watch = Watch(control.interrupted, control.jumping)
+        return Follower(self._condensation.problem, options, resume, watch)
+
+    def _limits(self) -> dict[str, Any]:
+        """With which factors there is an equilibrium, and with which none, where rigid motions tell. Collective.
+
+        Where supports and obstacles are moved to does not matter to them, nor do given strains.
+        """
+        loads = existence.loads_of_rigid_motions(self.prepared.problem, self.prepared.system.forces)
+        scaled = sorted(loads.keys() & set(self.scaled))
+        if not scaled:
+            return {"borne": (np.inf, -np.inf)} if self.prepared.solvability.state == "escapes" else {}
+        known = self.prepared.load_factors(*scaled)
+        return {"borne": (known.peak_from, known.peak), "held": (known.held_from, known.held)}
+
+    def _take(self, state: PathState, verdict: Verdict) -> None:
+        self.states.append(state)
+        self._verdicts.append(verdict)
+
+    def _rows(self) -> Iterator[PathRow]:
+        return (self._row(number) for number in range(len(self.states)))
+
+    def _row(self, number: int) -> PathRow:
+        state, verdict, scales = self.states[number], self._verdicts[number], self.prepared.problem.scales
+        largest = self._reached(number) if self.wanted.memory else None
+        place, d = state.place, scales.dimension
+        return PathRow(
+            factor=state.factor,
+            event=str(state.event),
+            part=None if place is None else place.part,
+            point=None if place is None else np.asarray(place.point[:d]),
+            energy=state.energy * scales.energy,
+            work=state.work * scales.energy,
+            dissipated=state.dissipated * scales.energy,
+            released=state.released * scales.energy,
+            unstable=state.unstable,
+            forces=self._measures.forces(state.x, state.factor, largest),
+            displacements=self._measures.displacements(state.x, state.factor),
+            certified=verdict.certified,
+        )
+
+    def _reached(self, number: int) -> tuple[float, float]:
+        """The least and the greatest factor up to a row."""
+        for state in self.states[len(self._extremes) : number + 1]:
+            low, high = self._extremes[-1] if self._extremes else (0.0, 0.0)
+            self._extremes.append((min(low, state.factor), max(high, state.factor)))
+        return self._extremes[number]
+
+    def displacement(self, number: int) -> fem.Function:
+        """The displacement at a row, nondimensional, ghosts updated. Collective.
+
+        Args:
+            number: of the row.
+        """
+        return self._certifier.displacement(self.states[number], self._verdicts[number])
+
+    def state(self, number: int) -> tuple[Problem, fem.Function]:
+        """The problem at the factor of a row, and the displacement there. Collective.
+
+        The problem holds until another factor is asked for.
+
+        Args:
+            number: of the row.
+        """
+        return self._factored.at(self.states[number].factor), self.displacement(number)
+
+    def crossings(self, factor: float) -> Iterator[tuple[int, Problem, fem.Function]]:
+        """The states at which the path crosses a factor: the row before, problem and displacement. Collective.
+
+        Between two rows the path is straight; one that is not has a row there.
+
+        Args:
+            factor: λ.
+        """
+        for number, (before, after) in enumerate(zip(self.states, self.states[1:], strict=False)):
+            low, high = sorted((before.factor, after.factor))
+            last = number + 2 == len(self.states)
+            if after.event is Event.JUMP or not low <= factor <= high or low == high:
+                continue
+            if factor == after.factor and not last:
+                continue
+            share = (factor - before.factor) / (after.factor - before.factor)
+            x = before.x + share * (after.x - before.x)
+            yield number, self._factored.at(factor), self._condensation.displacement(x, factor)
+
+    def free(self) -> None:
+        """Free the condensed body; the rows stay, displacements cannot be asked for any more. Collective."""
+        self._condensation.free()
+
+
+def _finite(states: Iterator[PathState]) -> Iterator[PathState]:
+    """The states up to the first that is no number."""
+    return itertools.takewhile(lambda state: np.isfinite(state.factor) and bool(np.all(np.isfinite(state.x))), states)

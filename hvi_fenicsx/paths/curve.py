@@ -1,0 +1,252 @@
+"""A curve of equilibria, followed by predictor and corrector with arc length as its parameter.
+
+The predictor goes along the tangent of the equations in coordinates and factor; the corrector is Newton's method in the
+plane across it (Riks 1979; Wempner 1971), or with the condition of an event instead of the plane: that a coordinate is
+at the end of its segment, or that the factor has a wanted value. The equations on given segments are smooth
+(:mod:`.relations`), so Newton's method converges quadratically there. A step is refused and halved where the corrector
+does not converge or goes far, where the tangent turns by more than some degrees, or where the work along it is not what
+the energies say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+
+import numpy as np
+from typing_extensions import override
+
+from ..typing import Array
+from .branch import Move, Outcome, Passage, Refused
+from .events import Arc, Events, displacement_rate, driven_work
+from .passages import Crossing
+from .relations import ContactPoints
+from .state import Position
+
+
+class Curve(Events):
+    """The curve from one of its points on.
+
+    Args:
+        constant: the load at the factor 0, (n,).
+        rate: how it grows with the factor, (n,).
+        points: where all points are; changed.
+        z: their coordinates, (n,).
+        factor: λ.
+        fineness: of the steps; 0.1 for a tenth of their length.
+
+    Attributes:
+        length: of the next step.
+        shortest: the shortest step that is tried.
+        disagreement: of the work along a step with the energies, 1 where it is as large as is allowed.
+    """
+
+    def __init__(
+        self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float, fineness: float = 1.0
+    ) -> None:
+        super().__init__(constant, rate, points, z, factor)
+        self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, self.limits.shortest
+        self._next = self.length
+        self.disagreement: Callable[[Arc], float] = lambda move: 0.0
+        self._size = self._extent()
+
+    def _extent(self) -> float:
+        values = self.here.values
+        ends = np.concatenate([self.points.low, self.points.high, values.s])
+        return float(np.max(np.abs(ends[np.isfinite(ends)]), initial=1.0))
+
+    @override
+    def advance(self, aim: float) -> Arc:
+        if self._goes_on_for_ever(aim):
+            return Arc(outcome=Outcome.AWAY, before=self.here, after=self.here)
+        while self.length > self.shortest:
+            try:
+                move = self._tried(aim)
+            except (Refused, np.linalg.LinAlgError):
+                self.length *= 0.5
+                continue
+            self.here = move.after
+            if move.outcome is Outcome.FACTOR:
+                self.here.y[-1] = aim / self.unit
+            return move
+        return Arc(outcome=Outcome.STUCK, before=self.here, after=self.here)
+
+    def _goes_on_for_ever(self, aim: float) -> bool:
+        """Whether nothing ends the curve."""
+        distances, _ = self._ends()
+        nearest = min(float(np.min(distances, initial=np.inf)), self._until(aim))
+        if not self.points.bent:
+            return not np.isfinite(nearest)
+        far = self.limits.far * self._size
+        if self.rising == 0.0 and nearest > far and self._is_straight(far):
+            return True
+        return not np.isfinite(nearest) and bool(np.max(np.abs(self.here.values.s), initial=0.0) > far)
+
+    def _is_straight(self, way: float) -> bool:
+        """Whether the equations stay satisfied so far along the tangent: a body slides on, and no force changes."""
+        y = self.here.y + way * self.here.tangent
+        load = self.points.stiffness @ self.here.values.x + self.here.values.force
+        size = 1.0 + float(np.max(np.abs(load / self.points.forces), initial=0.0))
+        allowed = 1e-9 * size + 4.0 * np.finfo(float).eps * way
+        return bool(np.max(np.abs(self.residual(y, self.points.values(y[:-1])))) <= allowed)
+
+    def _ends(self) -> tuple[Array, Array]:
+        """Along the tangent, the ways of all points to the ends of their segments, and these ends, (m,) each."""
+        points, s = self.points, self.here.values.s
+        rates = self.points.rates(self.here.y[:-1], self.here.tangent[:-1])
+        largest = float(np.max(np.abs(self.here.tangent)))
+        ends = np.where(rates > 0.0, points.high, points.low)
+        there = np.abs(ends - s) <= points.allowances(self.here.values, rates, largest)
+        moves = np.abs(rates) > np.where(there & points.bent, self.limits.undecided, self.limits.standing) * largest
+        found = np.full(len(points), np.inf)
+        found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)
+        return found, ends
+
+    def _until(self, aim: float) -> float:
+        """The way to a factor."""
+        rate, left = self.rising, aim / self.unit - float(self.here.y[-1])
+        return left / rate if rate * left > 0.0 else np.inf
+
+    def _tried(self, aim: float) -> Arc:
+        """A step of the present length, or to what comes first."""
+        start, tangent = self.here.y, self.here.tangent
+        ways, ends = self._ends()
+        first, until, safe = float(np.min(ways, initial=np.inf)), self._until(aim), self._safe()
+        way = min(first, until, safe)
+        # what ends with the factor at its aim goes on from there, if at all
+        if until <= way * (1.0 + 0.1 * self.limits.rounding):
+            way = until
+            outcome, point, condition = Outcome.FACTOR, None, self.at_factor(aim)
+        elif way == first:
+            point = int(np.argmin(ways))
+            if way == 0.0:
+                return self._in_place(point)
+            outcome, condition = Outcome.END, self.at_end(point, float(ends[point]))
+        else:
+            outcome, point, condition = Outcome.STEP, None, self.plane(way)
+        predicted = start + way * tangent
+        y = self.correct(predicted, condition)
+        self._refuse_far(predicted, y, way)
+        return self._checked(self._earliest(self._moved(outcome, point, y), aim), way)
+
+    def _safe(self) -> float:
+        """The longest way that is safe."""
+        largest = float(np.max(np.abs(self.here.tangent)))
+        if not self.points.bent:
+            return np.inf
+        rates = np.abs(self.points.rates(self.here.y[:-1], self.here.tangent[:-1]))
+        allowed = self._fineness * self.points.reach(self.here.values)
+        reach = np.min(allowed / np.maximum(rates, 1e-300), initial=np.inf)
+        return float(min(self.length / largest, reach))
+
+    def _refuse_far(self, predicted: Array, y: Array, way: float) -> None:
+        """Refuse a step whose corrector went far beside its length; else adapt the length of the next one."""
+        if not self.points.bent:
+            return
+        off = float(np.max(np.abs(y - predicted)))
+        size = way * float(np.max(np.abs(self.here.tangent)))
+        if off > 0.3 * size + 1e-12 * float(np.max(np.abs(y))):
+            raise Refused
+        wanted = 0.05 * self._fineness
+        grown = min(4.0, np.sqrt(wanted * size / off)) if off > 0.0 else 4.0
+        self._next = max(size, self.length if grown > 1.0 else 0.0) * max(grown, 0.3)
+
+    @override
+    def position(self, leg: int) -> Position:
+        tangent = self.here.tangent
+        driver = int(np.argmax(np.abs(tangent)))
+        return Position(
+            leg=leg,
+            numbers=self.points.numbers.copy(),
+            driver=driver,
+            heading=1 if tangent[driver] > 0.0 else -1,
+            small=self.z.copy(),
+            step=self.length,
+        )
+
+    def resume(self, position: Position) -> None:
+        """Go on as the branch went.
+
+        Args:
+            position: where it was.
+        """
+        self.head(np.eye(1, len(self.here.y), position.driver)[0], position.heading)
+        self.watch_folds()
+        self.length = position.step
+
+    @override
+    def set_out(self, sign: float, check: Callable[[], None]) -> None:
+        self.head_with_load(sign)
+        if Crossing(self, check).run():
+            self._settle_at_factor()
+
+    @override
+    def watch_folds(self) -> None:
+        rate = self.rising
+        self.trend = int(np.sign(rate)) if rate else self.trend
+
+    @override
+    def pass_on(self, move: Move, check: Callable[[], None]) -> list[Passage]:
+        return Crossing(self, check).run(move)
+
+    @override
+    def note(self, move: Move) -> None:
+        if move.outcome is Outcome.FOLD:
+            self.trend, self.unstable = -self.trend, self._beyond(move)
+            return
+        if move.outcome in (Outcome.END, Outcome.TURNED):
+            self._settle()
+            self.watch_folds()
+        self.unstable = self.points.unstable_directions(self.here.values)
+
+    def _beyond(self, move: Move) -> int:
+        """The number of unstable directions after a fold: vᵀH v = λ' f1ᵀv along the curve changes its sign there."""
+        assert isinstance(move, Arc)
+        held = self.trend * float(self._rate @ displacement_rate(self.points, move.before))
+        return max(self.unstable + (1 if held < 0.0 else -1), 0)
+
+    @override
+    def driven(self, move: Move) -> float:
+        assert isinstance(move, Arc)
+        return driven_work(move, self.points, self._rate, self.unit)
+
+    @override
+    def must_leave(self, aim: float) -> bool:
+        """Unstable, or away from the factor: a bond that turns back makes the path stable, and turn."""
+        return self.unstable > 0 or (aim - self.factor) * self.trend < 0.0
+
+    @override
+    def balanced(self, factor: float) -> Array:
+        return self.correct(self.here.y, self.at_factor(factor))[:-1]
+
+    def _settle(self) -> None:
+        """Take out what rounding has left in the equations: points pass their ends a little before or after them."""
+        with suppress(Refused):
+            self._settle_at(self.correct(self.here.y, self.plane(0.0)))
+
+    def _settle_at_factor(self) -> None:
+        """The same with the factor as it is."""
+        with suppress(Refused):
+            standing = self.rising == 0.0  # then it fixes no point of the curve
+            y = self.correct(self.here.y, self.plane(0.0) if standing else self.at_factor(self.factor))
+            self._settle_at(np.append(y[:-1], self.here.y[-1]))
+
+    def _settle_at(self, y: Array) -> None:
+        self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
+
+    def _checked(self, move: Arc, way: float) -> Arc:
+        """The step, if it did not leave the curve."""
+        if not self.points.bent:
+            return move
+        short = way < 1e-7
+        if not short and float(self.here.tangent @ move.after.tangent) < self.limits.least_turn:
+            raise Refused
+        disagreement = self.disagreement(move)
+        if not short and disagreement > 1.0:
+            self.length *= max(0.3, 1.6 * disagreement**-0.2)  # halved as well where it is refused
+            raise Refused
+        agreed = move.size * 0.8 * max(disagreement, 1e-4) ** -0.2
+        if move.outcome is not Outcome.STEP:  # an event that is near says nothing of the next step's length
+            agreed = max(agreed, self.length)
+        self.length = min(self._next, agreed)
+        return move

@@ -1,0 +1,158 @@
+"""How far a state is from the graphs of its laws and bounds: what certifies it on Γc, apart from how it was found."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from ..reduced.condensed_problem import CondensedProblem
+from ..typing import Array
+from .relations import ContactPoints
+from .state import PathState
+from .straight_state import StraightState, coordinates_at
+from .substitutions import factors, multiplied
+from .thresholds import DEFAULT
+from .vertex_laws import LawRows, law_rows
+
+
+class Distances:
+    """The distances of the states of one path.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds that remember.
+        rounding: a displacement this near to a break of a law, or to a bound, may be there.
+    """
+
+    def __init__(
+        self, problem: CondensedProblem, remember: Collection[int], rounding: float = DEFAULT.curve.near_break
+    ) -> None:
+        self._rounding = rounding
+        self._factors = factors(problem)
+        self._problem = multiplied(problem, self._factors)
+        self._laws = law_rows(self._problem, remember)
+
+    def __call__(self, state: PathState, carried: Array | None = None) -> float:
+        """The largest distance, relative to the forces.
+
+        Args:
+            state: the state.
+            carried: forces of laws and bounds, (n,); by default what the condensed body leaves them.
+        """
+        problem, x = self._problem, state.x * self._factors
+        elastic, load = problem.elastic @ x, problem.load(state.factor)
+        size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
+        force = load - elastic if carried is None else carried / self._factors
+        return self._largest(x, force, self._memories(state)) / size
+
+    def _memories(self, state: PathState) -> list[Array]:
+        """What each group of bonds remembers, (r, 4) each; zeros where it remembers nothing."""
+        ends = np.cumsum([0, *(len(rows.signs) for rows in self._laws)])
+        known = np.zeros((int(ends[-1]), 4)) if state.memory is None else state.memory
+        return [known[a:b] * rows.remembers for rows, a, b in zip(self._laws, ends, ends[1:], strict=False)]
+
+    def _largest(self, x: Array, force: Array, memories: list[Array]) -> float:
+        """The largest distance of a force that laws and bounds should give."""
+        low, high, worst = np.zeros(len(x)), np.zeros(len(x)), 0.0
+        rest, problem = force.copy(), self._problem
+        for rows, memory in zip(self._laws, memories, strict=True):
+            unknowns = rows.bonds.unknowns
+            if rows.bonds.radial:
+                lower = problem.lower[unknowns[:, 0]] if rows.bonds.opens else np.full(len(unknowns), -np.inf)
+                off = _off(rows, x[unknowns], force[unknowns], lower, memory, self._rounding)
+                worst = max(worst, float(np.max(off, initial=0.0)))
+                rest[unknowns] = 0.0
+            else:
+                least, most = _interval(rows, x[unknowns[:, 0]], memory, self._rounding)
+                np.add.at(low, unknowns[:, 0], least)
+                np.add.at(high, unknowns[:, 0], most)
+        allowed = self._rounding * float(np.max(np.abs(x), initial=0.0))
+        low[x <= problem.lower + allowed], high[x >= problem.upper - allowed] = -np.inf, np.inf
+        beyond = np.maximum(np.maximum(problem.lower - x, x - problem.upper), 0.0) * problem.elastic.diagonal
+        away = np.maximum(np.maximum(low - rest, rest - high), 0.0) + beyond
+        return max(worst, float(np.max(away, initial=0.0)))
+
+
+def _interval(rows: LawRows, x: Array, memory: Array, rounding: float) -> tuple[Array, Array]:
+    """The least and the greatest forces at coordinates, but for their rounding, (r,) each."""
+    near = rounding * (np.abs(x) + rows.law.length_scale)
+    ends = rows.traction(x - near, "left", memory), rows.traction(x + near, "right", memory)
+    return rows.bonds.weights * np.minimum(*ends), rows.bonds.weights * np.maximum(*ends)
+
+
+def _off(rows: LawRows, u: Array, force: Array, lower: Array, memory: Array, rounding: float) -> Array:
+    """How far forces are from those that a law on a length gives: along u, of a size of its graph, (r,).
+
+    An opening that is not positive has none, but for what its bound pushes.
+    """
+    near = rounding * (np.max(np.abs(u), axis=1) + rows.law.length_scale)
+    pushed = np.zeros(len(u))
+    if rows.bonds.opens:
+        shut, pressed = u[:, 0] <= near, u[:, 0] <= lower + near
+        pushed[shut & ~pressed] = np.maximum(-force[shut & ~pressed, 0], 0.0)
+        force[shut, 0], u[shut, 0] = np.maximum(force[shut, 0], 0.0), 0.0
+    length = np.linalg.norm(u, axis=1)
+    least, most = (_energies(rows, u) * end for end in _interval(rows, length, memory, rounding))
+    at_rest = np.maximum(np.linalg.norm(force, axis=1) - np.maximum(np.abs(least), np.abs(most)), 0.0)
+    directions = np.divide(u, length[:, None], out=np.zeros_like(u), where=length[:, None] > 0.0)
+    along = np.sum(force * directions, axis=1)
+    across = np.linalg.norm(force - along[:, None] * directions, axis=1)
+    moved = np.maximum(np.maximum(least - along, along - most), 0.0) + across
+    return np.asarray(np.where(length <= rounding * rows.law.length_scale, at_rest, moved) + pushed)
+
+
+def _energies(rows: LawRows, u: Array) -> Array:
+    """By what the mode mixity of vectors multiplies a law, (r,)."""
+    mixity, whole = rows.bonds.mixity, np.sum(u * u, axis=1)
+    if mixity is None:
+        return np.ones(len(u))
+    slips = u[:, 1:] if rows.bonds.opens else u
+    shares = np.divide(np.sum(slips * slips, axis=1), whole, out=np.zeros(len(u)), where=whole > 0.0)
+    return np.where(whole > 0.0, mixity.energy(shares), 1.0)
+
+
+class StateOnGraphs:
+    """A state along the graphs on which its laws and bounds are.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds that remember.
+        state: the state.
+
+    Attributes:
+        x: displacements, (n,).
+        force: of laws and bounds, with what bonds remember, (n,).
+    """
+
+    def __init__(self, problem: CondensedProblem, remember: Collection[int], state: PathState) -> None:
+        self._factors = factors(problem)
+        known = multiplied(problem, self._factors)
+        self._points = ContactPoints(known, remember)
+        self._z = coordinates_at(known, self._points, state)
+        self._read()
+
+    def _read(self) -> None:
+        values = self._points.values(self._z)
+        self.x, self.force = values.x / self._factors, values.force * self._factors
+
+    def take(self, load: Array) -> None:
+        """Move along the graphs until a small load more is carried, at the same factor, or an end is reached.
+
+        Args:
+            load: (n,).
+
+        Raises:
+            numpy.linalg.LinAlgError: the equations are singular.
+        """
+        self._z = self._z + self._change(load / self._factors)
+        s = self._points.s(self._z)
+        for k in np.flatnonzero((s < self._points.low) | (s > self._points.high)):
+            self._points.leave(self._z, int(k), forward=bool(s[k] > self._points.high[k]))
+        self._read()
+
+    def _change(self, load: Array) -> Array:
+        if self._points.straight:
+            return StraightState(self._points, self._z).inverse().solve(load)
+        matrix, rank = self._points.jacobian(self._points.values(self._z)), self._points.thresholds.curve.rank
+        return np.asarray(np.linalg.lstsq(matrix, load, rcond=rank)[0])

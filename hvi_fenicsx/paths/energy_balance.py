@@ -1,0 +1,227 @@
+"""The energy balance of a path: what the loads put in, what is stored, and what is lost, from the laws."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..reduced.condensed_problem import CondensedProblem
+from ..typing import Array, Integers
+from .events import Arc, driven_work
+from .relations import ContactPoints, Values
+from .vertex_laws import LawRows, VertexLaw, law_rows
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stored:
+    """The energies of one state.
+
+    Attributes:
+        energy: ½ a(u, u) - <g, u> + what the bonds would give back.
+        potential: <g, u>.
+        constant: the part of the energy that x does not change.
+        dissipated: lost in bonds with memory.
+        size: of the terms.
+        elastic: ½ a(u, u).
+        lost: by each bond with memory, for 1 at its mode, (b,).
+        scales: of the bonds' energies by mode, (b,).
+    """
+
+    energy: float
+    potential: float
+    constant: float
+    dissipated: float
+    size: float
+    elastic: float = 0.0
+    lost: Array = field(default_factory=lambda: np.zeros(0))
+    scales: Array = field(default_factory=lambda: np.zeros(0))
+
+
+class EnergyBalance:
+    """Work and dissipation, added up from state to state.
+
+    Args:
+        problem: the problem.
+        points: its points.
+        work: done before.
+        dissipated: before.
+
+    Attributes:
+        work: done by the loads and by what moves prescribed displacements.
+        stored: the energies of the last state.
+    """
+
+    def __init__(
+        self, problem: CondensedProblem, points: ContactPoints, work: float = 0.0, dissipated: float = 0.0
+    ) -> None:
+        self._problem, self._points, self.work = problem, points, work
+        self._size = sum(float(b.weights.sum()) * b.law.energy_scale for b in problem.bonds)
+        self._bonds = BondEnergies(problem, points)
+        self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
+        self.stored = Stored(energy=0.0, potential=0.0, constant=0.0, dissipated=0.0, size=0.0)
+
+    def at(self, values: Values, factor: float) -> Stored:
+        """The energies of a state.
+
+        Args:
+            values: of the points.
+            factor: λ.
+        """
+        problem, x = self._problem, values.x
+        elastic, load = 0.5 * float(x @ (problem.elastic @ x)), float(problem.load(factor) @ x)
+        constant = problem.constant_at(factor)
+        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._bonds.numbers)
+        back, lost, scales = self._bonds(values)
+        all_lost = float(scales @ lost)
+        return Stored(
+            energy=elastic - load + constant + plain + back,
+            potential=problem.potential(x, factor),
+            constant=constant,
+            dissipated=all_lost if self._potential else self._lost,
+            size=abs(elastic) + abs(load) + abs(constant) + abs(plain) + abs(back) + all_lost,
+            elastic=elastic,
+            lost=lost,
+            scales=scales,
+        )
+
+    def begin(self, values: Values, factor: float) -> None:
+        """Start at a state.
+
+        Args:
+            values: of the points.
+            factor: λ.
+        """
+        self.stored = self.at(values, factor)
+
+    def go(self, values: Values, factor: float, driven: float) -> None:
+        """Along a step.
+
+        Args:
+            values: of the points after it.
+            factor: λ after it.
+            driven: what the loads that grow did in it, ∫ f1ᵀx dλ.
+        """
+        before, after = self.stored, self.at(values, factor)
+        done = after.potential - before.potential + after.constant - before.constant - driven
+        self.work += done
+        if not self._potential:  # the bonds have no energy but the frozen one: what the work leaves is lost
+            self._lost += done - (after.energy + after.potential - before.energy - before.potential)
+            after = replace(after, dissipated=self._lost)
+        self._size = max(self._size, after.size)
+        self.stored = after
+
+    def leap(self, values: Values, factor: float) -> float:
+        """To another state at the same factor; returns the energy that is released.
+
+        Bonds whose energy depends on the mode lose what they break by at the mode of that state.
+
+        Args:
+            values: of the points.
+            factor: λ.
+        """
+        before, after = self.stored, self.at(values, factor)
+        if not self._potential:
+            self._lost += float(after.scales @ (after.lost - before.lost))
+            after = replace(after, dissipated=self._lost)
+        self.stored = after
+        self.work += self.stored.potential - before.potential
+        return before.energy + before.dissipated - self.stored.energy - self.stored.dissipated
+
+    def disagreement(self, arc: Arc, unit: float) -> float:
+        """By how much the work along a step misses what the energies say, 1 for all that is allowed.
+
+        Args:
+            arc: the step.
+            unit: of the factor.
+        """
+        if not self._potential:
+            return 0.0
+        before, after = (self.at(place.values, float(place.y[-1]) * unit) for place in (arc.before, arc.after))
+        change = self._strained(arc) + driven_work(arc, self._points, self._problem.force_rate, unit)
+        for sign, ends in ((-1.0, before), (1.0, after)):
+            change += sign * (ends.energy - ends.elastic + ends.dissipated - ends.constant)
+        size = max(self._size, before.size, after.size)
+        return abs(change) / (self._points.thresholds.curve.agreed * size or 1.0)
+
+    def _strained(self, arc: Arc) -> float:
+        """The change of ½ xᵀ S x, without the rounding that large displacements leave in each of its ends."""
+        before, after = arc.before.values.x, arc.after.values.x
+        return 0.5 * float((before + after) @ (self._problem.stiffness @ (after - before)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Group:
+    """One law at r vertices.
+
+    Attributes:
+        rows: the law in arrays.
+        laws: the laws of the vertices.
+        points: their numbers, (r,).
+        shared: the vertices at whose point another law acts, too.
+        first: the number of the first vertex among all.
+    """
+
+    rows: LawRows
+    laws: list[VertexLaw]
+    points: Integers
+    shared: list[int]
+    first: int
+
+    def tractions(self, points: ContactPoints, lengths: Array, forces: Array) -> Array:
+        """What each vertex has of the force at its point, (r,).
+
+        Args:
+            points: all points.
+            lengths: of the displacements by point, (m,).
+            forces: of all laws of each point, (m,).
+        """
+        found = np.asarray(forces[self.points] / self.rows.bonds.weights)
+        for row in self.shared:
+            k, law = int(self.points[row]), self.laws[row]
+            shares = points.shares(k, float(lengths[k]), float(forces[k]))
+            found[row] = next(share for other, share in zip(points.laws[k], shares, strict=True) if other is law)
+        return found
+
+
+class BondEnergies:
+    """The energies of the bonds with memory, and of those whose energy depends on the mode.
+
+    Args:
+        problem: the problem.
+        points: its points.
+
+    Attributes:
+        numbers: of these among the problem's bonds.
+    """
+
+    def __init__(self, problem: CondensedProblem, points: ContactPoints) -> None:
+        self._points = points
+        remember = {law.group for law in points.vertices if law.passed is not None}
+        self.numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
+        self._groups = [_group(n, problem, remember, points) for n in self.numbers]
+
+    def __call__(self, values: Values) -> tuple[float, Array, Array]:
+        """What they give back, what each has lost for 1 at its mode, and the scales by mode, (b,).
+
+        Args:
+            values: of the points.
+        """
+        back, forces = 0.0, self._points.bond_forces(values)
+        lost: list[Array] = []
+        scales: list[Array] = []
+        for group in self._groups:
+            x, scale = values.lengths[group.points], values.energies[group.points]
+            traction = group.tractions(self._points, values.lengths, forces)
+            back += float(scale @ group.rows.recoverable(x, traction))
+            lost.append(group.rows.dissipated(x, traction, self._points.remembered[group.first : group.first + len(x)]))
+            scales.append(scale)
+        return back, np.concatenate([np.zeros(0), *lost]), np.concatenate([np.zeros(0), *scales])
+
+
+def _group(number: int, problem: CondensedProblem, remember: Collection[int], points: ContactPoints) -> _Group:
+    laws = [law for law in points.vertices if law.group == number]
+    at = points.point_of[[law.unknowns[0] for law in laws]]
+    shared = [row for row, k in enumerate(at) if len(points.laws[k]) > 1]
+    return _Group(rows=law_rows(problem, remember)[number], laws=laws, points=at, shared=shared, first=laws[0].row)

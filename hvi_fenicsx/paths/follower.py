@@ -1,0 +1,331 @@
+"""The path of a problem through a load history: from event to event, with jumps, memory and an energy balance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from typing_extensions import override
+
+from ..reduced.condensed_problem import CondensedProblem
+from ..reduced.condensed_stiffness import CellInverse
+from ..typing import Array
+from .branch import Branch, Move, Outcome, Passage, Refused, event_of
+from .branching import Way, chosen, ways_on
+from .curve import Curve
+from .cycles import Cycle, Cycles
+from .energy_balance import EnergyBalance
+from .initial_state import Nowhere, at_rest, settled
+from .jumps import jump_from
+from .load_history import LoadHistory
+from .pivoting import StraightBranch
+from .relations import ContactPoints
+from .state import End, Event, Follow, PathOptions, PathState, Place, Stopped, Watch, place_of
+from .straight_state import coordinates_at
+from .substitutions import factors, multiplied
+
+
+class Follower(LoadHistory):
+    """The path of a problem, exact where all laws are piecewise linear, else by predictor and corrector.
+
+    Args:
+        problem: the problem.
+        options: what path is wanted.
+        resume: the state after which to go on; by default the path begins at factor 0.
+        watch: whether to stop, asked at each state and within jumps, and who is told of these.
+
+    Attributes:
+        end: how the path ended; None before.
+        reason: that in a sentence.
+
+    Raises:
+        InputError: a law on a length shares an unknown with another law or a bound.
+    """
+
+    def __init__(
+        self,
+        problem: CondensedProblem,
+        options: PathOptions,
+        resume: PathState | None = None,
+        watch: Watch | None = None,
+    ) -> None:
+        self._factors = factors(problem)
+        problem = multiplied(problem, self._factors)
+        super().__init__(problem, options, resume, watch)
+        self._points = ContactPoints(problem, options.remember, options.thresholds)
+        self._empty_jumps = 0
+        self._blocked, self._untried = False, (np.empty(0), list[Way]())
+        self._last: PathState
+        self._branch: Branch
+        self._cycles: Cycles
+
+    @property
+    @override
+    def factor(self) -> float:
+        return self._branch.factor
+
+    @property
+    def _x(self) -> Array:
+        """The displacements of the problem as it was given, (n,)."""
+        return self._branch.values.x / self._factors
+
+    # -- beginning
+
+    @override
+    def _begun(self) -> Iterator[PathState]:
+        z = self._first()
+        if z is None:
+            return
+        self._follow_from(z, 0.0)
+        self._balance = EnergyBalance(self._problem, self._points)
+        self._balance.begin(self._branch.values, 0.0)
+        self._branch.unstable = self._points.unstable_directions(self._branch.values)
+        yield self._state(Event.START)
+
+    def _first(self) -> Array | None:
+        """Where the points are at the factor 0; None: the path has ended."""
+        rest = at_rest(self._problem, self._points)
+        if rest.constant is not None:
+            return self._loaded(rest.constant)
+        if rest.held:
+            return rest.z
+        z = self._at_no_load(rest.z, self._options.programme[0])
+        if isinstance(z, Nowhere):
+            self._end_before(z.value, escapes=z is Nowhere.AWAY)
+            return None
+        return z
+
+    def _at_no_load(self, z: Array, towards: float) -> Array | Nowhere:
+        held = self._is_held(self._options.thresholds.settling.first_load * towards)
+        return settled(self._problem, self._points, z, towards, self._watcher, held=held)
+
+    def _loaded(self, constant: CondensedProblem) -> Array | None:
+        """From rest to the constant loads, as stable as it goes; where the points are then."""
+        options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
+        follower = Follower(constant, options, watch=self._watcher)
+        for _ in follower.states():
+            pass
+        if follower.end is End.INTERRUPTED:
+            raise Stopped
+        if follower.end is not End.REACHED:
+            reason = f"under the constant loads alone: {follower.reason}"
+            self._end_before(reason, escapes=follower.end is End.ESCAPES)
+            return None
+        self._points = follower._points
+        return follower._branch.z
+
+    def _follow_from(
+        self,
+        z: Array,
+        factor: float,
+        resumed: PathState | None = None,
+        inverse: CellInverse | None = None,
+        heading: int = 1,
+    ) -> None:
+        problem, points = self._problem, self._points
+        position = None if resumed is None else resumed.position
+        if points.straight:
+            loads = problem.force, problem.force_rate
+            self._branch = StraightBranch(points, *loads, z, factor, position, inverse, heading)
+            return
+        fineness = self._options.fineness
+        curve = Curve(problem.force, problem.force_rate, points, z.copy(), factor, fineness)
+        curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
+        self._branch = curve
+        if resumed is not None and resumed.event not in (Event.START, Event.TURN):
+            curve.resume(resumed.position)
+
+    @override
+    def _restore(self, state: PathState) -> None:
+        self._follow_from(coordinates_at(self._problem, self._points, state), state.factor, state)
+        self._branch.unstable, self._leg, self._last = state.unstable, state.position.leg, state
+        self._balance = EnergyBalance(self._problem, self._points, state.work, state.dissipated)
+        self._balance.begin(self._branch.values, self.factor)
+
+    # -- one leg of the load history
+
+    @override
+    def _towards(self, aim: float) -> Iterator[PathState]:
+        self._orient(aim)
+        self._cycles = Cycles(self._x, self._options.thresholds.exact.same_place)
+        while self.end is None and self.factor != aim:
+            if self._adrift or self._must_jump(aim):
+                yield from self._taken_up() if self._adrift else self._jump(aim)
+                continue
+            move = self._branch.advance(self._next(aim))
+            if move.outcome in (Outcome.AWAY, Outcome.STUCK):
+                self._ended(move.outcome)
+                yield self._state(Event.END)
+                return
+            self._balance.go(self._branch.values, self.factor, self._branch.driven(move))
+            if move.outcome is not Outcome.FACTOR or self.factor != aim:
+                yield self._noted(move, aim)
+            if self.end is None:
+                self._watch()
+            if self.end is not None:
+                yield self._state(Event.END)
+
+    def _must_jump(self, aim: float) -> bool:
+        if self._blocked or self._options.follow is Follow.EXACT:
+            return self._blocked
+        return self._branch.must_leave(aim)
+
+    def _next(self, aim: float) -> float:
+        """The next factor that the path may come to as it goes: one at which a state is wanted, or the aim."""
+        if self._points.straight:
+            return aim
+        factor, up = self.factor, self._branch.rising > 0.0
+        ahead = [f for f in (*self._options.stops, aim) if f != factor and (f > factor) == up]
+        return min(ahead, key=lambda f: abs(f - factor), default=aim)
+
+    def _orient(self, aim: float) -> None:
+        """Set out towards a factor; a path that is resumed on its way goes on as it went."""
+        resumed, self._resume = self._resume, None
+        if resumed is not None and resumed.event not in (Event.START, Event.TURN):
+            return
+        try:
+            self._branch.set_out(1.0 if aim > self.factor else -1.0, self._watcher.check)
+        except Refused:
+            self._lose_among_ends()
+        self._branch.watch_folds()
+
+    def _passed(self, move: Move) -> list[Passage]:
+        """The passages at the present state; where there is no end of them, the path is lost."""
+        if move.outcome not in (Outcome.END, Outcome.TURNED):
+            return []
+        try:
+            return self._branch.pass_on(move, self._watcher.check)
+        except Refused:
+            self._lose_among_ends()
+            return []
+
+    def _lose_among_ends(self) -> None:
+        where = f"at the factor {self.factor:.6g} several bonds are at ends of their pieces"
+        self._lose(self.factor, f"{where}, and each way on leads from one of them to the other")
+
+    def _noted(self, move: Move, aim: float) -> PathState:
+        """The state after a step, and what happens there."""
+        if move.outcome in (Outcome.END, Outcome.TURNED) and not self._points.straight and self._is_adrift():
+            return self._state(Event.KINK)  # all bonds are broken at once: nothing is left to pass
+        before = self._branch.trend
+        passages = self._passed(move)
+        self._branch.note(move)
+        if move.outcome in (Outcome.STEP, Outcome.FACTOR):
+            return self._state(Event.STEP)
+        event = event_of(passages, folds=before * self._branch.trend < 0)
+        state = self._state(event, passages, bifurcation=event is Event.FOLD and max(move.tied, len(passages)) > 1)
+        return state if move.outcome is Outcome.FOLD else self._unless_cyclic(state, aim)
+
+    def _unless_cyclic(self, state: PathState, aim: float) -> PathState:
+        """The state; where the path comes back to one, another way is taken, or the path ends."""
+        found = self._cycles.note(state)
+        if self._points.straight and found is Cycle.BLOCKED and self._takes_another_way(aim):
+            return self._state(state.event, place=state.place, bifurcation=True)
+        if found is Cycle.CLOSED or (found is not None and self._points.straight):
+            self._go_round(found)
+        elif self._cycles.standing > self._options.thresholds.exact.standing + 4 * len(self._points):
+            self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
+        return state
+
+    def _takes_another_way(self, aim: float) -> bool:
+        """On by another of all ways, of those not tried yet; a stable path that has none jumps."""
+        branch, stable = self._branch, self._options.follow is Follow.STABLE
+        assert isinstance(branch, StraightBranch)
+        at, ways = self._untried
+        if not np.array_equal(at, self._cycles.came):
+            ways = ways_on(branch)
+        way = chosen(ways, self._cycles.came, float(np.sign(aim - self.factor)), stable=stable)
+        self._untried = self._cycles.came, [other for other in ways if other is not way]
+        if way is not None:
+            self._points.restore(way.kept)
+            self._follow_from(way.z, self.factor, heading=way.heading)
+            self._branch.unstable, self._branch.leader = way.unstable, way.leader
+        self._blocked = stable and (way is None or way.unstable > 0)
+        return way is not None or stable
+
+    def _ended(self, outcome: Outcome) -> None:
+        if outcome is Outcome.STUCK:
+            self._lose(self.factor, f"at the factor {self.factor:.6g} no step is short enough to stay on the path")
+        else:
+            self._end_for_ever(stands=self._branch.stands)
+
+    @override
+    def _is_off(self) -> bool:
+        rate, values = self._problem.force_rate, self._branch.values
+        return self._branch.at_rest(self._peak) and bool(np.any(self._points.unresisted(values, rate).driven))
+
+    # -- jumps
+
+    def _jump(self, aim: float) -> Iterator[PathState]:
+        """On to the next stable equilibrium at the same factor, or off."""
+        factor = self.factor
+        self._watcher.jumps(factor)
+        heading, held = (1 if aim > factor else -1), self._is_held(factor)
+        landing = jump_from(self._problem, self._branch, heading, held=held, step=self._watcher.step)
+        if landing is not None and landing.z is not None:
+            yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
+            return
+        self._end_jump(escapes=landing is not None)
+        yield replace(self._last, event=Event.END, place=None, released=0.0, bifurcation=False)
+
+    def _goes_on(self, landed: PathState) -> Iterator[PathState]:
+        """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""
+        yield landed
+        self._empty_jumps = 0 if landed.released > 1e-12 * abs(landed.energy) else self._empty_jumps + 1
+        if self._empty_jumps > self._options.thresholds.jump.empty:
+            self._lose(self.factor, f"at the factor {self.factor:.6g} jumps release no energy: rounding alone leads on")
+            yield self._state(Event.END)
+
+    def _taken_up(self) -> Iterator[PathState]:
+        """From no load, at which the body is free, to where the next load takes it."""
+        programme = self._options.programme
+        self._adrift = False
+        towards = next((factor for factor in programme[self._leg :] if factor), programme[0])
+        z = self._at_no_load(self._branch.z, towards)
+        if isinstance(z, Nowhere):
+            self._lose(self.factor, z.value)
+            yield self._state(Event.END)
+        else:
+            yield self._landed(z, 0.0, towards)
+
+    def _landed(self, z: Array, factor: float, aim: float, inverse: CellInverse | None = None) -> PathState:
+        self._blocked = False
+        self._follow_from(z, factor, inverse=inverse)
+        released = self._balance.leap(self._branch.values, factor)
+        if self._points.straight:
+            self._branch.unstable = self._points.unstable_directions(self._branch.values)
+        self._orient(aim)
+        return replace(self._state(Event.JUMP), released=released)
+
+    # -- reports
+
+    @override
+    def _state(
+        self,
+        event: Event,
+        passages: Sequence[Passage] = (),
+        place: Place | None = None,
+        *,
+        bifurcation: bool = False,
+    ) -> PathState:
+        stored = self._balance.stored
+        self._last = PathState(
+            factor=self.factor,
+            event=event,
+            place=self._place(passages[0]) if passages else place,
+            x=self._x,
+            energy=stored.energy,
+            work=self._balance.work,
+            dissipated=stored.dissipated,
+            unstable=self._branch.unstable,
+            memory=self._points.memory,
+            bifurcation=bifurcation,
+            position=self._branch.position(self._leg),
+        )
+        return self._last
+
+    def _place(self, passage: Passage) -> Place:
+        laws = self._points.laws_at(passage.point)
+        group = laws[0].group if laws and not (passage.closes or passage.opens) else None
+        return place_of(self._problem, int(self._points.unknowns_of(passage.point)[0]), group)

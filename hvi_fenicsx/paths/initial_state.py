@@ -1,0 +1,144 @@
+"""Where a path begins: at rest, before constant loads act; these are applied along a path of their own.
+
+Where nothing holds a body at rest, a small part of the loads takes it to where something does, and is taken off again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from ..reduced.condensed_problem import CondensedProblem
+from ..typing import Array
+from .branch import Outcome, Refused, advancing
+from .branching import branch_from
+from .motion import Relaxation
+from .relations import ContactPoints
+from .segments import Kind, Segment
+from .state import Watch
+from .thresholds import SettlingThresholds
+
+
+class Nowhere(Enum):
+    """Why a body that nothing holds at rest has no first state."""
+
+    AWAY = "nothing holds the body at rest"
+    UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """The state before any load acts.
+
+    Attributes:
+        z: the coordinates of the points, (n,).
+        held: whether the body is held there.
+        constant: the path from there to the constant loads, its factor from 0 to 1; None where there are none.
+    """
+
+    z: Array
+    held: bool
+    constant: CondensedProblem | None = None
+
+
+def at_rest(problem: CondensedProblem, points: ContactPoints) -> Rest:
+    """The state before any load acts; the points are put there.
+
+    Args:
+        problem: the problem.
+        points: its points.
+    """
+    x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
+    z, force = np.zeros(problem.size), np.zeros(problem.size)
+    free = problem.force - problem.elastic @ x
+    for k in range(len(points)):
+        i = int(points.one[k]) if k < len(points.one) else None
+        at, wanted = (0.0, 0.0) if i is None else (float(x[i]), float(free[i]))
+        number, s_force = _standing(points.chain(k), at, wanted)
+        if points.opening(k) is not None and points.chain(k)[number].kind is Kind.PIECE:
+            number = len(points.chain(k)) - 1
+        points.enter(k, number)
+        if i is not None:
+            z[i], force[i] = points.coordinate(k, at, s_force), s_force
+    return Rest(z=z, held=points.is_held(points.values(z)), constant=constant_alone(problem, x, force))
+
+
+def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:
+    """The segment of a displacement that holds best, and its least force; of a fixed unknown the wanted one."""
+    if len(chain) == 1 and chain[0].kind is Kind.BOUND:
+        return 0, wanted
+    forces = {n: segment.force_at(x) for n, segment in enumerate(chain) if segment.stands_at(x)}
+    least = min(abs(f) for f in forces.values())
+    best = max((n for n in forces if abs(forces[n]) == least), key=lambda n: chain[n].hold)
+    return best, forces[best]
+
+
+def settled(
+    problem: CondensedProblem, points: ContactPoints, z: Array, towards: float, watch: Watch, *, held: bool
+) -> Array | Nowhere:
+    """The coordinates at the factor 0, (n,), or why there are none.
+
+    The body moves as an overdamped one until something holds it; then the load is taken off again.
+
+    Args:
+        problem: the problem, without constant loads.
+        points: where they are at rest; after it, where they are then.
+        z: their coordinates at rest, (n,).
+        towards: the factor of which a small part acts.
+        watch: whether to stop, and who is told of the motion.
+        held: whether there is an equilibrium at this factor, so that no way leads off.
+    """
+    limits = points.thresholds.settling
+    first = limits.first_load * towards
+    watch.jumps(first)
+    motion = Relaxation(problem, points, z, problem.load(first), held=held, step=watch.step)
+    if not motion.run(np.zeros(len(points))) or motion.escapes:
+        return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
+    heading, most = -int(np.sign(first)), limits.steps + limits.more_steps * len(points)
+    try:
+        branch = branch_from(points, problem.force, problem.force_rate, motion.z, first, heading=heading)
+        branch.set_out(heading, watch.step)
+        none = no_load(problem, branch.values.x, first, limits)
+        for move in advancing(branch, -heading * none, watch.step, most):
+            if move.outcome is Outcome.FACTOR:
+                return branch.balanced(0.0)
+            if move.outcome in (Outcome.AWAY, Outcome.STUCK):
+                break
+    except (Refused, np.linalg.LinAlgError):
+        pass
+    return Nowhere.UNKNOWN
+
+
+def no_load(problem: CondensedProblem, x: Array, first: float, limits: SettlingThresholds) -> float:
+    """A factor that is none: beside the first one, and beside the rounding of the elastic forces.
+
+    Args:
+        problem: the problem.
+        x: displacements, (n,).
+        first: a small factor.
+        limits: what is none.
+    """
+    stiffest = float(np.max(problem.elastic.diagonal, initial=0.0))
+    rounding = np.finfo(float).eps * stiffest * float(np.max(np.abs(x), initial=0.0))
+    load = float(np.max(np.abs(problem.force_rate), initial=0.0)) or 1.0
+    return max(limits.no_load * abs(first), limits.roundings * rounding / load)
+
+
+def constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> CondensedProblem | None:
+    """The path from rest to the constant loads, its factor from 0 to 1; None where there are none.
+
+    Rounding of the elastic forces at rest, where a bound lifts the body as a whole, is no load.
+
+    Args:
+        problem: the problem.
+        x: the displacement at rest, (n,).
+        forces: of bonds and bounds there, (n,).
+    """
+    held = problem.elastic @ x + forces
+    away, stiffest = problem.force - held, float(np.max(problem.elastic.diagonal, initial=0.0))
+    sizes = held, problem.force, stiffest * x
+    if np.max(np.abs(away), initial=0.0) <= 1e-14 * sum(float(np.max(np.abs(f), initial=0.0)) for f in sizes):
+        return None
+    return replace(problem, force=held, force_rate=away)

@@ -1,0 +1,362 @@
+"""The graph of force over displacement of one unknown, with its laws and bounds, as a chain of segments.
+
+Pieces of laws have a slope. Where a law jumps, and at a bound, the displacement stands and the force moves. All of them
+form one continuous curve, which a coordinate runs along.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from ..errors import InputError
+from ..laws.traction_graph import TractionGraph
+from ..reduced.condensed_problem import CondensedProblem
+from ..typing import Array
+from .lengths import VectorPoints
+from .vertex_laws import VertexLaw
+
+_SIDES = ("left", "right")
+_ROUNDING = 1e-12
+"""A jump so small beside the forces there is none."""
+
+
+class Kind(Enum):
+    """What moves on a segment."""
+
+    PIECE = "piece"
+    """The displacement, and the force with it."""
+    JUMP = "jump"
+    """The force, at a jump of a law."""
+    BOUND = "bound"
+    """The force, at a bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """A straight part of the graph; its coordinate τ grows along the graph, the displacement never falls.
+
+    Attributes:
+        kind: what moves.
+        x: displacement at τ = 0.
+        force: at τ = 0.
+        slope: of the force over the displacement; of a piece.
+        rise: of the force over τ where the displacement stands: 1, or -1 at a drop; 0 on a piece.
+        low: least τ.
+        high: greatest τ.
+        outward: on a piece or jump that a bond with memory has not passed yet, the direction in which it does, 1 or -1;
+            else 0.
+    """
+
+    kind: Kind
+    x: float
+    force: float
+    slope: float = 0.0
+    rise: float = 0.0
+    low: float
+    high: float
+    outward: int = 0
+
+    def weighted(self, weight: float) -> Segment:
+        """The segment with all forces multiplied."""
+        stands = self.rise != 0.0
+        return Segment(
+            kind=self.kind,
+            x=self.x,
+            force=self.force * weight,
+            slope=self.slope * weight,
+            rise=self.rise,
+            low=self.low * weight if stands else self.low,
+            high=self.high * weight if stands else self.high,
+            outward=self.outward,
+        )
+
+    def displacement(self, coordinate: float) -> float:
+        """The displacement at τ."""
+        return self.x if self.rise else self.x + coordinate
+
+    def coordinate(self, x: float, force: float) -> float:
+        """The τ of a displacement (or, where it stands, of a force), at most that of an end.
+
+        Args:
+            x: the displacement.
+            force: the force.
+        """
+        wanted = (force - self.force) / self.rise if self.rise else x - self.x
+        return min(max(wanted, self.low), self.high)
+
+    def stands_at(self, x: float) -> bool:
+        """Whether a displacement is on the segment, to the last digit."""
+        return self.displacement(self.coordinate(x, self.force)) == x
+
+    def force_at(self, x: float) -> float:
+        """The force at a displacement on the segment; where it stands, the one nearest to zero."""
+        return self.force + (self.rise or self.slope) * self.coordinate(x, 0.0)
+
+    @property
+    def hold(self) -> tuple[int, float]:
+        """How well a segment holds, for comparison: bounds, rising jumps, pieces by their slope, drops."""
+        if self.kind is Kind.PIECE:
+            return 0, self.slope
+        if self.kind is Kind.BOUND:
+            return 2, 0.0
+        return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
+
+    def distance(self, x: float, force: float, stiffness: float) -> float:
+        """How far a point is from the segment, in units of force.
+
+        Args:
+            x: its displacement.
+            force: its force.
+            stiffness: force for one unit of displacement.
+        """
+        at = self.coordinate(x, force)
+        on = self.force + (self.rise or self.slope) * at
+        return abs(on - force) + stiffness * abs(self.displacement(at) - x)
+
+
+def piece_at(chain: Sequence[Segment], x: float, rounding: float, *, forward: bool) -> int:
+    """The number of the piece on which a displacement is or, but for rounding, at an end; of two the next one.
+
+    Args:
+        chain: the segments.
+        x: the displacement.
+        rounding: relative.
+        forward: whether the next one is the one after it.
+    """
+    pieces = [n for n, s in enumerate(chain) if not s.rise]
+    near = [n for n in pieces if abs(chain[n].displacement(chain[n].coordinate(x, 0.0)) - x) <= rounding * abs(x)]
+    return near[-1] if forward else near[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Component:
+    """One bond's law on an unknown.
+
+    Attributes:
+        graph: traction over the unknown.
+        weight: lumped area.
+        passed: displacements (least, greatest) up to which a bond with memory has been; None without memory.
+        curved: whether the graph has chords of a law: a piece that has been passed ends where the bond has been, even
+            if the chords go on in its direction.
+    """
+
+    graph: TractionGraph
+    weight: float
+    passed: tuple[float, float] | None = None
+    curved: bool = False
+
+    def force(self, x: Array, side: str) -> Array:
+        """The limit of the force from one side, (m,).
+
+        Args:
+            x: displacements, (m,).
+            side: "left" or "right".
+        """
+        return self.weight * self.graph.traction(x, side)
+
+    def slope(self, x: float) -> float:
+        """The slope of the force off the breaks."""
+        return self.weight * float(self.graph.slopes[np.searchsorted(self.graph.breaks, x)])
+
+    def fresh(self, x: float, slope: float | None = None) -> bool:
+        """Whether a bond with memory has not been at x, and does not return on a line through 0 as it came.
+
+        Args:
+            x: the displacement.
+            slope: of the force there; None at a jump.
+        """
+        if self.passed is None or self.passed[0] < x < self.passed[1]:
+            return False
+        if slope is None:
+            return x != 0.0
+        line = float(self.force(np.array([x]), "right")[0])
+        return abs(line - slope * x) > 1e-12 * (abs(line) + abs(slope * x))
+
+
+def chain(components: Sequence[Component], lower: float, upper: float) -> tuple[Segment, ...]:
+    """The segments of an unknown, from the least displacement to the greatest.
+
+    Args:
+        components: the laws that act on it.
+        lower: its lower bound, or -inf.
+        upper: its upper bound, or inf.
+    """
+    if lower == upper:
+        return (Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=math.inf),)
+    found = _inside(components, lower, upper)
+    if math.isfinite(lower):
+        found.insert(0, _bound(lower, _forces(components, lower, "right"), low=-math.inf, high=0.0))
+    if math.isfinite(upper):
+        found.append(_bound(upper, _forces(components, upper, "left"), low=0.0, high=math.inf))
+    return tuple(found)
+
+
+def _bound(x: float, force: float, low: float, high: float) -> Segment:
+    return Segment(kind=Kind.BOUND, x=x, force=force, rise=1.0, low=low, high=high)
+
+
+def _forces(components: Sequence[Component], x: float, side: str) -> float:
+    return float(sum(c.force(np.array([x]), side)[0] for c in components))
+
+
+def _inside(components: Sequence[Component], lower: float, upper: float) -> list[Segment]:
+    """Pieces and jumps between the bounds; breaks at which nothing changes are left out."""
+    breaks = _breaks(components, lower, upper)
+    ends = [lower, *breaks, upper]
+    found = [_piece(components, a, b) for a, b in itertools.pairwise(ends)]
+    chained: list[Segment] = []
+    for at, piece in zip([None, *breaks], found, strict=True):
+        jump = None if at is None else _jump(components, at)
+        if jump is not None:
+            chained.append(jump)
+        chained.append(piece)
+    return chained
+
+
+def _breaks(components: Sequence[Component], lower: float, upper: float) -> list[float]:
+    every = sorted({float(b) for c in components for b in c.graph.breaks if lower < b < upper})
+    return [b for b in every if any(_changes(c, b) for c in components)]
+
+
+def _changes(component: Component, at: float) -> bool:
+    graph = component.graph
+    number = int(np.searchsorted(graph.breaks, at))
+    if number == len(graph.breaks) or graph.breaks[number] != at:
+        return False
+    if component.curved and component.passed is not None and at != 0.0 and at in component.passed:
+        return True
+    return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
+
+
+def _jump(components: Sequence[Component], at: float) -> Segment | None:
+    left, right = (_forces(components, at, side) for side in _SIDES)
+    if abs(right - left) <= _ROUNDING * sum(abs(_forces([c], at, side)) for c in components for side in _SIDES):
+        return None
+    fresh = any(c.fresh(at) for c in components)
+    rise = math.copysign(1.0, right - left)
+    return Segment(
+        kind=Kind.JUMP,
+        x=at,
+        force=left,
+        rise=rise,
+        low=0.0,
+        high=abs(right - left),
+        outward=int(np.sign(at)) if fresh else 0,
+    )
+
+
+def _piece(components: Sequence[Component], start: float, end: float) -> Segment:
+    middle = between(start, end)
+    slopes = [c.slope(middle) for c in components]
+    fresh = any(c.fresh(middle, slope) for c, slope in zip(components, slopes, strict=True))
+    anchor, side = _anchor(start, end)
+    return Segment(
+        kind=Kind.PIECE,
+        x=anchor,
+        force=_forces(components, anchor, side),
+        slope=math.fsum(slopes),
+        low=start - anchor,
+        high=end - anchor,
+        outward=int(np.sign(middle)) if fresh else 0,
+    )
+
+
+def _anchor(start: float, end: float) -> tuple[float, str]:
+    """Where a piece has τ = 0, and from which side: at 0 where that is on it, so that rest is exact."""
+    if start < 0.0 < end:
+        return 0.0, "right"
+    return (start, "right") if math.isfinite(start) else (end, "left")
+
+
+def between(start: float, end: float) -> float:
+    """A displacement inside an interval, of the sign of the interval.
+
+    Args:
+        start: its low end, or -inf.
+        end: its high end, or inf.
+    """
+    if math.isfinite(start) and math.isfinite(end):
+        return 0.5 * (start + end)
+    if math.isfinite(start):
+        return start + 1.0 + abs(start)
+    return end - 1.0 - abs(end) if math.isfinite(end) else 0.0
+
+
+def from_zero(found: tuple[Segment, ...], laws: Sequence[VertexLaw]) -> tuple[Segment, ...]:
+    """The segments of a length: instead of a bound at 0 the traction at rest, which may have any direction.
+
+    Args:
+        found: the segments above a bound at 0.
+        laws: that act on the length.
+    """
+    rest = found[0].force
+    ahead = tuple(fresh(s, laws) for s in found[1:])
+    if rest == 0.0:
+        return ahead
+    return (Segment(kind=Kind.JUMP, x=0.0, force=0.0, rise=float(np.sign(rest)), low=0.0, high=abs(rest)), *ahead)
+
+
+def fresh(segment: Segment, laws: Sequence[VertexLaw]) -> Segment:
+    """A piece that a curved law with memory has not passed is fresh, whatever its chord; one through 0 goes both ways.
+
+    Args:
+        segment: the piece, or another segment.
+        laws: of its point.
+    """
+    if segment.rise or segment.outward:
+        return segment
+    first, last = segment.x + segment.low, segment.x + segment.high
+    if first < 0.0 < last:
+        return segment
+    middle = between(first, last)
+    for law in laws:
+        ends = (-np.inf, np.inf) if law.passed is None else law.passed.displacements
+        if law.curved and not ends[0] < middle < ends[1]:
+            return replace(segment, outward=int(np.sign(middle)))
+    return segment
+
+
+def beside_opening(lower: float) -> tuple[Segment, ...]:
+    """The segments of an opening: pressed against its bound, free while it is negative, part of a length.
+
+    Args:
+        lower: the bound, at most 0; or -inf.
+    """
+    found = [Segment(kind=Kind.PIECE, x=0.0, force=0.0, low=0.0, high=math.inf)]
+    if lower < 0.0:
+        found.insert(0, Segment(kind=Kind.PIECE, x=0.0, force=0.0, low=lower, high=0.0))
+    if math.isfinite(lower):
+        found.insert(0, Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=0.0))
+    return tuple(found)
+
+
+def refuse_shared(problem: CondensedProblem, vectors: VectorPoints, laws: Sequence[VertexLaw]) -> None:
+    """Refuse what has no graph of its own: unknowns that a law on a length shares with another law or a bound.
+
+    Args:
+        problem: the problem.
+        vectors: the points of laws on a length.
+        laws: at all vertices.
+
+    Raises:
+        InputError: there are such unknowns, or openings with a bound above 0.
+    """
+    seen, openings = vectors.flat, vectors.opening_unknowns
+    with_one = [i for law in laws if not law.radial for i in law.unknowns]
+    low = np.isfinite(problem.lower)
+    low[openings] = problem.lower[openings] > 0.0
+    bounded = np.flatnonzero(low | np.isfinite(problem.upper))
+    shared = np.intersect1d(seen, np.concatenate([np.array(with_one, dtype=np.int64), bounded]))
+    if len(np.unique(seen)) == len(seen) and not shared.size:
+        return
+    raise InputError(
+        "path: at a vertex a law acts on |u_t| or on opening and slip, and contact or another law on a component of "
+        "it; such an edge has no path yet. Leave one of them away there, or let the parts not meet. Cohesion beside "
+        "contact has a path where nothing bounds the opening from above, and the gap is not negative"
+    )

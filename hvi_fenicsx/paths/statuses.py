@@ -1,0 +1,376 @@
+"""The graphs of all points as chains of segments, where each point is on its own, and what their laws remember.
+
+A point is an unknown with its laws and bounds, or the unknowns of a law on a length (:mod:`.vectors`). Its graph of
+force over displacement is one continuous line, vertical where a law jumps and at a bound (:mod:`..segments`); s runs
+along it, nondimensional. The coordinate of a point of a length is a vector z of length s: displacement and force have
+its direction. So sticking, sliding, a drop at a fixed length and what is remembered all have smooth equations. An
+opening has a point of its own beside, without a law: what it does where it is not positive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..reduced.condensed_problem import CondensedProblem
+from ..typing import Array, Integers, Mask
+from .contact_points import PointLaws
+from .curved_laws import Deviations
+from .graphs import Passed
+from .segments import Component, Kind, Segment, beside_opening, chain, fresh, from_zero
+from .thresholds import DEFAULT, Thresholds
+from .vertex_laws import VertexLaw, shares
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """Where points were.
+
+    Attributes:
+        numbers: of their segments, (m,).
+        chains: their segments.
+        bases: where s was at the coordinate 0 of each.
+        memory: what their laws remembered, (v, 4).
+    """
+
+    numbers: Integers
+    chains: list[tuple[Segment, ...]]
+    bases: list[Array]
+    memory: Array
+
+
+class PointStatuses(PointLaws):
+    """All points, each on one segment of its graph.
+
+    Args:
+        problem: the problem.
+        remember: numbers of the problem's bonds that remember.
+        thresholds: of the path.
+
+    Attributes:
+        numbers: of the segments on which the points are, (m,).
+        low: least s, (m,).
+        high: greatest s, (m,).
+        outward: where bonds with memory go on, 1 or -1; else 0, (m,).
+        elastic: S, or another one while a body moves.
+        remembered: what the laws at all vertices remember, (v, 4); zeros of those that remember nothing.
+        rigid: the displacements that S does not resist, as orthonormal rows, (k, n).
+
+    Raises:
+        InputError: a law on a length shares an unknown with another law or a bound.
+    """
+
+    def __init__(
+        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: Thresholds = DEFAULT
+    ) -> None:
+        super().__init__(problem, remember, thresholds)
+        self.elastic, self.rigid = problem.elastic, problem.elastic.rigid
+        self._made: dict[tuple[object, ...], tuple[Segment, ...]] = {}
+        self.remembered = np.array([law.memory() for law in self.vertices]).reshape(-1, 4)
+        self._deviations = Deviations(self.laws, thresholds.curve)
+        m = len(self.laws)
+        self.numbers = np.zeros(m, dtype=np.int64)
+        self.low, self.high, self.outward = np.zeros(m), np.zeros(m), np.zeros(m)
+        self._base, self._x, self._force = np.zeros(m), np.zeros(m), np.zeros(m)
+        self._moves, self._rises = np.zeros(m), np.zeros(m)
+        self._bound, self._curved, self._bent = (np.zeros(m, dtype=bool) for _ in range(3))
+        self._chains: list[tuple[Segment, ...]] = [()] * m
+        self._bases: list[Array] = [np.zeros(0)] * m
+        for k in range(m):
+            self.rebuild(k)
+
+    # -- graphs
+
+    def rebuild(self, k: int) -> None:
+        """Make the segments of a point with what its laws remember now.
+
+        Args:
+            k: the point.
+        """
+        self._chains[k] = self._segments(k)
+        self._bases[k] = self._based(k)
+
+    @property
+    def stiffness(self) -> Array:
+        """S as an array, (n, n)."""
+        return self.elastic.array
+
+    def _segments(self, k: int) -> tuple[Segment, ...]:
+        """The segments of a point; those of one law that remembers nothing yet are made once."""
+        laws, problem = self.laws[k], self._problem
+        if len(laws) != 1 or self.radial(k) is not None or laws[0].passed not in (None, Passed()):
+            return self._chained(k, laws)
+        law, i = laws[0], int(self.one[k])
+        key = law.group, law.sign, law.passed, float(problem.lower[i]), float(problem.upper[i])
+        if key not in self._made:
+            self._made[key] = self._chained(k, [replace(law, weight=1.0)])
+        return tuple(segment.weighted(law.weight) for segment in self._made[key])
+
+    def _chained(self, k: int, laws: Sequence[VertexLaw]) -> tuple[Segment, ...]:
+        problem, opening = self._problem, self.opening(k)
+        if opening is not None:
+            return beside_opening(float(problem.lower[self.vectors.opening_unknowns[opening]]))
+        parts = [
+            Component(
+                graph=law.graph(),
+                weight=law.weight,
+                passed=None if law.passed is None else law.passed.displacements,
+                curved=law.curved,
+            )
+            for law in laws
+        ]
+        if self.radial(k) is not None:
+            return from_zero(chain(parts, 0.0, np.inf), laws)
+        i = int(self.one[k])
+        found = chain(parts, float(problem.lower[i]), float(problem.upper[i]))
+        return tuple(fresh(s, laws) for s in found)
+
+    def _based(self, k: int) -> Array:
+        """Where s is at the coordinate 0 of each segment."""
+        found, at = np.zeros(len(self._chains[k])), 0.0
+        if self.straight:
+            return found
+        for number, segment in enumerate(self._chains[k]):
+            unit = self.unit(k, segment)
+            if np.isfinite(segment.low):
+                found[number] = at - segment.low / unit
+                at += (segment.high - segment.low) / unit
+            else:
+                found[number] = -segment.high / unit if np.isfinite(segment.high) else 0.0
+        return found if self.opening(k) is None else found - found[-1]
+
+    def unit(self, k: int, segment: Segment) -> float:
+        """The unit of a segment's own coordinate.
+
+        Args:
+            k: the point.
+            segment: one of its segments.
+        """
+        return float(self._force_units[k]) if segment.rise else self.length
+
+    def segment(self, k: int) -> Segment:
+        """Where a point is."""
+        return self._chains[k][self.numbers[k]]
+
+    def chain(self, k: int) -> tuple[Segment, ...]:
+        """The segments of a point."""
+        return self._chains[k]
+
+    def enter(self, k: int, number: int) -> None:
+        """Put a point on a segment.
+
+        Args:
+            k: the point.
+            number: of the segment.
+        """
+        segment, base = self._chains[k][number], float(self._bases[k][number])
+        unit = self.unit(k, segment)
+        self.numbers[k], self._base[k] = number, base
+        self.low[k], self.high[k], self.outward[k] = base + segment.low / unit, base + segment.high / unit, 0
+        if self.radial(k) is not None and number == 0:
+            self.low[k] = -np.inf  # a length passes through 0
+        self._x[k], self._force[k] = segment.x, segment.force
+        self._moves[k] = 0.0 if segment.rise else unit
+        self._rises[k] = (segment.rise or segment.slope) * unit
+        self._bound[k] = segment.kind is Kind.BOUND
+        self.outward[k] = segment.outward
+        self._curved[k] = self._deviations.enter(k, segment)
+        self._bent[k] = self._curved[k] or self._turns(k)
+        self._count(k, counts=number == len(self._chains[k]) - 1)
+
+    def _count(self, k: int, *, counts: bool) -> None:
+        """Let the opening that a point is count in its length, or not."""
+        opening = self.opening(k)
+        if opening is None:
+            return
+        self.vectors.counts[self.vectors.openings[opening]] = counts
+        of = len(self.one) + int(self.vectors.owner[self.vectors.openings[opening]])
+        self._bent[of] = self._curved[of] or self._turns(of)
+
+    def _turns(self, k: int) -> bool:
+        """Whether a point's vector may turn without its force being a multiple of it."""
+        p = self.radial(k)
+        if p is None or self.vectors.counted(p) <= 1:
+            return False
+        return any(law.mixity is not None for law in self.laws[k]) or not self._proportional(k)
+
+    def _proportional(self, k: int) -> bool:
+        """Whether displacement and force are multiples of s on the present segment."""
+        x = (self._x[k] - self._moves[k] * self._base[k]) / self.length
+        force = (self._force[k] - self._rises[k] * self._base[k]) / self._force_units[k]
+        return bool(abs(x) + abs(force) <= 1e-12)
+
+    def enter_next(self, k: int, *, forward: bool) -> None:
+        """Put a point on the segment next to its own.
+
+        Args:
+            k: the point.
+            forward: whether on the one that comes after its own.
+        """
+        self.enter(k, int(self.numbers[k]) + (1 if forward else -1))
+
+    def leave(self, z: Array, k: int, *, forward: bool) -> None:
+        """Put a point on the segment next to its own, at the end at which they meet.
+
+        Args:
+            z: all coordinates, changed, (n,).
+            k: the point.
+            forward: whether on the one that comes after its own.
+        """
+        self.enter_next(k, forward=forward)
+        self.set(z, k, float(self.low[k] if forward else self.high[k]))
+
+    def coordinate(self, k: int, x: float, force: float) -> float:
+        """The s of a displacement and its force on the present segment.
+
+        Args:
+            k: the point.
+            x: along the point's direction.
+            force: likewise.
+        """
+        segment = self.segment(k)
+        return float(self._base[k] + segment.coordinate(x, force) / self.unit(k, segment))
+
+    def set(self, z: Array, k: int, s: float) -> None:
+        """Change the coordinates of a point to another s in the same direction.
+
+        Args:
+            z: all coordinates, changed, (n,) or more.
+            k: the point.
+            s: the new one.
+        """
+        p = self.radial(k)
+        if p is None:
+            z[self.unknowns_of(k)] = s
+        else:
+            here = self.vectors.owner == p
+            group = self.vectors.groups[p]
+            z[group] = np.where(self.vectors.counts[here], s * self.directions(z)[here], z[group])
+
+    def polar(self, z: Array) -> tuple[Array, Array]:
+        """The coordinates along the graphs, (m,), and the unit vectors of the points of lengths, (N,).
+
+        Args:
+            z: the coordinates, (n,).
+        """
+        lengths, directions = self.vectors.polar(z)
+        return np.concatenate([z[self.one], lengths, z[self.vectors.opening_unknowns]]), directions
+
+    def s(self, z: Array) -> Array:
+        """The coordinates along the graphs, (m,)."""
+        return self.polar(z)[0]
+
+    def directions(self, z: Array) -> Array:
+        """Unit vectors of the points of lengths, (N,)."""
+        return self.vectors.directions(z)
+
+    def rates(self, z: Array, direction: Array) -> Array:
+        """How s changes along a direction of the coordinates, (m,); a length of 0, but for rounding, grows in each.
+
+        Args:
+            z: the coordinates, (n,).
+            direction: of them, (n,).
+        """
+        vectors = self.vectors
+        lengths, directions = vectors.polar(z)
+        moved = lengths > self.thresholds.curve.no_length
+        along = np.where(moved, vectors.along(directions, direction), vectors.lengths(direction))
+        return np.concatenate([direction[self.one], along, direction[vectors.opening_unknowns]])
+
+    @property
+    def moving(self) -> Mask:
+        """The points whose displacements move, (m,)."""
+        return np.asarray(self._moves != 0.0)
+
+    @property
+    def slope(self) -> Array:
+        """Of the forces of points that move, else 0, (m,); of straight graphs."""
+        return np.where(self._moves != 0.0, self._rises, 0.0)
+
+    @property
+    def rise(self) -> Array:
+        """±1 where the displacement stands, else 0, (m,); of straight graphs."""
+        return np.where(self._moves != 0.0, 0.0, self._rises)
+
+    @property
+    def stiffest(self) -> float:
+        """The largest stiffness of an unknown."""
+        if self.straight:
+            return float(np.max(self.elastic.diagonal, initial=0.0))
+        return float(np.max(self.forces, initial=0.0)) / self.length
+
+    def on_drops(self) -> list[int]:
+        """The points where a law drops."""
+        return [int(k) for k in np.flatnonzero((self._moves == 0.0) & (self._rises < 0.0) & ~self._bound)]
+
+    # -- memory
+
+    @property
+    def memory(self) -> Array | None:
+        """What the laws at all vertices remember, (v, 4), as :meth:`.VertexLaw.memory`; None where none does."""
+        return self.remembered.copy() if any(law.passed is not None for law in self.vertices) else None
+
+    def put(self, numbers: Integers, memory: Array | None) -> None:
+        """Put all points where they were at a state of a path.
+
+        Args:
+            numbers: of their segments, (m,).
+            memory: as :attr:`memory` was.
+        """
+        if memory is not None:
+            self._recall(memory)
+        for k, number in enumerate(numbers):
+            self.rebuild(k)
+            self.enter(k, int(number))
+
+    def kept(self) -> Kept:
+        """Where all points are and what their laws remember, for :meth:`restore`."""
+        chains, bases, memory = list(self._chains), list(self._bases), self.remembered.copy()
+        return Kept(numbers=self.numbers.copy(), chains=chains, bases=bases, memory=memory)
+
+    def restore(self, kept: Kept) -> None:
+        """Go back to where all points were.
+
+        Args:
+            kept: as :meth:`kept` found it.
+        """
+        self._chains, self._bases = list(kept.chains), list(kept.bases)
+        self._recall(kept.memory)
+        for k, number in enumerate(kept.numbers):
+            self.enter(k, int(number))
+
+    def _recall(self, memory: Array) -> None:
+        """Let the laws remember what they did."""
+        for row in np.flatnonzero(np.any(memory != self.remembered, axis=1)):
+            self.vertices[row].restore(memory[row])
+        self.remembered = np.array(memory)
+
+    def remember(self, k: int, x: float, traction: float) -> float:
+        """Let a point's laws note where they have been, and take its segments anew.
+
+        Args:
+            k: the point.
+            x: along the point's direction.
+            traction: the force there.
+
+        Returns:
+            The displacement, 0 where it is rounding.
+        """
+        x = x if any(law.has_moved(x) for law in self.laws[k]) else 0.0
+        for law, share in zip(self.laws[k], self.shares(k, x, traction), strict=True):
+            law.remember(x, share)
+            self.remembered[law.row] = law.memory()
+        self.rebuild(k)
+        return x
+
+    def shares(self, k: int, x: float, force: float) -> list[float]:
+        """The tractions of a point's laws that give a force together.
+
+        Args:
+            k: the point.
+            x: along the point's direction.
+            force: of all its laws.
+        """
+        return shares(self.laws[k], x, force)

@@ -1,0 +1,159 @@
+"""A state of points on straight segments: its coordinates, and the linear equations that these satisfy."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+from ..reduced.condensed_problem import CondensedProblem
+from ..reduced.condensed_stiffness import CellColumns, CellInverse
+from ..typing import Array
+from .relations import ContactPoints, Values
+from .rigid_motions import are_same, pins
+from .state import PathState
+
+
+class StraightState:
+    """All n points on their segments.
+
+    Args:
+        points: the points, all of them straight; their statuses are changed by :meth:`enter`.
+        tau: the coordinates along the segments, (n,); of force where the displacement stands.
+
+    Attributes:
+        points: as given.
+        tau: the coordinates.
+        held: rigid motions that nothing resists and no load drives, as orthonormal rows, (d, n).
+    """
+
+    def __init__(self, points: ContactPoints, tau: Array) -> None:
+        self.points, self.tau, self._stiffness = points, np.array(tau), points.elastic
+        self.held: Array = np.empty((0, len(tau)))
+        self._pins = np.zeros(len(tau))
+
+    def __len__(self) -> int:
+        return len(self.tau)
+
+    @property
+    def values(self) -> Values:
+        """Displacements and forces."""
+        return self.points.values(self.tau)
+
+    def enter(self, i: int, number: int, coordinate: float) -> None:
+        """Put a point on a segment.
+
+        Args:
+            i: the point.
+            number: of the segment.
+            coordinate: τ there.
+        """
+        self.points.enter(i, number)
+        self.tau[i] = coordinate
+
+    @property
+    def tangent(self) -> Array:
+        """The slopes of the forces of laws and of what pins the body, (n,)."""
+        return np.asarray(self.points.slope + self._pins)
+
+    def column(self, i: int) -> Array:
+        """How the equations change with a coordinate, (n,)."""
+        rise = self.points.rise[i]
+        if rise:
+            return np.asarray(rise * np.eye(1, len(self), i)[0])
+        found = self._stiffness.column(i)
+        found[i] += self.tangent[i]
+        return found
+
+    def hold(self, rate: Array) -> bool:
+        """Hold the motions that nothing resists and no load drives; whether they are others than before.
+
+        Args:
+            rate: the load that grows, (n,).
+        """
+        if not len(self.points.rigid):
+            return False
+        held = self.points.unresisted(self.values, rate).held
+        if are_same(held, self.held):
+            return False
+        self.held, self._pins = held, np.zeros(len(self))
+        self._pins[pins(held)] = self.points.stiffest or 1.0
+        return True
+
+    def inverse(self, driver: int | None = None, factor: Array | None = None) -> CellInverse:
+        """The inverse of the equations.
+
+        Args:
+            driver: the point in whose place is the factor; None: all are in their own places.
+            factor: the factor's column, (n,).
+
+        Raises:
+            numpy.linalg.LinAlgError: they are singular.
+        """
+        column = np.zeros(len(self)) if factor is None else factor
+        given = CellColumns(slope=self.tangent, rise=self.points.rise, driver=driver, factor=column)
+        return self._stiffness.inverse(given)
+
+    def product(self, coordinates: Array) -> Array:
+        """The equations times coordinates, (n,).
+
+        Args:
+            coordinates: (n,).
+        """
+        moving = self.points.moving
+        found = self._stiffness @ np.where(moving, coordinates, 0.0)
+        return np.asarray(found + np.where(moving, self.tangent, self.points.rise) * coordinates)
+
+    def softest(self, inverse: CellInverse, start: Array) -> Array:
+        """The eigenvector of the negative eigenvalue next to zero, or of the greatest one; zero where points stand.
+
+        By Lanczos' method on the inverse.
+
+        Args:
+            inverse: of the equations.
+            start: where the iteration begins, (n,).
+        """
+        found, free = np.zeros(len(self)), np.flatnonzero(self.points.moving)
+
+        def response(v: Array) -> Array:
+            spread = np.zeros(len(self))
+            spread[free] = v.ravel()
+            return inverse.solve(spread)[free]
+
+        begin = response(start[free])
+        found[free] = begin if np.any(begin) else 1.0
+        if free.size < 2 or not np.any(begin):
+            return found
+        operator = LinearOperator((free.size, free.size), matvec=response, dtype=np.float64)
+        try:
+            accuracy = self.points.thresholds.exact.softest
+            found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=accuracy)[1][:, 0]
+        except ArpackNoConvergence:
+            pass
+        return found
+
+
+def coordinates_at(problem: CondensedProblem, points: ContactPoints, state: PathState) -> Array:
+    """The coordinates of a state of a path; the points are put where they were, (n,).
+
+    Args:
+        problem: the problem.
+        points: its points.
+        state: the state.
+    """
+    points.put(state.position.numbers, state.memory)
+    if not points.straight:
+        return state.position.small.copy()
+    return _coordinates(points, state.x, problem.load(state.factor) - problem.elastic @ state.x)
+
+
+def _coordinates(points: ContactPoints, x: Array, force: Array) -> Array:
+    """The coordinates of displacements and forces along the present segments; ends where they are that, (n,)."""
+    found = np.zeros(len(x))
+    for i in range(len(x)):
+        segment = points.segment(i)
+        found[i] = segment.coordinate(float(x[i]), float(force[i]))
+        length = segment.high - segment.low
+        for end in (segment.low, segment.high):
+            if abs(found[i] - end) <= 1e-12 * (length if np.isfinite(length) else abs(found[i])):
+                found[i] = end
+    return found
