@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hvi_fenicsx.load_paths.journal import Journal
 from numpy.testing import assert_array_equal
 
-from hvi_fenicsx.load_paths import journal
+from hvi_fenicsx.runtime import journal
+from hvi_fenicsx.runtime.journal import Journal
 
 RECORDS: list[dict[str, Any]] = [
     {"factor": 0.1 + 0.2, "event": "kink", "x": np.array([1.0, np.nextafter(1.0, 2.0)]), "memory": None},

@@ -6,14 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hvi_fenicsx.load_paths.journal import Record
-from hvi_fenicsx.system.factorised_stiffness import FactorisedStiffness
 from runs import LONG_RANKS, on_ranks
 from scenes import STEEL, Table
 from unformed import difference, figures, path_run, words
 
 from hvi_fenicsx.load_paths.following import Control
 from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
+from hvi_fenicsx.reduced.factorised_stiffness import FactorisedStiffness
+from hvi_fenicsx.runtime.journal import Record
 
 SOFT: Table = {"law": "graph", "points": [[0, 0], [2e-6, 3e6], [1.6e-5, 0]]}
 TEETH: Table = {"law": "graph", "points": [[0, 0], [4e-6, 1e6], [4e-6, 6e5], [9e-6, 1e6], [9e-6, 6e5]]}
