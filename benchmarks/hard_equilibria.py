@@ -8,35 +8,40 @@ Of each such case in which `auto` certifies nothing, all equilibria are searched
 from __future__ import annotations
 
 import argparse
-import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import hard_scenes
 from covering import Case, Table, cases
 from hard_cases import AXES
 from mpi4py import MPI
 
-from hvi_fenicsx import workflow
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.stationary_points.bodies import Equilibria
+from hvi_fenicsx.workflow import finish
 
 UNDECIDED = ("metastable", "borderline")
+LARGEST = 8
+"""Cells along the floor of cases that a report has searched."""
 
 
-def decided(case: Case, table: Table, limit: float) -> str | None:
-    """What is known of a case; None where `auto` certifies an equilibrium, or existence is decided."""
-    prepared = hard_scenes.prepare(case, table.data, "auto", MPI.COMM_SELF)
-    if prepared.solvability.state not in UNDECIDED:
-        return None
-    if workflow.finish(prepared, interrupted=_clock(limit), estimating=False).converged:
-        return None
-    begin = time.process_time()
+def number_of_equilibria(case: Case, data: Mapping[str, Any], limit: float = 60.0) -> int | None:
+    """How many equilibria a case has; None where that is not proven within the limit of processor time."""
+    prepared = hard_scenes.prepare(case, data, "auto", MPI.COMM_SELF)
     try:
         found = Equilibria(prepared).find(lowest=False, gap=1e-8, stop=_clock(limit), report=lambda _: None)
-    except HviError as error:
-        return f"not searched: {error}"
-    return f"{found.reason}\t{found.nodes} cells\t{time.process_time() - begin:.1f} s"
+    except HviError:
+        return None
+    return len(found.points) if found.complete else None
+
+
+def is_open(case: Case, data: Mapping[str, Any], limit: float) -> bool:
+    """Whether existence is undecided, and `auto` certifies nothing."""
+    prepared = hard_scenes.prepare(case, data, "auto", MPI.COMM_SELF)
+    if prepared.solvability.state not in UNDECIDED:
+        return False
+    return not finish(prepared, interrupted=_clock(limit), estimating=False).converged
 
 
 def _clock(limit: float) -> Callable[[], bool]:
@@ -45,8 +50,8 @@ def _clock(limit: float) -> Callable[[], bool]:
     return lambda: time.process_time() - begin > limit
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cells", type=int, default=16)
     parser.add_argument("--only", nargs="+", metavar="KEY", help="cases, by default all up to that size")
     parser.add_argument("--limit", type=float, default=60.0, help="seconds of processor time for each case and search")
@@ -54,12 +59,12 @@ def main() -> int:
     table = Table.read(AXES)
     for case in cases(table):
         wanted = case.key in options.only if options.only else case["cells"] <= options.cells
-        if wanted and (words := decided(case, table, options.limit)):
-            print(
-                f"{case.number}\t{case.key}\t{case['law']}\t{case['smoothing']}\t{case['cells']}\t{words}", flush=True
-            )
-    return 0
+        if wanted and is_open(case, table.data, options.limit):
+            number = number_of_equilibria(case, table.data, options.limit)
+            words = "not proven" if number is None else f"{number} equilibria"
+            about = (case["law"], case["smoothing"], case["cells"])
+            print(case.number, case.key, *about, words, sep="\t", flush=True)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

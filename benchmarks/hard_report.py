@@ -35,7 +35,7 @@ def write(name: str, table: Table, listed: Sequence[Case], records: Iterable[Rec
 
 
 def _without(results: Results) -> str:
-    """The enumeration of cases in which no method found an equilibrium."""
+    """The search of cases in which no method found an equilibrium."""
     ended = {r["key"] for of in results.of.values() for r in of.values() if r["outcome"] == "no_equilibrium"}
     decided = {key: number for key, number in results.enumerated.items() if number is not None}
     confirmed = sum(not number for number in decided.values())
@@ -46,10 +46,8 @@ In {len(ended - results.found)} metastable or borderline cases no method found a
     if not rows:
         return words
     words += f""" Is there none?
-`benchmarks/hard_enumeration.py` tries all states of the floor's vertices by branch and bound. It can do so where the
-tractions are piecewise linear (unsmoothed laws and the quadratic smoothing) and the floor is short: here in
-{len(results.enumerated)} cases. In {len(decided)} of them it ended within its limit of linear programmes.
-{confirmed} of these have no equilibrium."""
+`hvi equilibria` searches all of them where the floor is short: here in {len(results.enumerated)} cases.
+In {len(decided)} of them it ended with a proof within a minute. {confirmed} of these have no equilibrium."""
     return f"{words}\n\n{_markdown(['case', 'law', 'cells', 'equilibria there are'], rows)}"
 
 
@@ -114,8 +112,8 @@ There are {len(results.cases)} cases; what is missing under *cases run* has not 
   in one process only; an exact law that jumps upwards at a length is taken in the plane only;
 - *asked*: the cases run, without these two;
 - *held: certified*: of the cases in which the body is held, so that an equilibrium exists, those that are certified;
-- *no equilibrium found*: the state is metastable or borderline, and no method or enumeration found an equilibrium;
-- *missed*: the method found no equilibrium, but another method or the enumeration did;
+- *no equilibrium found*: the state is metastable or borderline, and no method or search found an equilibrium;
+- *missed*: the method found no equilibrium, but another method or the search did;
 - *failed*: all other cases.
 
 {_BRANCH if "branch" in results.methods else ""}Solved within {QUICK:g} s: {", ".join(quick)}."""

@@ -15,14 +15,14 @@ SOLVED = ("certified", "no_equilibrium")
 
 
 class Results:
-    """The last record of each case and method, judged beside those of other methods and an enumeration.
+    """The last record of each case and method, judged beside those of other methods and a search with a proof.
 
     Attributes:
         cases: by key.
         of: records by method and key.
         found: keys of the cases that have an equilibrium.
-        enumerated: number of stationary points, by key, of small cases in which no method found any; None where there
-            are too many states to try.
+        enumerated: number of stationary points, by key, of small cases in which no method found any; None where that
+            is not proven.
     """
 
     def __init__(self, table: Table, listed: Sequence[Case], records: Iterable[Record]) -> None:
@@ -47,7 +47,7 @@ class Results:
         return [r for r in self.of[method].values() if self.outcome(r) not in ("refused", "escapes")]
 
     def outcome(self, record: Record) -> str:
-        """That no equilibrium was found counts only where no other method and no enumeration found one either."""
+        """That no equilibrium was found counts only where no other method and no search found one either."""
         if record["reason"].startswith(REFUSAL):
             return "refused"
         missed = record["outcome"] == "no_equilibrium" and record["key"] in self.found
@@ -64,9 +64,10 @@ class Results:
 
 
 def _enumerated(table: Table, listed: Sequence[Case]) -> dict[str, int | None]:
-    """Numbers of stationary points of those cases that are small enough; None where there is too much to try."""
+    """Numbers of stationary points of those cases that are small enough; None where that is not proven."""
     if not listed:
         return {}
-    import hard_enumeration  # it imports dolfinx, which a report without such cases does not need
+    import hard_equilibria  # it imports dolfinx, which a report without such cases does not need
 
-    return {c.key: hard_enumeration.equilibria(c, table.data) for c in listed if hard_enumeration.fits(c)}
+    small = [c for c in listed if c["cells"] <= hard_equilibria.LARGEST]
+    return {c.key: hard_equilibria.number_of_equilibria(c, table.data) for c in small}

@@ -16,14 +16,14 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import workflow
 from hvi_fenicsx.certify.certificate import Examination
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.load_paths.following import Control, PathRun
 from hvi_fenicsx.scene import PathTable
 from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
 from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.workflow import Preparation
+from hvi_fenicsx.workflow import Preparation, finish
+from hvi_fenicsx.workflow.solving import judged
 
 COMM = MPI.COMM_WORLD
 UNDECIDED = ("metastable", "borderline")
@@ -100,12 +100,12 @@ def _judged(
 ) -> tuple[SolveResult, Examination]:
     """A result and its certificate: as of ``hvi run``, but where a method or its start is looked at by itself."""
     if prepared.options.method == "auto" and case["start"] == "default":
-        solution = workflow.finish(prepared, interrupted=late, estimating=False)
+        solution = finish(prepared, interrupted=late, estimating=False)
         assert solution.solve_result is not None
         assert solution.examination is not None
         return solution.solve_result, solution.examination
     control = RunControl(timer=prepared.timer, interrupted=late)
-    return workflow.judged(prepared, _solved(case, data, prepared, control), control=control)
+    return judged(prepared, _solved(case, data, prepared, control), control=control)
 
 
 def _unsolved(state: str, found: SolveResult) -> str:

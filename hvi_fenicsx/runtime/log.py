@@ -186,7 +186,7 @@ class TerminalDisplay(logging.Handler):
         self._line: Any = None
         self.addFilter(lambda record: record.name == COMMANDS or hasattr(record, "moving"))
         if sys.stderr.isatty():
-            self._line = _moving_line()
+            self._line, self._spinner = _moving_line()
             self._line.start()
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -194,7 +194,7 @@ class TerminalDisplay(logging.Handler):
         if not hasattr(record, "moving"):
             terminal.say(record.getMessage())
         elif self._line is not None:
-            self._line.renderable.update(text=f"{record.getMessage()}, {time.perf_counter() - self._start:.1f} s")
+            self._spinner.update(text=f"{record.getMessage()}, {time.perf_counter() - self._start:.1f} s")
 
     def close(self) -> None:
         """Leave the terminal clean."""
@@ -205,15 +205,16 @@ class TerminalDisplay(logging.Handler):
         super().close()
 
 
-def _moving_line() -> Any:
-    """A line on standard error with a spinner; lines on standard output go above it, where that is a terminal too."""
+def _moving_line() -> tuple[Any, Any]:
+    """A line on standard error, and its spinner; lines on standard output go above it, where that is a terminal too."""
     from rich.console import Console
     from rich.live import Live
     from rich.spinner import Spinner
 
     shared = sys.stdout.isatty()
     spinner = Spinner("line", style="status.spinner")
-    return Live(spinner, console=Console(stderr=True), refresh_per_second=12.5, transient=True, redirect_stdout=shared)
+    console = Console(stderr=True)
+    return Live(spinner, console=console, refresh_per_second=12.5, transient=True, redirect_stdout=shared), spinner
 
 
 class Handlers:

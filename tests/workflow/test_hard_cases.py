@@ -29,7 +29,7 @@ BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 import hard_cases  # noqa: E402 (a script's neighbour, not a package)
-import hard_enumeration  # noqa: E402
+import hard_equilibria  # noqa: E402
 import hard_run  # noqa: E402
 import hard_scenes  # noqa: E402
 from covering import Case, Table, cases  # noqa: E402
@@ -143,13 +143,13 @@ AGREED = [
 
 
 @pytest.mark.parametrize(("law", "support", "smoothing", "cells", "expected"), AGREED)
-def test_enumeration_and_auto_agree_on_whether_there_is_an_equilibrium(
+def test_a_search_with_a_proof_and_auto_agree_on_whether_there_is_an_equilibrium(
     law: str, support: str, smoothing: str, cells: int, expected: int
 ) -> None:
     """Pushed blocks that no state of their floors holds, and one at a wall that exactly one does."""
     wanted = {"law": law, "support": support, "smoothing": smoothing, "cells": cells, "side": "under"}
     case = next(c for c in LISTED if all(c[axis] == value for axis, value in wanted.items()))
-    assert hard_enumeration.equilibria(case, TABLE.data) == expected
+    assert hard_equilibria.number_of_equilibria(case, TABLE.data) == expected
     record = hard_run.attempt(case, TABLE.data, "auto", TABLE.data["limit"])
     assert record["outcome"] == ("certified" if expected else "no_equilibrium")
 
