@@ -1,4 +1,4 @@
-"""The hard-case matrix: run it, and write its table and picture.
+"""The hard-case matrix: run it, and write its table.
 
     python3 benchmarks/hard_cases.py run [--method auto ...] [--only KEY ...] [--cells N] [--limit SECONDS]
         [--sample NUMBER SEED] [--out FILE]

@@ -1,4 +1,4 @@
-"""The document of a hard-case matrix and its picture, docs/hard-cases.md of the first, from the results alone."""
+"""The document of a hard-case matrix, docs/hard-cases.md of the first, from the results alone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from covering import Case, Table
-from hard_picture import draw
 from hard_results import SOLVED, Record, Results
 
 QUICK = 10.0
@@ -31,7 +30,6 @@ def write(name: str, table: Table, listed: Sequence[Case], records: Iterable[Rec
         *(_open(results, m) for m in results.methods),
     ]
     (folder / f"{page}.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-    draw(table, results, folder / f"{page}.png")
 
 
 def _without(results: Results) -> str:
@@ -56,7 +54,6 @@ def _size(case: Case) -> list[str]:
 
 
 def _head(name: str, table: Table, listed: Sequence[Case]) -> str:
-    page = name.replace("_", "-")
     return f"""# {table.data["title"]}
 
 {_about(name, table, listed)} The list of cases follows from the axes
@@ -70,14 +67,12 @@ def _head(name: str, table: Table, listed: Sequence[Case]) -> str:
 The commands are
 
     {COMMAND} run --table {name}       # hours for all methods; `--method auto` is minutes; resumes where it stopped
-    {COMMAND} report --table {name}    # writes this document and its picture
+    {COMMAND} report --table {name}    # writes this document
 
 A case counts as solved in three situations: its displacement is certified within
 {table.data["tolerance"]:g}; or it is proved that no solution exists (state *escapes*); or its state is metastable or
 borderline, and no method found an equilibrium.{_PATHS if "question" in table.axes else ""} The time of one case and
-method is processor time.
-
-![Share of the cases solved by each method, for each value of each axis]({page}.png)"""
+method is processor time."""
 
 
 def _about(name: str, table: Table, listed: Sequence[Case]) -> str:

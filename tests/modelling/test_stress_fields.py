@@ -5,19 +5,16 @@ A bar in pure bending has a quadratic displacement, which degree 2 represents ex
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import pyvista
+import rings
 from dolfinx import fem
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.typing import Array
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-import rings
 
 E, NU, TURN = 2e9, 0.3, 1e-3
 BENT = {

@@ -6,15 +6,18 @@ turns with the facets: all bounds here fail on them by a factor of ten or more.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import lame
 import numpy as np
 import pytest
+import rings
 import ufl
 from dolfinx import fem
+from lame import NU, E, P
+from rings import RINGS
 from runs import LONG_RANKS, summary
 from runs import hvi as command
 
@@ -22,12 +25,6 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.problem.curved_overlaps import in_plane
 from hvi_fenicsx.problem.facet_overlaps import Facets
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-import lame
-import rings
-from lame import NU, E, P
-from rings import RINGS
 
 HELD = [hvi.Displacement("bottom", [0.0, 0.0]), hvi.Displacement("left", [0.0, 0.0])]
 SYMMETRY = [hvi.Displacement("bottom", [None, 0.0]), hvi.Displacement("left", [0.0, None])]

@@ -5,28 +5,25 @@ With flat facets on both sides the energies are wrong by h², more than ten time
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
+import lame
 import numpy as np
 import pytest
+import shells
 import ufl
 from dolfinx import fem
+from lame import BULK, SHEAR, E, P
 from runs import hvi as command
 from runs import summary
+from shells import FLAT
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.problem import curved_shapes, facet_integrals
 from hvi_fenicsx.problem.curved_polygons import in_space
 from hvi_fenicsx.problem.facet_overlaps import Facets
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-import lame
-import shells
-from lame import BULK, SHEAR, E, P
-from shells import FLAT
 
 
 def patch(cells: int, radius: float, sign: float, begin: float = -1.0) -> Facets:

@@ -1,6 +1,4 @@
-"""Lamé's hollow ball of two bodies at degree 2: errors with curved cells on both sides, and with straight ones.
-
-    ./hvi exec python3 benchmarks/shells.py
+"""Lamé's hollow ball of two bodies in contact, and the errors of solutions.
 
 An eighth of a ball, radii 1 and 2 m, under pressure inside; the two bodies meet at 1.5 m. The error in the energy norm
 is integrated over the bodies as they are meshed.
@@ -89,16 +87,3 @@ def under_pressure(body: hvi.Body) -> hvi.Solution:
 def errors(found: hvi.Solution) -> Errors:
     """The errors of a solution under pressure."""
     return lame.errors(found, displacement)
-
-
-def table() -> None:
-    """All errors on three meshes."""
-    for order in (2, 1):
-        for name, ratio, sizes in (("matching", 1.0, (0.6, 0.3, 0.15)), ("not matching", 0.7, (0.4, 0.28, 0.2))):
-            for size in sizes:
-                found = under_pressure(bodies(size, ratio * size, order))
-                print(f"{name}, file of order {order}, {errors(found)}", flush=True)
-
-
-if __name__ == "__main__":
-    table()

@@ -1,6 +1,4 @@
-"""Lamé's thick wall at degree 2, of one body and of two in contact: errors with curved cells and with straight ones.
-
-    ./hvi exec python3 benchmarks/rings.py
+"""Lamé's thick wall of one body and of two in contact, and the errors of solutions.
 
 A quarter of a ring, radii 1 and 2 m, under pressure inside; the two bodies meet at 1.5 m. The error in the energy norm
 is integrated: that of the energy has another order where polygons take the place of curves, since the body is another.
@@ -9,7 +7,6 @@ is integrated: that of the energy has another order where polygons take the plac
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,19 +64,3 @@ def solved(script: str, *effects: Any) -> hvi.Solution:
 def errors(found: hvi.Solution) -> Errors:
     """The errors of a solution under pressure."""
     return lame.errors(found, displacement)
-
-
-def table(cells: Sequence[int]) -> None:
-    """All errors on meshes of so many cells across the wall."""
-    for order in (2, 1):
-        for name, other in (("one body", None), ("two bodies, matching", 1.0), ("two bodies, not matching", 0.7)):
-            for n in cells:
-                if other is None:
-                    found = solved(RING.format(size=1 / n, order=order))
-                else:
-                    found = solved(RINGS.format(size=1 / n, other=other / n, order=order), hvi.Contact("fit"))
-                print(f"{name}, file of order {order}, {errors(found)}", flush=True)
-
-
-if __name__ == "__main__":
-    table((2, 4, 8, 16))
