@@ -51,7 +51,7 @@ class ConcavePart:
             if b < 0.0 and g.rows.size
         ]
         _, sizes, right = np.linalg.svd(np.linalg.qr(np.vstack([np.zeros((k, k)), *rows]), mode="r"))
-        return cls(f, programme, right[sizes > programme.thresholds.rank * max(sizes[0], 1e-300)])
+        return cls(f, programme, right[sizes > programme.thresholds.rounding * max(sizes[0], 1e-300)])
 
     def cones(self) -> Iterator[Array]:
         """Cones that cover all slips; the edges of each are columns (q, q)."""
@@ -173,7 +173,7 @@ class GlobalProgramme:
         factor = self.evaluate(f, y) / float(load @ y)
         for _ in range(limits.max_rounds):
             found = self.minimise(f.minus(load, factor), ball(self.convex.frame))
-            if found is None or found.value >= -limits.loose_gap * self.convex.scale:
+            if found is None or found.value >= -limits.rounding * self.convex.scale:
                 return factor, y
             y, work = found.y, float(load @ found.y)
             if work <= least:
@@ -194,7 +194,7 @@ class GlobalProgramme:
                     best = Minimum(value, found.y, found.lower) if value < best.value else best
                     heappush(waiting, (found.lower, next(numbers), edges, found.y, depth))
             gap = best.value - waiting[0][0] if waiting else 0.0
-            if gap <= limits.loose_gap * self.convex.scale:
+            if gap <= limits.rounding * self.convex.scale:
                 return replace(best, lower=best.value - gap) if best.y.size else None
             _, _, edges, y, depth = heappop(waiting)
             cones, depth = part.divide(edges, y, depth), depth + 1

@@ -70,7 +70,7 @@ class GapHistory:
         self.best = min(self.best, gap)
         if gap <= limits.tight_gap * self.scale:
             return True
-        return self.stalled >= limits.patience and gap <= limits.loose_gap * self.scale
+        return self.stalled >= limits.patience and gap <= limits.rounding * self.scale
 
 
 @dataclass
@@ -167,7 +167,7 @@ class Programme:
                 return factor, limit
             if not self._violated(f.cone, found.y, active):
                 value, work = self.evaluate(f, found.y), float(load @ found.y)
-                if work <= least and value - factor * work < -self.thresholds.loose_gap * self.scale:
+                if work <= least and value - factor * work < -self.thresholds.rounding * self.scale:
                     return -np.inf, found.y
                 if work > least and value < factor * work:
                     factor, limit = value / work, found.y
@@ -233,14 +233,14 @@ class Programme:
         return Minimum(values[i], inside[i], values[i]) if values else None
 
     def _inside(self, f: Functional, region: Region, y: Array) -> bool:
-        feasible = self.thresholds.feasible
+        feasible = self.thresholds.exact
         held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= feasible
         return bool(held and (f.cone @ y).max(initial=0.0) <= feasible)
 
     def _violated(self, cone: Array, y: Array, active: list[int]) -> bool:
         """Whether y leaves the cone; the row it violates most is then added to the active ones."""
         excess = cone @ y
-        if not len(cone) or excess.max() <= self.thresholds.feasible or int(excess.argmax()) in active:
+        if not len(cone) or excess.max() <= self.thresholds.exact or int(excess.argmax()) in active:
             return False
         active.append(int(excess.argmax()))
         return True

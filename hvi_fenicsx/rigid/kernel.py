@@ -79,7 +79,7 @@ def null_space(rows: Array, thresholds: Thresholds = DEFAULT) -> Array:
     if not rows.any():
         return np.eye(n)
     _, values, right = np.linalg.svd(np.vstack([rows, np.zeros((n, n))]), full_matrices=False)
-    return np.asarray(right[values <= thresholds.rank * values[0]].T)
+    return np.asarray(right[values <= thresholds.rounding * values[0]].T)
 
 
 def natural_basis(basis: Array, count: int, thresholds: Thresholds = DEFAULT) -> Array:
@@ -90,10 +90,10 @@ def natural_basis(basis: Array, count: int, thresholds: Thresholds = DEFAULT) ->
         count: how many of the coefficients are translations; they come first.
         thresholds: what counts as zero.
     """
-    basis = np.where(np.abs(basis) <= thresholds.rank, 0.0, basis)
+    basis = np.where(np.abs(basis) <= thresholds.rounding, 0.0, basis)
     shifts = _sparse_basis(basis[:count] @ null_space(basis[count:], thresholds), thresholds)
     spins = _sparse_basis(basis[count:], thresholds)
-    lift = np.linalg.lstsq(basis[count:], spins, rcond=thresholds.rank)[0]
+    lift = np.linalg.lstsq(basis[count:], spins, rcond=thresholds.rounding)[0]
     centre = basis[:count] @ lift
     centre = centre - shifts @ (shifts.T @ centre)
     zeros = np.zeros((len(basis) - count, shifts.shape[1]))
@@ -103,7 +103,7 @@ def natural_basis(basis: Array, count: int, thresholds: Thresholds = DEFAULT) ->
 def _sparse_basis(vectors: Array, thresholds: Thresholds) -> Array:
     """Orthonormal basis of the span of the columns (n, k) of `vectors`, along axes where it can be."""
     left, values, _ = np.linalg.svd(vectors, full_matrices=False)
-    span = left[:, values > thresholds.rank]
+    span = left[:, values > thresholds.rounding]
     factor, upper = np.linalg.qr(_reduce(span))
     return _snap(factor * np.sign(np.diag(upper)))
 

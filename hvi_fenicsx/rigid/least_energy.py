@@ -139,7 +139,7 @@ class _CutModel:
         return _Step(
             target,
             float(self.work @ target + np.sum(level) + size * np.sum(found.x[k:])),
-            bool(np.max(np.abs(found.x[:k])) < 1.0 - self.thresholds.at_edge),
+            bool(np.max(np.abs(found.x[:k])) < 1.0 - self.thresholds.rounding),
             -found.ineqlin.marginals[: len(room)],
         )
 
@@ -191,8 +191,8 @@ def _descend(comm: MPI.Comm, model: _CutModel, energy: Energy, best: Array) -> R
     thresholds = model.thresholds
     reactions: Array = np.zeros(len(model.sides.limits))
     radius, lowest = model.size, model.cut(best, *energy(best))
-    tiny = thresholds.rest_gap * max(float(np.max(np.abs(v), initial=0.0)) for v in (model.work, model.slopes[0]))
-    for _ in range(thresholds.rest_rounds):
+    tiny = thresholds.exact * max(float(np.max(np.abs(v), initial=0.0)) for v in (model.work, model.slopes[0]))
+    for _ in range(thresholds.max_rounds):
         step = on_root(comm, functools.partial(model.minimise, best, radius))
         if step is None or radius > thresholds.farthest:
             return None

@@ -54,7 +54,7 @@ class Analysis:
     @cached_property
     def tie(self) -> float:
         """Works of less than this are zero: relative to the loads, without any to the laws."""
-        return self.thresholds.tie * (self.reduced.load_scale or self._law_scale or 1.0)
+        return self.thresholds.rounding * (self.reduced.load_scale or self._law_scale or 1.0)
 
     @cached_property
     def programme(self) -> GlobalProgramme:
@@ -118,7 +118,7 @@ class Analysis:
 
     def _limits(self, factor: float) -> bool:
         """Whether a load factor between none and all of the load."""
-        return self.thresholds.tie < factor < 1.0
+        return self.thresholds.rounding < factor < 1.0
 
     def load_factors(self, loads: Collection[str]) -> LoadFactors:
         """The factors of some loads together, the others constant."""
@@ -196,11 +196,11 @@ class Analysis:
         """Unit rigid coefficients (3|6,) of y, small ones dropped if f stays as low and y in the cone."""
         z = self.reduced.frame @ y
         z, limit = z / np.abs(z).max(), self.programme.evaluate(f, y) / np.abs(z).max() + self.tie
-        for snap in self.thresholds.dropped:
+        for snap in self.thresholds.dropped_sizes():
             short = np.where(np.abs(z) <= snap, 0.0, z)
             trial = np.linalg.lstsq(self.reduced.frame, short, rcond=None)[0]
             off = max(np.abs(self.reduced.frame @ trial - short).max(), (f.cone @ trial).max(initial=0.0))
-            if off <= self.thresholds.tie and self.programme.evaluate(f, trial) <= limit:
+            if off <= self.thresholds.rounding and self.programme.evaluate(f, trial) <= limit:
                 return np.asarray(short)
         return np.asarray(z)
 
@@ -216,7 +216,7 @@ class Analysis:
         gram = sum(
             (g for g, c in zip(self.reduced.traces, c4, strict=True) if c > 0.0), np.zeros((len(self.work),) * 2)
         )
-        corners = vertices(self.reduced.frame, self.thresholds.rank) if c4.any() else ()
+        corners = vertices(self.reduced.frame, self.thresholds.rounding) if c4.any() else ()
         trace = max((float(y @ gram @ y) for y in corners), default=0.0)
         return float(np.sqrt(c4**2 @ self.reduced.areas * trace))
 

@@ -176,7 +176,7 @@ class ReducedProblem:
     def slip_rows(self, p: int) -> Array:
         """The slips of part p as rows (q, k) of length one; vanishing ones are left out."""
         rows = self.slips[p].rows
-        tiny = self.thresholds.short_row * float(self.areas[p]) / max(len(rows), 1)
+        tiny = self.thresholds.exact * float(self.areas[p]) / max(len(rows), 1)
         return unit_rows(rows.reshape(-1, rows.shape[2]), tiny)
 
 
@@ -233,7 +233,7 @@ def reduce(
 def _own_rows(problem: RigidProblem, basis: Array, thresholds: Thresholds) -> _Rows:
     """What this rank has of the reduced problem."""
     normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.cones()]
-    contact = unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.short_row)
+    contact = unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.exact)
     slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
     return _Rows(
         contact=np.unique(contact, axis=0),

@@ -62,7 +62,7 @@ class LoadFactors:
     mode: Mode | None
     peak_mode: Mode | None
     peak_from: float = -np.inf
-    tie: float = DEFAULT.tie
+    tie: float = DEFAULT.rounding
 
     @property
     def never_held(self) -> bool:
