@@ -12,9 +12,9 @@ from dolfinx import fem
 
 from ..errors import InputError
 from ..paths.follower import Follower
-from ..paths.graphs import is_straight
 from ..paths.load_path import LoadPath, PathRow
 from ..paths.state import End, Event, Follow, PathOptions, PathState, Watch
+from ..paths.vertex_laws import is_straight
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..reduced import loading

@@ -9,11 +9,10 @@ from scipy.sparse import csr_array
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
-from .graphs import is_straight
 from .lengths import VectorPoints
 from .segments import refuse_shared
 from .thresholds import DEFAULT, Thresholds
-from .vertex_laws import VertexLaw, vertex_laws
+from .vertex_laws import VertexLaw, is_straight, vertex_laws
 
 
 class PointLaws:
@@ -49,7 +48,7 @@ class PointLaws:
     ) -> None:
         laws = vertex_laws(problem, remember)
         self._problem, self.thresholds, self.vertices = problem, thresholds, laws
-        kinds = {law.unknowns: (law.opens, law.mixity) for law in laws if law.radial}
+        kinds = {law.unknowns: (law.bonds.opens, law.bonds.mixity) for law in laws if law.bonds.radial}
         lengths = sorted(kinds)
         self.vectors = VectorPoints(
             lengths, [kinds[group][0] for group in lengths], [kinds[group][1] for group in lengths]

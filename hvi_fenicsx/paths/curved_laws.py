@@ -126,10 +126,10 @@ class Deviations:
             group.at = None
             law, low, high = group.rows[row], segment.x + segment.low, segment.x + segment.high
             middle = between(low, high)
-            passed = (0.0, 0.0) if law.passed is None else law.passed.displacements
+            passed = law.passed or (0.0, 0.0)
             group.live[row] = not segment.rise and not passed[0] < middle < passed[1]
             if group.live[row]:
-                graph, at = law.graph(), np.array([middle])
+                graph, at = law.graph, np.array([middle])
                 slope = float(graph.slopes[np.searchsorted(graph.breaks, middle)])
                 group.chords[row] = middle, float(graph.traction(at, "right")[0]), slope
                 group.ends[row] = low, high

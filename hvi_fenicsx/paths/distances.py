@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ..reduced.condensed_problem import CondensedProblem
+from ..laws import VertexLaws
+from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
 from .relations import ContactPoints
 from .state import PathState
 from .straight_state import StraightState, coordinates_at
 from .substitutions import factors, multiplied
 from .thresholds import DEFAULT
-from .vertex_laws import LawRows, law_rows
 
 
 class Distances:
@@ -31,7 +32,8 @@ class Distances:
         self._rounding = rounding
         self._factors = factors(problem)
         self._problem = multiplied(problem, self._factors)
-        self._laws = law_rows(self._problem, remember)
+        bonds = enumerate(self._problem.bonds)
+        self._laws = [b.laws.with_memory if number in remember else b.laws for number, b in bonds]
 
     def __call__(self, state: PathState, carried: Array | None = None) -> float:
         """The largest distance, relative to the forces.
@@ -44,27 +46,29 @@ class Distances:
         elastic, load = problem.elastic @ x, problem.load(state.factor)
         size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
         force = load - elastic if carried is None else carried / self._factors
-        return self._largest(x, force, self._memories(state)) / size
+        return self._largest(x, force, self._present(state)) / size
 
-    def _memories(self, state: PathState) -> list[Array]:
-        """What each group of bonds remembers, (r, 4) each; zeros where it remembers nothing."""
-        ends = np.cumsum([0, *(len(rows.signs) for rows in self._laws)])
-        known = np.zeros((int(ends[-1]), 4)) if state.memory is None else state.memory
-        return [known[a:b] * rows.remembers for rows, a, b in zip(self._laws, ends, ends[1:], strict=False)]
+    def _present(self, state: PathState) -> list[VertexLaws]:
+        """The laws of all groups of bonds, with what these remember."""
+        ends = np.cumsum([len(laws.weights) for laws in self._laws])[:-1]
+        if state.memory is None or not self._laws:
+            return self._laws
+        parts = zip(self._laws, np.split(state.memory, ends), strict=True)
+        return [laws if laws.memory is None else replace(laws, memory=memory) for laws, memory in parts]
 
-    def _largest(self, x: Array, force: Array, memories: list[Array]) -> float:
+    def _largest(self, x: Array, force: Array, present: Sequence[VertexLaws]) -> float:
         """The largest distance of a force that laws and bounds should give."""
         low, high, worst = np.zeros(len(x)), np.zeros(len(x)), 0.0
         rest, problem = force.copy(), self._problem
-        for rows, memory in zip(self._laws, memories, strict=True):
-            unknowns = rows.bonds.unknowns
-            if rows.bonds.radial:
-                lower = problem.lower[unknowns[:, 0]] if rows.bonds.opens else np.full(len(unknowns), -np.inf)
-                off = _off(rows, x[unknowns], force[unknowns], lower, memory, self._rounding)
+        for bonds, laws in zip(problem.bonds, present, strict=True):
+            unknowns = bonds.unknowns
+            if bonds.radial:
+                lower = problem.lower[unknowns[:, 0]] if bonds.opens else np.full(len(unknowns), -np.inf)
+                off = _off(bonds, laws, x[unknowns], force[unknowns], lower, self._rounding)
                 worst = max(worst, float(np.max(off, initial=0.0)))
                 rest[unknowns] = 0.0
             else:
-                least, most = _interval(rows, x[unknowns[:, 0]], memory, self._rounding)
+                least, most = _interval(laws, x[unknowns[:, 0]], self._rounding)
                 np.add.at(low, unknowns[:, 0], least)
                 np.add.at(high, unknowns[:, 0], most)
         allowed = self._rounding * float(np.max(np.abs(x), initial=0.0))
@@ -74,40 +78,40 @@ class Distances:
         return max(worst, float(np.max(away, initial=0.0)))
 
 
-def _interval(rows: LawRows, x: Array, memory: Array, rounding: float) -> tuple[Array, Array]:
+def _interval(laws: VertexLaws, x: Array, rounding: float) -> tuple[Array, Array]:
     """The least and the greatest forces at coordinates, but for their rounding, (r,) each."""
-    near = rounding * (np.abs(x) + rows.law.length_scale)
-    ends = rows.traction(x - near, "left", memory), rows.traction(x + near, "right", memory)
-    return rows.bonds.weights * np.minimum(*ends), rows.bonds.weights * np.maximum(*ends)
+    near = rounding * (np.abs(x) + laws.law.length_scale)
+    ends = laws.traction(x - near, "left"), laws.traction(x + near, "right")
+    return laws.weights * np.minimum(*ends), laws.weights * np.maximum(*ends)
 
 
-def _off(rows: LawRows, u: Array, force: Array, lower: Array, memory: Array, rounding: float) -> Array:
+def _off(bonds: Bonds, laws: VertexLaws, u: Array, force: Array, lower: Array, rounding: float) -> Array:
     """How far forces are from those that a law on a length gives: along u, of a size of its graph, (r,).
 
     An opening that is not positive has none, but for what its bound pushes.
     """
-    near = rounding * (np.max(np.abs(u), axis=1) + rows.law.length_scale)
+    near = rounding * (np.max(np.abs(u), axis=1) + laws.law.length_scale)
     pushed = np.zeros(len(u))
-    if rows.bonds.opens:
+    if bonds.opens:
         shut, pressed = u[:, 0] <= near, u[:, 0] <= lower + near
         pushed[shut & ~pressed] = np.maximum(-force[shut & ~pressed, 0], 0.0)
         force[shut, 0], u[shut, 0] = np.maximum(force[shut, 0], 0.0), 0.0
     length = np.linalg.norm(u, axis=1)
-    least, most = (_energies(rows, u) * end for end in _interval(rows, length, memory, rounding))
+    least, most = (_energies(bonds, u) * end for end in _interval(laws, length, rounding))
     at_rest = np.maximum(np.linalg.norm(force, axis=1) - np.maximum(np.abs(least), np.abs(most)), 0.0)
     directions = np.divide(u, length[:, None], out=np.zeros_like(u), where=length[:, None] > 0.0)
     along = np.sum(force * directions, axis=1)
     across = np.linalg.norm(force - along[:, None] * directions, axis=1)
     moved = np.maximum(np.maximum(least - along, along - most), 0.0) + across
-    return np.asarray(np.where(length <= rounding * rows.law.length_scale, at_rest, moved) + pushed)
+    return np.asarray(np.where(length <= rounding * laws.law.length_scale, at_rest, moved) + pushed)
 
 
-def _energies(rows: LawRows, u: Array) -> Array:
+def _energies(bonds: Bonds, u: Array) -> Array:
     """By what the mode mixity of vectors multiplies a law, (r,)."""
-    mixity, whole = rows.bonds.mixity, np.sum(u * u, axis=1)
+    mixity, whole = bonds.mixity, np.sum(u * u, axis=1)
     if mixity is None:
         return np.ones(len(u))
-    slips = u[:, 1:] if rows.bonds.opens else u
+    slips = u[:, 1:] if bonds.opens else u
     shares = np.divide(np.sum(slips * slips, axis=1), whole, out=np.zeros(len(u)), where=whole > 0.0)
     return np.where(whole > 0.0, mixity.energy(shares), 1.0)
 

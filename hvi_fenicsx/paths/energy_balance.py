@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
 from .events import Arc, driven_work
 from .relations import ContactPoints, Values
-from .vertex_laws import LawRows, VertexLaw, law_rows
+from .vertex_laws import VertexLaw
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,18 +155,14 @@ class _Group:
     """One law at r vertices.
 
     Attributes:
-        rows: the law in arrays.
         laws: the laws of the vertices.
         points: their numbers, (r,).
         shared: the vertices at whose point another law acts, too.
-        first: the number of the first vertex among all.
     """
 
-    rows: LawRows
     laws: list[VertexLaw]
     points: Integers
     shared: list[int]
-    first: int
 
     def tractions(self, points: ContactPoints, lengths: Array, forces: Array) -> Array:
         """What each vertex has of the force at its point, (r,).
@@ -177,7 +172,7 @@ class _Group:
             lengths: of the displacements by point, (m,).
             forces: of all laws of each point, (m,).
         """
-        found = np.asarray(forces[self.points] / self.rows.bonds.weights)
+        found = np.asarray(forces[self.points] / self.laws[0].laws.weights)
         for row in self.shared:
             k, law = int(self.points[row]), self.laws[row]
             shares = points.shares(k, float(lengths[k]), float(forces[k]))
@@ -198,9 +193,9 @@ class BondEnergies:
 
     def __init__(self, problem: CondensedProblem, points: ContactPoints) -> None:
         self._points = points
-        remember = {law.group for law in points.vertices if law.passed is not None}
+        remember = {law.group for law in points.vertices if law.laws.memory is not None}
         self.numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
-        self._groups = [_group(n, problem, remember, points) for n in self.numbers]
+        self._groups = [_group(n, points) for n in self.numbers]
 
     def __call__(self, values: Values) -> tuple[float, Array, Array]:
         """What they give back, what each has lost for 1 at its mode, and the scales by mode, (b,).
@@ -214,14 +209,15 @@ class BondEnergies:
         for group in self._groups:
             x, scale = values.lengths[group.points], values.energies[group.points]
             traction = group.tractions(self._points, values.lengths, forces)
-            back += float(scale @ group.rows.recoverable(x, traction))
-            lost.append(group.rows.dissipated(x, traction, self._points.remembered[group.first : group.first + len(x)]))
+            laws = group.laws[0].laws
+            back += float(scale @ laws.recoverable(x, traction))
+            lost.append(laws.dissipated(x, traction))
             scales.append(scale)
         return back, np.concatenate([np.zeros(0), *lost]), np.concatenate([np.zeros(0), *scales])
 
 
-def _group(number: int, problem: CondensedProblem, remember: Collection[int], points: ContactPoints) -> _Group:
+def _group(number: int, points: ContactPoints) -> _Group:
     laws = [law for law in points.vertices if law.group == number]
     at = points.point_of[[law.unknowns[0] for law in laws]]
     shared = [row for row, k in enumerate(at) if len(points.laws[k]) > 1]
-    return _Group(rows=law_rows(problem, remember)[number], laws=laws, points=at, shared=shared, first=laws[0].row)
+    return _Group(laws=laws, points=at, shared=shared)

@@ -11,10 +11,10 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .follower import Follower
-from .graphs import is_straight
 from .state import End, Follow, PathOptions, PathState, Watch
 from .substitutions import without_fixed
 from .thresholds import DEFAULT, Thresholds
+from .vertex_laws import is_straight
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -316,8 +316,8 @@ def fresh(segment: Segment, laws: Sequence[VertexLaw]) -> Segment:
         return segment
     middle = between(first, last)
     for law in laws:
-        ends = (-np.inf, np.inf) if law.passed is None else law.passed.displacements
-        if law.curved and not ends[0] < middle < ends[1]:
+        low, high = law.passed or (-np.inf, np.inf)
+        if law.curved and not low < middle < high:
             return replace(segment, outward=int(np.sign(middle)))
     return segment
 
@@ -348,7 +348,7 @@ def refuse_shared(problem: CondensedProblem, vectors: VectorPoints, laws: Sequen
         InputError: there are such unknowns, or openings with a bound above 0.
     """
     seen, openings = vectors.flat, vectors.opening_unknowns
-    with_one = [i for law in laws if not law.radial for i in law.unknowns]
+    with_one = [i for law in laws if not law.bonds.radial for i in law.unknowns]
     low = np.isfinite(problem.lower)
     low[openings] = problem.lower[openings] > 0.0
     bounded = np.flatnonzero(low | np.isfinite(problem.upper))

@@ -10,7 +10,7 @@ opening has a point of its own beside, without a law: what it does where it is n
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
 from .contact_points import PointLaws
 from .curved_laws import Deviations
-from .graphs import Passed
 from .segments import Component, Kind, Segment, beside_opening, chain, fresh, from_zero
 from .thresholds import DEFAULT, Thresholds
 from .vertex_laws import VertexLaw, shares
@@ -55,7 +54,6 @@ class PointStatuses(PointLaws):
         high: greatest s, (m,).
         outward: where bonds with memory go on, 1 or -1; else 0, (m,).
         elastic: S, or another one while a body moves.
-        remembered: what the laws at all vertices remember, (v, 4); zeros of those that remember nothing.
         rigid: the displacements that S does not resist, as orthonormal rows, (k, n).
 
     Raises:
@@ -68,7 +66,8 @@ class PointStatuses(PointLaws):
         super().__init__(problem, remember, thresholds)
         self.elastic, self.rigid = problem.elastic, problem.elastic.rigid
         self._made: dict[tuple[object, ...], tuple[Segment, ...]] = {}
-        self.remembered = np.array([law.memory() for law in self.vertices]).reshape(-1, 4)
+        self._groups = list({law.group: law.laws for law in self.vertices}.values())
+        self._ends = np.cumsum([len(laws.weights) for laws in self._groups])[:-1]
         self._deviations = Deviations(self.laws, thresholds.curve)
         m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)
@@ -100,26 +99,22 @@ class PointStatuses(PointLaws):
     def _segments(self, k: int) -> tuple[Segment, ...]:
         """The segments of a point; those of one law that remembers nothing yet are made once."""
         laws, problem = self.laws[k], self._problem
-        if len(laws) != 1 or self.radial(k) is not None or laws[0].passed not in (None, Passed()):
+        if len(laws) != 1 or self.radial(k) is not None or np.any(laws[0].memory):
             return self._chained(k, laws)
         law, i = laws[0], int(self.one[k])
-        key = law.group, law.sign, law.passed, float(problem.lower[i]), float(problem.upper[i])
+        key = law.group, law.sign, float(problem.lower[i]), float(problem.upper[i])
         if key not in self._made:
-            self._made[key] = self._chained(k, [replace(law, weight=1.0)])
+            self._made[key] = self._chained(k, laws, of_area_one=True)
         return tuple(segment.weighted(law.weight) for segment in self._made[key])
 
-    def _chained(self, k: int, laws: Sequence[VertexLaw]) -> tuple[Segment, ...]:
+    def _chained(self, k: int, laws: Sequence[VertexLaw], *, of_area_one: bool = False) -> tuple[Segment, ...]:
         problem, opening = self._problem, self.opening(k)
         if opening is not None:
             return beside_opening(float(problem.lower[self.vectors.opening_unknowns[opening]]))
+        areas = [1.0 if of_area_one else law.weight for law in laws]
         parts = [
-            Component(
-                graph=law.graph(),
-                weight=law.weight,
-                passed=None if law.passed is None else law.passed.displacements,
-                curved=law.curved,
-            )
-            for law in laws
+            Component(graph=law.graph, weight=area, passed=law.passed, curved=law.curved)
+            for law, area in zip(laws, areas, strict=True)
         ]
         if self.radial(k) is not None:
             return from_zero(chain(parts, 0.0, np.inf), laws)
@@ -194,7 +189,7 @@ class PointStatuses(PointLaws):
         p = self.radial(k)
         if p is None or self.vectors.counted(p) <= 1:
             return False
-        return any(law.mixity is not None for law in self.laws[k]) or not self._proportional(k)
+        return any(law.bonds.mixity is not None for law in self.laws[k]) or not self._proportional(k)
 
     def _proportional(self, k: int) -> bool:
         """Whether displacement and force are multiples of s on the present segment."""
@@ -310,7 +305,13 @@ class PointStatuses(PointLaws):
     @property
     def memory(self) -> Array | None:
         """What the laws at all vertices remember, (v, 4), as :meth:`.VertexLaw.memory`; None where none does."""
-        return self.remembered.copy() if any(law.passed is not None for law in self.vertices) else None
+        return self._remembered if any(laws.memory is not None for laws in self._groups) else None
+
+    @property
+    def _remembered(self) -> Array:
+        """The same, with zeros of those that remember nothing."""
+        parts = [np.zeros((len(g.weights), 4)) if g.memory is None else g.memory for g in self._groups]
+        return np.concatenate([np.zeros((0, 4)), *parts])
 
     def put(self, numbers: Integers, memory: Array | None) -> None:
         """Put all points where they were at a state of a path.
@@ -327,7 +328,7 @@ class PointStatuses(PointLaws):
 
     def kept(self) -> Kept:
         """Where all points are and what their laws remember, for :meth:`restore`."""
-        chains, bases, memory = list(self._chains), list(self._bases), self.remembered.copy()
+        chains, bases, memory = list(self._chains), list(self._bases), self._remembered
         return Kept(numbers=self.numbers.copy(), chains=chains, bases=bases, memory=memory)
 
     def restore(self, kept: Kept) -> None:
@@ -343,9 +344,11 @@ class PointStatuses(PointLaws):
 
     def _recall(self, memory: Array) -> None:
         """Let the laws remember what they did."""
-        for row in np.flatnonzero(np.any(memory != self.remembered, axis=1)):
-            self.vertices[row].restore(memory[row])
-        self.remembered = np.array(memory)
+        for row in np.flatnonzero(np.any(memory != self._remembered, axis=1)):
+            self.vertices[row].forget_graph()
+        for laws, part in zip(self._groups, np.split(memory, self._ends), strict=True):
+            if laws.memory is not None:
+                laws.memory[:] = part
 
     def remember(self, k: int, x: float, traction: float) -> float:
         """Let a point's laws note where they have been, and take its segments anew.
@@ -361,7 +364,6 @@ class PointStatuses(PointLaws):
         x = x if any(law.has_moved(x) for law in self.laws[k]) else 0.0
         for law, share in zip(self.laws[k], self.shares(k, x, traction), strict=True):
             law.remember(x, share)
-            self.remembered[law.row] = law.memory()
         self.rebuild(k)
         return x
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..reduced.condensed_problem import Bonds, CondensedProblem, PrescribedBonds
 from ..reduced.condensed_stiffness import DenseStiffness
 from ..typing import Array, Integers, Mask
-from .graphs import is_straight
+from .vertex_laws import is_straight
 
 
 def factors(problem: CondensedProblem) -> Array:

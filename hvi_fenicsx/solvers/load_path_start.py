@@ -18,8 +18,8 @@ from ..errors import InputError, SolverError
 from ..laws import Superpotential
 from ..laws.smoothing.base import SmoothedLaw
 from ..paths.full_load import FullLoad, at_full_load
-from ..paths.graphs import is_straight
 from ..paths.state import Watch
+from ..paths.vertex_laws import is_straight
 from ..reduced.condensation import Condensation
 from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking

@@ -25,13 +25,13 @@ from hvi_fenicsx.paths.distances import Distances
 from hvi_fenicsx.paths.equations import Bordered
 from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.full_load import at_full_load
-from hvi_fenicsx.paths.graphs import Passed, is_straight, remembering
 from hvi_fenicsx.paths.jumps import CurvedJump
 from hvi_fenicsx.paths.motion import Relaxation
 from hvi_fenicsx.paths.passages import Crossing, _Approach
 from hvi_fenicsx.paths.relations import ContactPoints, Values
 from hvi_fenicsx.paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.paths.thresholds import CurveThresholds, JumpThresholds, Thresholds
+from hvi_fenicsx.paths.vertex_laws import is_straight
 from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
 from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
 
@@ -782,7 +782,7 @@ def test_an_edge_where_a_law_on_a_length_meets_another_is_refused() -> None:
 def test_a_piece_ends_where_a_bond_with_memory_has_been_though_its_chord_goes_on() -> None:
     """The smoothed law rises in proportion at first; unloading from there set out on the fresh piece for ever."""
     law = TractionGraph(np.array([-2.0, 0.0, 2.0]), *[np.array([-1.0, 0.0, 1.0])] * 2, np.array([0.0, 0.5, 0.5, 0.0]))
-    known = remembering(law, Passed(displacements=(-1.0, 1.0), tractions=(-0.5, 0.5)))
+    known = law.remembering(np.array([[-1.0, 1.0, -0.5, 0.5]])).row(0)
     part = segments.Component(graph=known, weight=1.0, passed=(-1.0, 1.0), curved=True)
     ends = [s.x + s.high for s in segments.chain([part], 0.0, np.inf) if s.kind is segments.Kind.PIECE]
     assert ends == [1.0, 2.0, np.inf]

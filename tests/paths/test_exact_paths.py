@@ -229,7 +229,7 @@ def test_a_bond_that_has_moved_by_rounding_remembers_nothing() -> None:
 def test_a_bond_that_breaks_at_a_traction_of_rounding_remembers_none() -> None:
     (bond,) = vertex_laws(problem(1.0, 1.0, bonds(graph(SOFTENING), 0)), (0,))
     bond.remember(1.5 * (1.0 - 1e-13), 3e-14)
-    assert bond.memory() == [-1.5, 1.5, 0.0, 0.0]
+    assert list(bond.memory) == [-1.5, 1.5, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("follow", Follow)

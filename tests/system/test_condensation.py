@@ -15,7 +15,7 @@ from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.errors import InputError, SolverError
-from hvi_fenicsx.paths.graphs import is_straight
+from hvi_fenicsx.paths.vertex_laws import is_straight
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.system.factorisation import form_of
 from hvi_fenicsx.system.interior import Interior
