@@ -104,7 +104,7 @@ def _along_motions(
     problem = references.problem
     motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
     nets = [rigid_balance.along(references, one, acting) for one in motions]
-    return np.array([net.beyond_rounding(thresholds.nothing_acts) for net in nets])
+    return np.array([net.beyond_rounding(thresholds.near) for net in nets])
 
 
 def _acting(

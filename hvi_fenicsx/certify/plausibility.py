@@ -19,7 +19,7 @@ from .contact_state import ContactState
 from .estimate.contact_errors import ratio
 from .estimate.estimator import Estimate
 from .law_state import LawState
-from .thresholds import PLAUSIBILITY, PlausibilityThresholds
+from .thresholds import DEFAULT, PLAUSIBILITY, PlausibilityThresholds
 
 
 def of_solution(
@@ -96,7 +96,7 @@ def _along_edges(problem: Problem, values: Array) -> Iterator[Array]:
 def _dips(problem: Problem, examination: Examination, size: float, thresholds: PlausibilityThresholds) -> Iterator[str]:
     """A penetration between the nodes that is not small."""
     dip = examination.between_nodes
-    if dip is not None and dip > thresholds.dip * size > 0:
+    if dip is not None and dip > thresholds.negligible * size > 0:
         yield (
             f"between the nodes of Γc, where nothing bounds it, a body goes {dip * problem.scales.displacement:.3g} m "
             f"beyond its bound, {dip / size:.1e} of the largest displacement; a finer mesh there makes it smaller"
@@ -111,7 +111,7 @@ def _distant_obstacle(
     if state.bounds is None:
         return
     gap = -largest(comm, -float(np.min(state.bounds.upper, initial=np.inf)))
-    if np.isfinite(gap) and gap > thresholds.unrelated * size > 0:
+    if np.isfinite(gap) and thresholds.negligible * gap > size > 0:
         metres, displacement = (value * problem.scales.displacement for value in (gap, size))
         yield (
             f"{scene_keys.of_bounds(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
@@ -121,7 +121,7 @@ def _distant_obstacle(
 
 def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThresholds) -> Iterator[str]:
     """A law whose kinks are of another order than what the solution does to it."""
-    comm, term, far = problem.domain.mesh.comm, law.term, thresholds.unrelated
+    comm, term, far = problem.domain.mesh.comm, law.term, 1.0 / thresholds.negligible
     kink, reached, weights = term.exact.length_scale, np.abs(law.argument), term.weights
     if term.exact.is_linear or np.any(term.exact.kinks == 0.0):
         return
@@ -132,7 +132,7 @@ def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThre
     metres = problem.scales.displacement * largest(comm, float(np.max(term.stretch, initial=0.0)))
     what = "slip" if term.direction is Direction.SLIP else term.direction.value
     sizes = f"{most * metres:.3g} m, the law's first kink {kink * metres:.3g} m"
-    if thresholds.rounding < most < kink / far:
+    if DEFAULT.near < most < kink / far:
         yield (
             f"{scene_keys.of_law(problem, term)}: the largest {what} is {sizes}: "
             "the law is on its first piece everywhere; are the law's displacements in m?"

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from ..mesh import facet_sizes, nodes
 from ..mesh.curved_cells import CurvedMesh
+from ..problem import thresholds as composition
 from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
@@ -20,7 +21,7 @@ from ..rigid import Solvability, kernel
 from ..runtime.mpi import largest, total
 from ..system import existence
 from . import scene_keys
-from .thresholds import PLAUSIBILITY, PlausibilityThresholds
+from .thresholds import DEFAULT, PLAUSIBILITY, PlausibilityThresholds
 
 
 def before_solving(
@@ -76,7 +77,7 @@ def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Itera
     comm = problem.domain.mesh.comm
     for surface in (bounds.surface for bounds in problem.bounds):
         turn = largest_turn(comm, surface)
-        if thresholds.flat < turn < thresholds.uneven:
+        if composition.DEFAULT.flat < turn < composition.DEFAULT.uneven:
             yield (
                 f"{scene_keys.of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to "
                 f"{turn:.1e} rad; this unevenness is part of the problem. If it is rounding of the mesh's coordinates, "
@@ -129,7 +130,7 @@ def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: Pl
     for term in problem.terms:
         peak = max(term.exact.peak.minus, term.exact.peak.plus)
         most = peak * total(comm, float(term.weights.sum()))
-        if most < thresholds.weak_law * load and not _holds(problem, forces, term, thresholds.rounding):
+        if most < thresholds.negligible * load and not _holds(problem, forces, term, DEFAULT.near):
             unit = "N" if problem.scales.dimension == 3 else "N/m"
             yield (
                 f"{scene_keys.of_law(problem, term)}: the law can carry {most * problem.scales.force:.3g} {unit} at "

@@ -236,9 +236,9 @@ def nearest_sum(
         The forces by carrier, (k, d) each, and what is left, (vertices, d).
     """
     asked: list[Array] = [np.zeros((len(c.rows), wanted.shape[1])) for c in carriers]
-    _sweep(carriers, asked, wanted, thresholds.sweeps)
-    settled = thresholds.settled * float(np.max(np.abs(wanted), initial=0.0))
-    for _ in range(thresholds.newton_steps):
+    _sweep(carriers, asked, wanted, thresholds.shared_steps)
+    settled = thresholds.summation * float(np.max(np.abs(wanted), initial=0.0))
+    for _ in range(thresholds.shared_steps):
         left = _left(carriers, asked, wanted)
         if np.all(np.abs(left) <= settled) or not _newton(carriers, asked, wanted, left, thresholds):
             break
@@ -268,13 +268,13 @@ def _newton(
     """One Newton step at each vertex where it leaves less; whether there was any."""
     d = wanted.shape[1]
     slopes = [c.nearest(a)[1] for c, a in zip(carriers, asked, strict=True)]
-    matrix = np.tile(thresholds.least_slope * np.eye(d), (len(wanted), 1, 1))
+    matrix = np.tile(thresholds.summation * np.eye(d), (len(wanted), 1, 1))
     for carrier, slope in zip(carriers, slopes, strict=True):
         matrix[carrier.rows] += slope @ slope
     step = np.linalg.solve(matrix, left[:, :, None])
     steps = [(slope @ step[c.rows])[:, :, 0] for c, slope in zip(carriers, slopes, strict=True)]
     size, pending, length = np.linalg.norm(left, axis=1), np.ones(len(wanted), dtype=bool), 1.0
-    for _ in range(thresholds.halvings):
+    for _ in range(thresholds.shared_steps):
         trial = [a + length * s for a, s in zip(asked, steps, strict=True)]
         better = pending & (np.linalg.norm(_left(carriers, trial, wanted), axis=1) < (1 - 1e-3 * length) * size)
         for i, carrier in enumerate(carriers):

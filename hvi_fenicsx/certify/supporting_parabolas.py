@@ -14,15 +14,14 @@ from ..laws import TractionGraph
 from ..laws.arc import Arc
 from ..typing import Array
 from .law_state import LawState
-from .thresholds import UniquenessThresholds
+from .thresholds import DEFAULT
 
 
-def needed_falls(state: LawState, thresholds: UniquenessThresholds) -> Array | None:
+def needed_falls(state: LawState) -> Array | None:
     """The least c at each vertex, infinite where there is none, (m,); None where the traction is no polyline.
 
     Args:
         state: of a law at a certified displacement.
-        thresholds: what is rounding.
     """
     graph = state.term.law.graph
     if graph is None or state.term.mixity is not None:
@@ -31,10 +30,10 @@ def needed_falls(state: LawState, thresholds: UniquenessThresholds) -> Array | N
     traction = np.clip(state.traction, low, high)
     x = _on_breaks(graph, state.argument, state.near)
     falls: Array = np.zeros(len(x))
-    energy, rounding = graph.primitive(x), thresholds.rounding * state.scale
+    energy, rounding = graph.primitive(x), DEFAULT.near * state.scale
     for arc in (a for a in graph.arcs() if not state.term.radial or a.low >= 0.0):
         falls = np.maximum(falls, _needed(arc, x, energy, traction, rounding))
-    falls[falls <= thresholds.rounding * float(np.max(np.abs(graph.slopes)))] = 0.0
+    falls[falls <= DEFAULT.near * float(np.max(np.abs(graph.slopes)))] = 0.0
     falls /= state.term.stretch
     if state.term.radial:
         return np.where(state.hidden | (traction < 0.0), np.inf, falls)

@@ -35,7 +35,7 @@ from .certificate import Examination
 from .directional import growth
 from .second_order import negative_eigenvalues
 from .supporting_parabolas import needed_falls
-from .thresholds import UNIQUENESS, UniquenessThresholds
+from .thresholds import DEFAULT, UNIQUENESS, UniquenessThresholds
 
 WAY_OUT = "`hvi equilibria SCENE --lowest` finds out"
 
@@ -92,7 +92,7 @@ def uniqueness(
         return Uniqueness(state="unknown", why=f"{doubt}; {WAY_OUT}" if searched else doubt)
     falling = any(term.law.steepest_fall > 0.0 for term in system.terms)
     proof = "the body is stiffer than its laws fall, so the energy is convex" if falling else "the energy is convex"
-    left = _left(system, modes, motions, u, examination, thresholds)
+    left = _left(system, modes, motions, u, examination)
     if not left:
         here = "; with the obstacle where it is" if pressed and modes else everywhere
         return Uniqueness(state="unique", why=f"{proof}, and no rigid motion leaves it as it is{here}")
@@ -118,10 +118,10 @@ def _doubt(
     if not _is_tried(system, thresholds):
         return (
             f"a law falls, and it was not tried whether the body is stiffer: more than {thresholds.most_on_boundary} "
-            f"unknowns on Γc, or {thresholds.most_unknowns[system.problem.scales.dimension]:,} in all"
+            f"unknowns on Γc, or {thresholds.most_unknowns[system.problem.scales.dimension - 2]:,} in all"
         )
     each = [np.asarray(fall / term.stretch, dtype=np.float64) for term, fall in zip(system.terms, falls, strict=True)]
-    if (moved := _moved(system, modes, motions, each, thresholds)) is not None:
+    if (moved := _moved(system, modes, motions, each)) is not None:
         return f"a law falls, and only laws and contact hold the motion {moved}"
     return None if _stiffer(system, modes, each, thresholds) else "a law falls more steeply than the body is stiff"
 
@@ -135,13 +135,13 @@ def _supported(
 ) -> str | None:
     """Why no displacement has a lower energy, be the energy convex or not; None where this is not known. Collective."""
     laws = {id(law.term): law for state in examination.states for law in state.laws}
-    falls = [needed_falls(laws[id(term)], thresholds) for term in system.problem.terms]
+    falls = [needed_falls(laws[id(term)]) for term in system.problem.terms]
     known = [fall for fall in falls if fall is not None]
     if len(known) < len(falls) or not np.isfinite(most := largest(system.comm, _size(known))):
         return None
     if most == 0.0:
         return "no law's energy is anywhere below its tangent at this state"
-    if not _is_tried(system, thresholds) or _moved(system, modes, motions, known, thresholds) is not None:
+    if not _is_tried(system, thresholds) or _moved(system, modes, motions, known) is not None:
         return None
     return (
         "the body is stiffer than the laws' energies fall below their tangents at this state"
@@ -153,7 +153,7 @@ def _supported(
 def _is_tried(system: System, thresholds: UniquenessThresholds) -> bool:
     """Whether the problem is small enough for a factorisation. Collective."""
     unknowns = int(total(system.comm, float(len(system.jacobian.rows.dofs))))
-    most = thresholds.most_unknowns[system.problem.scales.dimension]
+    most = thresholds.most_unknowns[system.problem.scales.dimension - 2]
     return unknowns <= thresholds.most_on_boundary and system.dofs <= most
 
 
@@ -162,12 +162,11 @@ def _moved(
     modes: Sequence[Mode],
     motions: Sequence[Array],
     falls: Sequence[Array],
-    thresholds: UniquenessThresholds,
 ) -> str | None:
     """A rigid motion that moves a vertex whose law falls; None if there is none. Collective."""
     for mode, motion in zip(modes, motions, strict=True):
         falling = [term.slip(motion)[fall > 0.0] for term, fall in zip(system.terms, falls, strict=True)]
-        if largest(system.comm, _size(falling)) > thresholds.rounding:
+        if largest(system.comm, _size(falling)) > DEFAULT.near:
             return mode.name
     return None
 
@@ -218,7 +217,6 @@ def _left(
     motions: Sequence[Array],
     u: fem.Function,
     examination: Examination,
-    thresholds: UniquenessThresholds,
 ) -> str:
     """The rigid motions if some of them, together, are not shown to raise the energy; else nothing. Collective."""
     if not modes:
@@ -231,5 +229,5 @@ def _left(
     rows = [np.concatenate([m[strong], *(term.slip(m).ravel() for term in springs)]) for m in motions]
     gram = sum(agree(system.comm, np.array([[a @ b for a in rows] for b in rows])))
     least, most = np.linalg.eigvalsh(gram)[[0, -1]]
-    held = bool(least > thresholds.rounding * most)
+    held = bool(least > DEFAULT.near * most)
     return "" if held else ", ".join(mode.name for mode in modes)

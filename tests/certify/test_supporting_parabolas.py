@@ -12,7 +12,6 @@ from scenes import Table, model
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.certify.supporting_parabolas import needed_falls
-from hvi_fenicsx.certify.thresholds import UNIQUENESS
 from hvi_fenicsx.workflow import Solution, finish, prepare
 
 DROP = ((0.0, 0.0), (9e-6, 3e6), (9e-6, 1.5e6))
@@ -38,7 +37,7 @@ def test_the_least_curvature_is_that_of_samples(name: str) -> None:
     law, size = state.term.law, len(state.argument)
     x = np.random.default_rng(1).uniform(-2.0, 2.0, size) * float(law.breaks.max())
     traction = law.right(x)
-    falls = needed_falls(replace(state, argument=x, traction=traction, hidden=np.zeros(size, bool)), UNIQUENESS)
+    falls = needed_falls(replace(state, argument=x, traction=traction, hidden=np.zeros(size, bool)))
     assert falls is not None
     y = np.append(law.breaks, float(law.breaks.max()) * np.linspace(-40.0, 40.0, 400_001))
     for at, t, fall in zip(x, traction, falls, strict=True):
@@ -61,7 +60,7 @@ def test_on_a_convex_kink_every_traction_between_is_supported_and_on_a_drop_none
             traction=np.full_like(state.argument, share * peak),
             hidden=np.zeros(len(state.argument), bool),
         )
-        falls = needed_falls(here, UNIQUENESS)
+        falls = needed_falls(here)
         assert falls is not None
         assert np.all(np.isfinite(falls)) == supported
 
@@ -73,7 +72,7 @@ def test_a_convex_law_is_nowhere_below_its_tangents_whatever_rounding_makes_of_t
     random = np.random.default_rng(1)
     x = random.normal(size=len(state.argument)) * 10.0 ** random.uniform(-6.0, 2.0, len(state.argument))
     traction = state.term.law.right(x) * (1.0 + random.choice([-2e-16, 0.0, 2e-16], len(x)))
-    falls = needed_falls(replace(state, argument=x, traction=traction, hidden=np.zeros(len(x), bool)), UNIQUENESS)
+    falls = needed_falls(replace(state, argument=x, traction=traction, hidden=np.zeros(len(x), bool)))
     assert falls is not None
     assert not np.any(falls)
 

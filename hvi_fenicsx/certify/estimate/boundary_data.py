@@ -130,5 +130,5 @@ def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thres
         thresholds: the degree of the modes.
     """
     found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
-    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * thresholds.data_degree[d])
+    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * thresholds.data_degree[d - 2])
     return FacetSamples(found, problem.positions[found.nodes], barycentric, weights)

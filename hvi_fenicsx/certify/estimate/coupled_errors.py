@@ -104,14 +104,14 @@ class Coupled:
         np.negative(nodes.x.array, out=self._moved.x.array)
         of_bubbles = self._of_bubbles.values()
         asked = traces.problem.combined(of_bubbles)
-        for number in range(self._thresholds.answer_rounds):
+        for number in range(self._thresholds.rounds):
             _, laws = traces.tested(self.error)
             if self._settled(laws) and number > 0:
                 break
             unmet = -asked
             unmet -= self._force
             unmet[laws.blocks] += laws.values
-            step, length = inverse.solve(unmet, self._thresholds.answer_tolerance)
+            step, length = inverse.solve(unmet, self._thresholds.rough_tolerance)
             nodes.x.array[:] += step.x.array
             self._force = inverse.force(nodes)
             self._longest = max(self._longest, length)
@@ -128,7 +128,7 @@ class Coupled:
         comm = self._traces.problem.domain.mesh.comm
         changed = np.sqrt(total(comm, float(np.sum((laws - self._answer).values ** 2))))
         self._answer, self._strongest = laws, max(self._strongest, changed)
-        return bool(changed <= self._thresholds.answer_settled * self._strongest)
+        return bool(changed <= self._thresholds.coupled_change * self._strongest)
 
     def tell_bubbles(self) -> None:
         """Let the bubbles feel that nodes and laws have moved. Collective."""

@@ -12,7 +12,6 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from ...mesh import nodes
 from ...typing import Array, Entities
 from .bubble_constraints import BubbleBounds, Constraints
 from .bubble_stiffness import BubbleStiffness, Springs
@@ -53,10 +52,9 @@ class LeastEnergy:
         """Find them; from the second time on from those that were found before. Collective."""
         stiffness, limits, e = self._stiffness, self._thresholds, self._e
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
-        again = limits.bubble_tolerance_again[nodes.degree(stiffness.problem.space)]
-        tolerance = again if self._begun else limits.bubble_tolerance
+        tolerance = limits.rough_tolerance if self._begun else limits.tolerance
         goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), limits.rounding**2)
-        for _ in range(limits.bubble_rounds):
+        for _ in range(limits.rounds):
             self._put_on_bounds()
             steps = limits.bubble_steps
             self.energy += stiffness.solve(self.residual, e, self._descent, goal=goal, max_steps=steps)

@@ -42,7 +42,7 @@ class DualNorm:
     """
 
     def __init__(self, system: System, levels: Levels, u: fem.Function, thresholds: Thresholds = DEFAULT) -> None:
-        self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.dual_tolerance
+        self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.tolerance
         self._near, self._x = thresholds.near, system.unknowns(u)
         self.held = _held(system, self._x, thresholds.near)
         at = self._x.array_r

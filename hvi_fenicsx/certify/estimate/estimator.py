@@ -98,7 +98,7 @@ def estimate(
     cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse, thresholds)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.left_tolerance)
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.rough_tolerance)
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
@@ -121,7 +121,7 @@ def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: floa
     """The error, where it is known as a field, and η_K² of the owned cells; a(u_h, u_h) is the energy. Collective."""
     if traces.problem.bulk.averages_dilatation:
         return None, nearly_incompressible.squares(traces, inverse)
-    stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), traces.thresholds.coupled[traces.degree]
+    stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), traces.thresholds.coupled[traces.degree - 1]
     if limit and not coupled_errors.within_facets(traces):
         cells = _between_nodes(traces, inverse, stiffness)
         if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:

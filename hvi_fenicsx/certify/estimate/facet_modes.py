@@ -73,7 +73,7 @@ def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, 
         thresholds: how many modes.
     """
     at, d = sample(problem, bubbles, facets, thresholds), problem.scales.dimension
-    degree, kind = thresholds.data_degree[d], basix.CellType.interval if d == 2 else basix.CellType.triangle
+    degree, kind = thresholds.data_degree[d - 2], basix.CellType.interval if d == 2 else basix.CellType.triangle
     legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, at.barycentric[:, 1:])
     values = legendre / math.sqrt(math.factorial(d - 1))
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])

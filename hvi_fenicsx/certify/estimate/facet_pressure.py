@@ -41,7 +41,7 @@ def redistributed(
     kernel += missing / (on.degrees[-1] + 1.5)
     within, pressure = gaps / compliance[:, None], pushes.copy()
     if not free:
-        return _solved(kernel, pushes, within, pressure, 4 * thresholds.gap_sweeps)
+        return _solved(kernel, pushes, within, pressure, 4 * thresholds.coupled_rounds)
     areas = on.facets.areas[:, None] * on.weights
     wanted = total(comm, float(np.sum(areas * pushes)))
     if wanted == 0.0:
@@ -51,7 +51,7 @@ def redistributed(
     high = comm.allreduce(float(np.max(gaps, initial=0.0)), op=MPI.MAX)
     for _ in range(thresholds.gap_shifts):
         shift = (low + high) / 2
-        pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, thresholds.gap_sweeps)
+        pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, thresholds.coupled_rounds)
         more = total(comm, float(np.sum(areas * pressure))) > wanted
         low, high = (low, shift) if more else (shift, high)
     return pressure

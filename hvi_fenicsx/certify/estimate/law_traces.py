@@ -164,9 +164,9 @@ class LawTraces:
         return known[1]
 
     def _new_part(self, surface: Surface, directions: Array) -> Trace:
-        problem, space, degree = self.problem, self.bubbles, self.thresholds.interface_degree[self.degree]
+        problem, space, degree = self.problem, self.bubbles, self.thresholds.facet_degree[self.degree - 1] // 2
         if (interface := problem.interface_of(surface)) is None:
-            return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree])
+            return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree - 1])
         if interface.name not in self._interfaces:
             self._interfaces[interface.name] = InterfacePoints(problem, space, interface, degree)
         return InterfaceTrace(problem, self._interfaces[interface.name], surface, directions)
