@@ -237,7 +237,7 @@ def nearest_sum(
     """
     asked: list[Array] = [np.zeros((len(c.rows), wanted.shape[1])) for c in carriers]
     _sweep(carriers, asked, wanted, thresholds.shared_steps)
-    settled = thresholds.summation * float(np.max(np.abs(wanted), initial=0.0))
+    settled = np.finfo(np.float64).eps * float(np.max(np.abs(wanted), initial=0.0))
     for _ in range(thresholds.shared_steps):
         left = _left(carriers, asked, wanted)
         if np.all(np.abs(left) <= settled) or not _newton(carriers, asked, wanted, left, thresholds):

@@ -41,7 +41,8 @@ class PlausibilityThresholds:
         stiffest: largest plausible Young's modulus, N/m²: stiffer than diamond.
         far_peak: a factor of the load that is borne is suspicious above it, and below its inverse.
         negligible: a law's largest force over the load, or a penetration between nodes over the largest displacement,
-            up to which it cannot matter; its inverse is the ratio of two lengths that have nothing to do with each other.
+            up to which it cannot matter; its inverse is the ratio of two lengths that have nothing to do with each
+            other.
         smoothing_change: change of a traction by smoothing, over the law's peak, that is large.
         smoothing_share: share of a part on which smoothing may change the traction so much.
         nearly_all: share of a part that counts as all of it: a vertex on a support does not slip.

@@ -16,8 +16,8 @@ class Thresholds:
         facet_degree: of the quadrature of the laws on a facet, at degree 1 and 2: a drop within an edge is met to a
             fourteenth of its length at degree 1, to a thirty-second at degree 2, whose edges are longer. On the
             intersections of the facets of two bodies, which are smaller, half of it.
-        tolerance: of a solve for bubbles, in the energy norm, and of one with the system's matrix, relative residual: an
-            energy is right to about its square.
+        tolerance: of a solve for bubbles, in the energy norm, and of one with the system's matrix, relative residual:
+            an energy is right to about its square.
         rough_tolerance: the same where the answer is a small part or is taken up by a next round: what the solver
             left, bubbles that are found again beside nodes that moved, nodes among those rounds.
         bubble_steps: conjugate gradient steps at most of a solve for bubbles.
