@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -160,27 +160,42 @@ class Component:
         """
         return self.weight * self.graph.traction(x, side)
 
-    def slope(self, x: float) -> float:
-        """The slope of the force off the breaks."""
-        return self.weight * float(self.graph.slopes[np.searchsorted(self.graph.breaks, x)])
-
-    def fresh(self, x: float, slope: float | None = None) -> bool:
-        """Whether a bond with memory has not been at x, and does not return on a line through 0 as it came.
+    def slopes(self, x: Array) -> Array:
+        """The slopes of the force off the breaks, (m,).
 
         Args:
-            x: the displacement.
-            slope: of the force there; None at a jump.
+            x: displacements, (m,).
         """
-        if self.passed is None or self.passed[0] < x < self.passed[1]:
-            return False
-        if slope is None:
-            return x != 0.0
+        return self.weight * self.graph.slopes[np.searchsorted(self.graph.breaks, x)]
+
+    def has_passed(self, x: float) -> bool:
+        """Whether it has nothing to remember at a displacement, or has been there."""
+        return self.passed is None or self.passed[0] < x < self.passed[1]
+
+    def returns(self, x: float, slope: float) -> bool:
+        """Whether it returns on a line through 0 as it came.
+
+        Args:
+            x: a displacement where it has not been.
+            slope: of the force there.
+        """
         line = float(self.force(np.array([x]), "right")[0])
-        return abs(line - slope * x) > 1e-12 * (abs(line) + abs(slope * x))
+        return abs(line - slope * x) <= _ROUNDING * (abs(line) + abs(slope * x))
+
+    def changes(self, at: float) -> bool:
+        """Whether the graph has another piece from a displacement on."""
+        graph, number = self.graph, int(np.searchsorted(self.graph.breaks, at))
+        if number == len(graph.breaks) or graph.breaks[number] != at:
+            return False
+        if self.curved and self.passed is not None and at != 0.0 and at in self.passed:
+            return True
+        return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
 
 
 def chain(components: Sequence[Component], lower: float, upper: float) -> tuple[Segment, ...]:
     """The segments of an unknown, from the least displacement to the greatest.
+
+    Breaks at which nothing changes are left out. A piece has τ = 0 at 0 where that is on it, so that rest is exact.
 
     Args:
         components: the laws that act on it.
@@ -189,89 +204,49 @@ def chain(components: Sequence[Component], lower: float, upper: float) -> tuple[
     """
     if lower == upper:
         return (Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=math.inf),)
-    found = _inside(components, lower, upper)
+    every = sorted({float(b) for c in components for b in c.graph.breaks if lower < b < upper})
+    ends = [lower, *(b for b in every if any(c.changes(b) for c in components)), upper]
+    places = np.unique([x for x in (*ends, 0.0) if math.isfinite(x)])
+    sides = [np.array([c.force(places, side) for c in components]).reshape(-1, len(places)) for side in _SIDES]
+    left, right, size = (
+        dict(zip(places, total, strict=True))
+        for total in (*(part.sum(axis=0) for part in sides), np.abs(sides).sum(axis=(0, 1)))
+    )
+    found: list[Segment] = []
     if math.isfinite(lower):
-        found.insert(0, _bound(lower, _forces(components, lower, "right"), low=-math.inf, high=0.0))
+        found.append(Segment(kind=Kind.BOUND, x=lower, force=right[lower], rise=1.0, low=-math.inf, high=0.0))
+    for start, end in itertools.pairwise(ends):
+        if start > lower and abs(right[start] - left[start]) > _ROUNDING * size[start]:
+            found.append(_jump(components, start, left[start], right[start]))
+        anchor = 0.0 if start < 0.0 < end else start if math.isfinite(start) else end
+        found.append(_piece(components, start, end, anchor, (left if anchor == end else right)[anchor]))
     if math.isfinite(upper):
-        found.append(_bound(upper, _forces(components, upper, "left"), low=0.0, high=math.inf))
+        found.append(Segment(kind=Kind.BOUND, x=upper, force=left[upper], rise=1.0, low=0.0, high=math.inf))
     return tuple(found)
 
 
-def _bound(x: float, force: float, low: float, high: float) -> Segment:
-    return Segment(kind=Kind.BOUND, x=x, force=force, rise=1.0, low=low, high=high)
+def _jump(components: Sequence[Component], at: float, left: float, right: float) -> Segment:
+    fresh = at != 0.0 and not all(c.has_passed(at) for c in components)
+    rise, outward = math.copysign(1.0, right - left), int(np.sign(at)) if fresh else 0
+    return Segment(kind=Kind.JUMP, x=at, force=left, rise=rise, low=0.0, high=abs(right - left), outward=outward)
 
 
-def _forces(components: Sequence[Component], x: float, side: str) -> float:
-    return float(sum(c.force(np.array([x]), side)[0] for c in components))
-
-
-def _inside(components: Sequence[Component], lower: float, upper: float) -> list[Segment]:
-    """Pieces and jumps between the bounds; breaks at which nothing changes are left out."""
-    breaks = _breaks(components, lower, upper)
-    ends = [lower, *breaks, upper]
-    found = [_piece(components, a, b) for a, b in itertools.pairwise(ends)]
-    chained: list[Segment] = []
-    for at, piece in zip([None, *breaks], found, strict=True):
-        jump = None if at is None else _jump(components, at)
-        if jump is not None:
-            chained.append(jump)
-        chained.append(piece)
-    return chained
-
-
-def _breaks(components: Sequence[Component], lower: float, upper: float) -> list[float]:
-    every = sorted({float(b) for c in components for b in c.graph.breaks if lower < b < upper})
-    return [b for b in every if any(_changes(c, b) for c in components)]
-
-
-def _changes(component: Component, at: float) -> bool:
-    graph = component.graph
-    number = int(np.searchsorted(graph.breaks, at))
-    if number == len(graph.breaks) or graph.breaks[number] != at:
-        return False
-    if component.curved and component.passed is not None and at != 0.0 and at in component.passed:
-        return True
-    return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
-
-
-def _jump(components: Sequence[Component], at: float) -> Segment | None:
-    left, right = (_forces(components, at, side) for side in _SIDES)
-    if abs(right - left) <= _ROUNDING * sum(abs(_forces([c], at, side)) for c in components for side in _SIDES):
-        return None
-    fresh = any(c.fresh(at) for c in components)
-    rise = math.copysign(1.0, right - left)
-    return Segment(
-        kind=Kind.JUMP,
-        x=at,
-        force=left,
-        rise=rise,
-        low=0.0,
-        high=abs(right - left),
-        outward=int(np.sign(at)) if fresh else 0,
-    )
-
-
-def _piece(components: Sequence[Component], start: float, end: float) -> Segment:
+def _piece(components: Sequence[Component], start: float, end: float, anchor: float, force: float) -> Segment:
     middle = between(start, end)
-    slopes = [c.slope(middle) for c in components]
-    fresh = any(c.fresh(middle, slope) for c, slope in zip(components, slopes, strict=True))
-    anchor, side = _anchor(start, end)
+    slopes = [float(c.slopes(np.array([middle]))[0]) for c in components]
+    turns = (
+        not c.has_passed(middle) and ((c.curved and not start < 0.0 < end) or not c.returns(middle, slope))
+        for c, slope in zip(components, slopes, strict=True)
+    )
     return Segment(
         kind=Kind.PIECE,
         x=anchor,
-        force=_forces(components, anchor, side),
+        force=force,
         slope=math.fsum(slopes),
         low=start - anchor,
         high=end - anchor,
-        outward=int(np.sign(middle)) if fresh else 0,
+        outward=int(np.sign(middle)) if any(turns) else 0,
     )
-
-
-def _anchor(start: float, end: float) -> tuple[float, str]:
-    """Where a piece has τ = 0, and from which side: at 0 where that is on it, so that rest is exact."""
-    if start < 0.0 < end:
-        return 0.0, "right"
-    return (start, "right") if math.isfinite(start) else (end, "left")
 
 
 def between(start: float, end: float) -> float:
@@ -288,38 +263,17 @@ def between(start: float, end: float) -> float:
     return end - 1.0 - abs(end) if math.isfinite(end) else 0.0
 
 
-def from_zero(found: tuple[Segment, ...], laws: Sequence[VertexLaw]) -> tuple[Segment, ...]:
+def from_zero(found: tuple[Segment, ...]) -> tuple[Segment, ...]:
     """The segments of a length: instead of a bound at 0 the traction at rest, which may have any direction.
 
     Args:
         found: the segments above a bound at 0.
-        laws: that act on the length.
     """
     rest = found[0].force
-    ahead = tuple(fresh(s, laws) for s in found[1:])
     if rest == 0.0:
-        return ahead
-    return (Segment(kind=Kind.JUMP, x=0.0, force=0.0, rise=float(np.sign(rest)), low=0.0, high=abs(rest)), *ahead)
-
-
-def fresh(segment: Segment, laws: Sequence[VertexLaw]) -> Segment:
-    """A piece that a curved law with memory has not passed is fresh, whatever its chord; one through 0 goes both ways.
-
-    Args:
-        segment: the piece, or another segment.
-        laws: of its point.
-    """
-    if segment.rise or segment.outward:
-        return segment
-    first, last = segment.x + segment.low, segment.x + segment.high
-    if first < 0.0 < last:
-        return segment
-    middle = between(first, last)
-    for law in laws:
-        low, high = law.passed or (-np.inf, np.inf)
-        if law.curved and not low < middle < high:
-            return replace(segment, outward=int(np.sign(middle)))
-    return segment
+        return found[1:]
+    jump = Segment(kind=Kind.JUMP, x=0.0, force=0.0, rise=float(np.sign(rest)), low=0.0, high=abs(rest))
+    return (jump, *found[1:])
 
 
 def beside_opening(lower: float) -> tuple[Segment, ...]:

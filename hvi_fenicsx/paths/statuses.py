@@ -18,7 +18,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
 from .contact_points import PointLaws
 from .curved_laws import Deviations
-from .segments import Component, Kind, Segment, beside_opening, chain, fresh, from_zero
+from .segments import Component, Kind, Segment, beside_opening, chain, from_zero
 from .thresholds import DEFAULT, Thresholds
 from .vertex_laws import VertexLaw, shares
 
@@ -117,10 +117,9 @@ class PointStatuses(PointLaws):
             for law, area in zip(laws, areas, strict=True)
         ]
         if self.radial(k) is not None:
-            return from_zero(chain(parts, 0.0, np.inf), laws)
+            return from_zero(chain(parts, 0.0, np.inf))
         i = int(self.one[k])
-        found = chain(parts, float(problem.lower[i]), float(problem.upper[i]))
-        return tuple(fresh(s, laws) for s in found)
+        return chain(parts, float(problem.lower[i]), float(problem.upper[i]))
 
     def _based(self, k: int) -> Array:
         """Where s is at the coordinate 0 of each segment."""
