@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from .accuracy import quantities
-from .accuracy.goal import AccuracyResult
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
 from .paths.load_path import LoadPath
@@ -184,31 +182,15 @@ def error(estimate: Estimate) -> str:
     """One line on the estimated error and its parts."""
     norm = estimate.energy_norm or 1.0
     parts = {name: getattr(estimate, name) / norm for name in ("discretisation", "smoothing", "algebraic")}
-    split = ", ".join(f"{name} {_part(value)}" for name, value in parts.items())
-    return f"estimated error {_part(estimate.total / norm)} in the energy norm ({split})"
+    split = ", ".join(f"{name} {share(value)}" for name, value in parts.items())
+    return f"estimated error {share(estimate.total / norm)} in the energy norm ({split})"
 
 
-def _part(value: float) -> str:
+def share(value: float) -> str:
     """A ratio as a percentage, where it is not too small for one."""
     if not math.isfinite(value):
         return "unknown"
     return percent(value) if value >= 1e-5 or value == 0 else f"{value:.0e}"
-
-
-def accuracy(reached: AccuracyResult) -> Iterator[str]:
-    """What was chosen for an accuracy, and what it cost."""
-    goal, steps = reached.goal, reached.steps
-    if reached.why is not None:
-        yield f"accuracy not reached: {reached.why}"
-    if not steps:
-        return
-    last, asked = steps[-1], f" ({_part(goal.accuracy)} was asked for)"
-    what = quantities.find(goal.quantity).description
-    epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
-    yield (
-        f"accuracy: {_part(last.error)}{asked} of {what}, at degree {reached.degree} by {len(steps)} meshes up to "
-        f"{last.dofs:,} unknowns, tolerance {last.tolerance:.0e}{epsilon}, {sum(s.seconds for s in steps):.1f} s"
-    )
 
 
 def as_data(prepared: Preparation, factors: Mapping[str, LoadFactors]) -> dict[str, Any]:

@@ -29,8 +29,7 @@ class Elements:
 
     def memory(self, dofs: float) -> float:
         """What so many unknowns take, about, on meshes refined where the error is, MB."""
-        known = memory.DEFAULT
-        return dofs * known.adaptive[self.dimension] * known.of_degree[self.degree] / 1024
+        return memory.needed_by_all_meshes(dofs, self.dimension, self.degree)
 
     def needed(self, dofs: int, times: float, quantity: Quantity) -> float:
         """The unknowns that an error so many times smaller takes, at the best rate of convergence.

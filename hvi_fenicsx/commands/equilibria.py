@@ -26,10 +26,8 @@ from .session import COMM, LOG, Command, Session, say, tell_moving
 
 BETWEEN = 0.2
 """Seconds between two reports of progress."""
-KEPT_AFTER = 2.0
-"""Seconds at least between two states of a search that are kept."""
 KEPT_EVERY = 20
-"""Keeping them takes at most a part in so many of its time."""
+"""Keeping what a search has so far takes a part in so many of its time at most; so many reports lie between."""
 MOST_TOLD = 20
 """Equilibria that are told on the terminal."""
 MOST_DRAWN = 10
@@ -86,7 +84,7 @@ class _StateFile:
 
     def __init__(self, call: Session) -> None:
         self._call, self._identity = call, on_root(COMM, lambda: call.identity)
-        self._next, self._broken = time.monotonic() + KEPT_AFTER, False
+        self._next, self._broken = time.monotonic() + KEPT_EVERY * BETWEEN, False
 
     def saved(self) -> Saved | None:
         """What an earlier search has left, if this one shall go on from it. Rank 0 only."""
@@ -109,7 +107,7 @@ class _StateFile:
             self._broken = True
             LOG.info("%s; a kill would lose the search", error)
         now = time.monotonic()
-        self._next = now + max(KEPT_AFTER, KEPT_EVERY * (now - began))
+        self._next = now + KEPT_EVERY * max(BETWEEN, now - began)
 
     def write_left(self, state: Saved) -> None:
         """Write what a search that was stopped has left, as a file of the result. Rank 0 only.

@@ -5,13 +5,9 @@ from __future__ import annotations
 import argparse
 import functools
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import console, results
-from ..accuracy import control, quantities
-from ..accuracy.adaptive import AdaptiveSolver
-from ..accuracy.goal import AccuracyResult, Goal
 from ..errors import ExitCode, InputError
 from ..load_paths import last_borne
 from ..results.whole import BegunResult, begin_whole, picture_process
@@ -19,6 +15,9 @@ from ..runtime.timing import Timer
 from ..workflow import Solution, find_solution, prepare
 from . import session
 from .session import COMM, LOG, Command, Record, Session, say
+
+if TYPE_CHECKING:
+    from ..accuracy.goal import Goal
 
 Begin = Callable[[Solution], BegunResult]
 """Writes what pictures are drawn from, and lets them be drawn. Collective."""
@@ -30,26 +29,33 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         InputError: on all ranks alike.
     """
-    timer, goal, scene = Timer(), _goal(options), session.scene_of(options)
-    if goal is not None:
-        quantities.find(goal.quantity)  # known only now: a plugin of the scene may define it
+    if options.accuracy is None and options.quantity is not None:
+        raise InputError("--quantity: says what --accuracy is of; give it too")
+    timer, scene = Timer(), session.scene_of(options)
+    goal = None if options.accuracy is None else _goal(options)  # a plugin of the scene may define its quantity
 
     def done(record: Record) -> bool:
         of_run = all(record.get(other) is None for other in ("path", "equilibria"))
         ended = record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
-        return of_run and ended and _same_goal(goal, record["accuracy"])
+        return of_run and ended and _is_of(goal, record["accuracy"])
 
     command = Command(suffix="", again="the scene is run again", done=done)
     return session.execute(options, scene, command, timer, lambda call: _run(call, goal))
 
 
-def _goal(options: argparse.Namespace) -> Goal | None:
-    """What accuracy is asked for, if one is."""
-    if options.accuracy is None:
-        if options.quantity is not None:
-            raise InputError("--quantity: says what --accuracy is of; give it too")
-        return None
-    return Goal(options.accuracy, options.quantity or "energy")
+def _goal(options: argparse.Namespace) -> Goal:
+    from . import to_accuracy  # a tenth of a second, for runs that ask for it
+
+    return to_accuracy.goal_of(options.accuracy, options.quantity)
+
+
+def _is_of(goal: Goal | None, recorded: Record | None) -> bool:
+    """Whether a result has the accuracy that is asked for, or none where none is."""
+    if goal is None:
+        return recorded is None
+    from . import to_accuracy
+
+    return to_accuracy.is_of(goal, recorded)
 
 
 def _run(call: Session, goal: Goal | None) -> int:
@@ -61,7 +67,9 @@ def _run(call: Session, goal: Goal | None) -> int:
             solution, begun = _solved(call, begin)
             given: dict[str, Any] = {}
         else:
-            reached = _to_goal(call, goal)
+            from . import to_accuracy
+
+            reached = to_accuracy.solve(call, goal)
             solution, begun = reached.solution, begin(reached.solution)
             given = {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
         record = begun.finish(solution, {**call.given, **given}, report=not call.options.no_report)
@@ -79,19 +87,3 @@ def _solved(call: Session, begin: Begin) -> tuple[Solution, BegunResult]:
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
     say([*console.outcome(solution), *console.warnings(new)])
     return solution, begun
-
-
-def _to_goal(call: Session, goal: Goal) -> AccuracyResult:
-    """The solution of the accuracy that was asked for, and how it was reached. Collective."""
-    solver = AdaptiveSolver(timer=call.timer, interrupted=call.interrupted)
-    reached = control.solve_to_goal(call.scene, COMM, goal, solver, LOG.info)
-    shown = last_borne.in_place_of(reached.level.prepared, reached.solution, call.interrupted)
-    reached = replace(reached, solution=shown)
-    say([*console.outcome(shown), *console.warnings(shown.warnings), *console.accuracy(reached)])
-    return reached
-
-
-def _same_goal(goal: Goal | None, recorded: Record | None) -> bool:
-    if goal is None or recorded is None:
-        return goal is None and recorded is None
-    return goal.as_dict().items() <= recorded.items()

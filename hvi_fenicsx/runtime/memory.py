@@ -6,8 +6,6 @@ import math
 import os
 import resource
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from mpi4py import MPI
@@ -17,35 +15,29 @@ from .mpi import on_this_machine, total
 _CGROUPS = Path("/sys/fs/cgroup")
 _LIMIT_FILES = ("memory.max", "memory.limit_in_bytes")
 """Files that hold the limit of a cgroup: version 2, version 1."""
+_PLANE, _ADAPTIVE = 1.3, 3.0
+"""KB that an unknown of a plane body takes, by multigrid on a mesh refined uniformly or not; in space twice."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """What an unknown takes, from the mesh to the estimate (measured: docs/benchmarks.md).
-
-    Attributes:
-        least: KB by dimension, on a mesh refined uniformly, by multigrid or GAMG; a direct solver takes more.
-        adaptive: KB by dimension, about, on a mesh refined where the error is: all coarser ones are kept, too.
-        of_degree: how many times that an unknown of a degree takes.
-    """
-
-    least: Mapping[int, float] = field(default_factory=lambda: {2: 1.3, 3: 2.6})
-    adaptive: Mapping[int, float] = field(default_factory=lambda: {2: 3.0, 3: 6.0})
-    of_degree: Mapping[int, float] = field(default_factory=lambda: {1: 1.0, 2: 2.0})
-
-
-DEFAULT = Thresholds()
-
-
-def needed(unknowns: float, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
-    """What so many unknowns take at least, MB.
+def needed(unknowns: float, dimension: int) -> float:
+    """What so many unknowns take at least, MB, from the mesh to the estimate (measured: docs/benchmarks.md).
 
     Args:
         unknowns: on all ranks together.
         dimension: 2 or 3.
-        thresholds: what one takes.
     """
-    return unknowns * thresholds.least[dimension] / 1024
+    return unknowns * _PLANE * (dimension - 1) / 1024
+
+
+def needed_by_all_meshes(unknowns: float, dimension: int, degree: int) -> float:
+    """What a mesh that was refined where the error is takes, about, MB: all coarser ones are kept, too.
+
+    Args:
+        unknowns: of the finest.
+        dimension: 2 or 3.
+        degree: of the elements.
+    """
+    return unknowns * _ADAPTIVE * (dimension - 1) * degree / 1024
 
 
 def peak(comm: MPI.Comm) -> float:

@@ -129,7 +129,6 @@ def test_a_search_that_is_killed_goes_on_from_its_last_state(
 
     out, mine = tmp_path / "out", tmp_path / "out" / "mine.txt"
     with monkeypatch.context() as patched:
-        patched.setattr(command, "KEPT_AFTER", 0.0)
         patched.setattr(command, "KEPT_EVERY", 0)
         patched.setattr(command._StateFile, "keep", keep)
         with pytest.raises(Killed):
