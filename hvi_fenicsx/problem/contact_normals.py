@@ -198,4 +198,4 @@ def _largest_turn(normal: _Row, row: _Row, thresholds: Thresholds) -> float:
     """By which angle a normal may be turned to be orthogonal or equal to another direction."""
     if not normal.exact:
         return thresholds.uneven
-    return thresholds.turned_to_prescribed if row.prescribed else thresholds.same_direction
+    return thresholds.turned_to_prescribed if row.prescribed else thresholds.flat

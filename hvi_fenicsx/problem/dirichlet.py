@@ -39,7 +39,7 @@ def make_conditions(
     """
     found = tuple(_condition(context, scales, part, condition) for part, condition in wanted)
     named = [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)]
-    _check_agreement(context, scales, named, thresholds.same_displacement)
+    _check_agreement(context, scales, named, thresholds.same)
     return found
 
 

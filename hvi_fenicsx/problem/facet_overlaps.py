@@ -180,7 +180,7 @@ def _intervals(first: Facets, second: Facets, number: int, thresholds: Threshold
     facing = np.flatnonzero(second.normals @ normal < -thresholds.facing)
     along = (second.corners[facing] - start) @ (end - start) / length**2
     low, high = np.maximum(along.min(axis=1), 0.0), np.minimum(along.max(axis=1), 1.0)
-    over = high - low > thresholds.sliver
+    over = high - low > thresholds.rounding
     facing, along, low, high = facing[over], along[over], low[over], high[over]
     width = along[:, 1] - along[:, 0]
     at = (np.stack([low, high], axis=1) - along[:, :1]) / width[:, None]

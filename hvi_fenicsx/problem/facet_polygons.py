@@ -72,11 +72,11 @@ def clip(outlines: Array, number: Integers, distance: Array, count: int, thresho
     """
     over = np.flatnonzero(np.all((outlines.min(axis=1) < 1.0) & (outlines.max(axis=1) > 0.0), axis=1))
     pieces = triangle_clipping.clip(outlines[over])
-    solid = pieces.areas > thresholds.sliver
+    solid = pieces.areas > thresholds.rounding
     pieces, outline = pieces.chosen(solid), over[solid]
     near = _nearest(pieces, number[outline], distance[outline], thresholds)
     pieces, outline = pieces.chosen(near), outline[near]
-    corners, of_piece = pieces.fans(thresholds.sliver)
+    corners, of_piece = pieces.fans(thresholds.rounding)
     covered = _covered(pieces, number[outline], count, thresholds)
     return Clipped(corners=corners, outline=outline[of_piece], covered=covered)
 
@@ -141,7 +141,7 @@ def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: Th
         here = np.flatnonzero(number == crowded)
         nearer: Array = np.empty((0, 3, 2))
         for one in here[np.argsort(distance[here], kind="stable")]:
-            fan = pieces.chosen(np.array([one])).fans(thresholds.sliver)[0]
+            fan = pieces.chosen(np.array([one])).fans(thresholds.rounding)[0]
             kept[one] = triangle_clipping.common_area(fan, nearer) < 0.5 * areas[one]
             nearer = np.concatenate([nearer, fan]) if kept[one] else nearer
     return kept

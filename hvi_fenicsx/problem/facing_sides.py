@@ -33,7 +33,7 @@ def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, threshold
     for surface in surfaces:
         gathered = agree(comm, (surface.points, surface.normals))
         points, normals = (np.concatenate(arrays) for arrays in zip(*gathered, strict=True))
-        found = _facing(points, normals, thresholds.same_point * length)
+        found = _facing(points, normals, thresholds.same * length)
         if found is not None:
             raise InputError(
                 f"boundary.{surface.part}: two sides lie on each other at {spot(found[: normals.shape[1]])} and face "

@@ -10,21 +10,21 @@ class Thresholds:
     """What counts as rounding, and what a law's traction is judged by.
 
     Attributes:
-        same_displacement: difference of two prescribed displacements, relative to the largest, that is rounding.
-        rounding: relative rounding of the mesh's coordinates, and of a direction that the scene states.
-        same_point: distance of two vertices over the body's length, up to which they are at one point.
-        flat: angle (rad) between the normals of a part up to which the part is flat.
+        same: difference of two prescribed displacements, relative to the largest, and of two vertices, over the body's
+            length, up to which they are the same.
+        rounding: relative rounding of the mesh's coordinates, and of a direction that the scene states; part of a facet
+            that is too little to lie over another one.
+        flat: angle (rad) between the normals of a part up to which the part is flat, and up to which those of two flat
+            parts are orthogonal or equal.
         uneven: angle by which the normal of a part that is not flat may be turned at a vertex that it shares with
             another part or with a prescribed component: few digits in the coordinates explain so much.
         turned_to_prescribed: the same for a flat part at a prescribed component. Contact stays exact; a law sees the
             square of this angle.
-        same_direction: angle up to which the normals of two flat parts are orthogonal or equal.
         outside_bounds: distance (of u0) by which a prescribed displacement may be outside of a contact bound.
         largest_scale: of stresses (N/m²) and displacements (m); its inverse is the smallest. Energies are products of
             both, so beyond this they are no numbers any more.
         law_scale: smallest scale of a law's traction, in units of the load's stress: a weaker law is not judged finer.
         facing: cosine of the largest angle between the normal of a facet and that against the one that it meets.
-        sliver: part of a facet that is too little to lie over another one.
         uncovered: part of a facet at its end that may lie beyond the other side.
         rim: part of a facet by which the rims of curved sides may be apart and are still one.
         rim_parts: chords that stand for a curved edge at the end of a side.
@@ -37,18 +37,15 @@ class Thresholds:
             coefficients of all of them.
     """
 
-    same_displacement: float = 1e-9
+    same: float = 1e-9
     rounding: float = 1e-14
-    same_point: float = 1e-9
     flat: float = 1e-8
     uneven: float = 0.02
     turned_to_prescribed: float = 1e-4
-    same_direction: float = 1e-8
     outside_bounds: float = 1e-12
     largest_scale: float = 1e100
     law_scale: float = 1e-3
     facing: float = 0.5
-    sliver: float = 1e-14
     uncovered: float = 1e-6
     rim: float = 0.01
     rim_parts: int = 8
