@@ -20,7 +20,7 @@ from ..system.free_motions import SupportedBody
 from ..system.net_forces import ActingForces, Holder
 from ..typing import Array, Mask
 from .contact_state import ContactState, Forces
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CertificateThresholds
 
 
 def unbalanced(problem: Problem, reaction: Array, parts: Sequence[ContactState]) -> Array:
@@ -63,7 +63,7 @@ def net_forces(
     forces: Forces,
     states: Sequence[ContactState],
     u: fem.Function,
-    thresholds: Thresholds = DEFAULT,
+    thresholds: CertificateThresholds = DEFAULT,
 ) -> Array:
     """The largest net force or moment along a rigid motion that nothing carries, by body. Collective.
 
@@ -82,7 +82,7 @@ def net_forces(
 
 
 def net_forces_carried(
-    references: References, forces: Forces, carried: Array, u: fem.Function, thresholds: Thresholds = DEFAULT
+    references: References, forces: Forces, carried: Array, u: fem.Function, thresholds: CertificateThresholds = DEFAULT
 ) -> Array:
     """As :func:`net_forces`, where what contact and laws carry is known: they could carry nothing else. Collective.
 
@@ -99,7 +99,10 @@ def net_forces_carried(
 
 
 def _along_motions(
-    acting: ActingForces, references: References, closed: Sequence[tuple[Surface, Mask]], thresholds: Thresholds
+    acting: ActingForces,
+    references: References,
+    closed: Sequence[tuple[Surface, Mask]],
+    thresholds: CertificateThresholds,
 ) -> Array:
     problem = references.problem
     motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
@@ -112,7 +115,7 @@ def _acting(
     forces: Forces,
     holders: Sequence[Holder],
     u: fem.Function,
-    thresholds: Thresholds,
+    thresholds: CertificateThresholds,
 ) -> ActingForces:
     """What acts on the bodies at u; what contact and laws give follows from the holders. Collective."""
     problem = references.problem

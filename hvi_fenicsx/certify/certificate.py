@@ -21,7 +21,7 @@ from ..typing import Array
 from . import balance, between_nodes, contact_state, deviations
 from . import second_order as stability
 from .contact_state import ContactState, Forces
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CertificateThresholds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -109,7 +109,7 @@ def examine(
     tolerance: float,
     *,
     inertia: bool = False,
-    thresholds: Thresholds = DEFAULT,
+    thresholds: CertificateThresholds = DEFAULT,
 ) -> Examination:
     """Certify u. Collective.
 

@@ -23,7 +23,7 @@ from ..typing import Array, Integers, Mask
 from . import force_attribution, law_state
 from .force_attribution import ForceAttribution
 from .law_state import LawState
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CertificateThresholds
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _internal(problem: Problem, u: fem.Function) -> Array:
 
 
 def states(
-    references: References, u: fem.Function, reaction: Array, thresholds: Thresholds = DEFAULT
+    references: References, u: fem.Function, reaction: Array, thresholds: CertificateThresholds = DEFAULT
 ) -> tuple[ContactState, ...]:
     """The state of each part with bounds or laws, in the problem's order. Collective.
 

@@ -14,10 +14,10 @@ from ..system.system import System
 from .certificate import Certificate, Examination
 from .estimate import dual_norm
 from .estimate.dual_norm import DualNorm
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CertificateThresholds
 
 
-def may_help(found: Certificate, thresholds: Thresholds = DEFAULT) -> bool:
+def may_help(found: Certificate, thresholds: CertificateThresholds = DEFAULT) -> bool:
     """Whether a certificate is missed by no more than rounding may be.
 
     Args:
@@ -29,7 +29,11 @@ def may_help(found: Certificate, thresholds: Thresholds = DEFAULT) -> bool:
 
 
 def corrected(
-    system: System, levels: Levels, u: fem.Function, examination: Examination, thresholds: Thresholds = DEFAULT
+    system: System,
+    levels: Levels,
+    u: fem.Function,
+    examination: Examination,
+    thresholds: CertificateThresholds = DEFAULT,
 ) -> fem.Function:
     """The displacement after the step, with contact and sticking kept as they are. Collective.
 

@@ -15,7 +15,7 @@ _DIRECTIONS = 256
 
 
 @dataclass(frozen=True)
-class Coupling:
+class CoupledVertices:
     """The terms c δ(B v) of one law of a length at vertices on its kinks.
 
     Attributes:
@@ -51,7 +51,7 @@ class _Bend:
 
 
 @dataclass(frozen=True)
-class Sides:
+class SideSlopes:
     """The growth by components, by scalar dof, (n,) each.
 
     Attributes:
@@ -65,7 +65,7 @@ class Sides:
     jump: Array
 
 
-def coupled(couplings: Sequence[Coupling], sides: Sides, d: int) -> Iterator[tuple[Integers, float, float]]:
+def coupled(couplings: Sequence[CoupledVertices], sides: SideSlopes, d: int) -> Iterator[tuple[Integers, float, float]]:
     """For each vertex with couplings: the components that they touch, their least growth, and that of a pair.
 
     Args:
@@ -80,11 +80,11 @@ def coupled(couplings: Sequence[Coupling], sides: Sides, d: int) -> Iterator[tup
     for vertex, bends in at.items():
         moved = np.flatnonzero(np.any(np.vstack([b.rows for b in bends]) != 0.0, axis=0))
         dofs = vertex * d + moved
-        here = Sides(sides.up[dofs], sides.down[dofs], sides.jump[dofs])
+        here = SideSlopes(sides.up[dofs], sides.down[dofs], sides.jump[dofs])
         yield dofs, *_least(here, [replace(b, rows=b.rows[:, moved]) for b in bends])
 
 
-def _least(sides: Sides, bends: list[_Bend]) -> tuple[float, float]:
+def _least(sides: SideSlopes, bends: list[_Bend]) -> tuple[float, float]:
     """The least growth of coupled components over their admissible directions, and of opposite ones together."""
     up, down = sides.up, sides.down
     v = _admissible(np.vstack([_steepest(up, down), _sphere(len(up))]), np.isfinite(up), np.isfinite(down))

@@ -18,8 +18,8 @@ from ..problem.references import References
 from ..system import local_frames
 from ..typing import Array, Entities, Mask
 from . import force_attribution, shared_forces
-from .coupled_growth import Coupling, Sides, coupled
-from .thresholds import DEFAULT, Thresholds
+from .coupled_growth import CoupledVertices, SideSlopes, coupled
+from .thresholds import DEFAULT, CertificateThresholds
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Growth:
 
 
 def growth(
-    references: References, u: Array, forces: Array, tolerance: float, thresholds: Thresholds = DEFAULT
+    references: References, u: Array, forces: Array, tolerance: float, thresholds: CertificateThresholds = DEFAULT
 ) -> Growth:
     """The growth at a displacement.
 
@@ -112,8 +112,8 @@ class _Collector:
     d: int
     near: Array
     tolerance: float
-    thresholds: Thresholds
-    couplings: list[Coupling] = field(default_factory=list)
+    thresholds: CertificateThresholds
+    couplings: list[CoupledVertices] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         n = len(self.forces)
@@ -174,7 +174,7 @@ class _Collector:
         self._couple(term, on & ~moving, w * right, counting, term.length or Length.plain(1))
 
     def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array, length: Length) -> None:
-        self.couplings.append(Coupling(term.surface.blocks[on], factors[on], rows[on], length))
+        self.couplings.append(CoupledVertices(term.surface.blocks[on], factors[on], rows[on], length))
 
     def enter_bounds(self, bounds: Bounds) -> None:
         """Directions beyond a reached bound are not admissible.
@@ -205,7 +205,7 @@ class _Collector:
         free_up, free_down = np.isfinite(self.up), np.isfinite(self.down)
         opposite = np.where(free_up & free_down, self.jump, np.inf)
         least = np.minimum(self.up, self.down)
-        for dofs, lowest, pair in coupled(self.couplings, Sides(self.up, self.down, self.jump), self.d):
+        for dofs, lowest, pair in coupled(self.couplings, SideSlopes(self.up, self.down, self.jump), self.d):
             least[dofs], opposite[dofs], self.bent[dofs] = lowest, pair, True
         up, down = np.where(free_up, self.curved_up, np.inf), np.where(free_down, self.curved_down, np.inf)
         rounding = self.thresholds.no_jump / self.tolerance * self.slack

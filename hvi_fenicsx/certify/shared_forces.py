@@ -19,7 +19,7 @@ from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
 from ..typing import Array, Integers, Mask
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CertificateThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +138,7 @@ def settle(
     needed: Array,
     held: Mask,
     near: Array,
-    thresholds: Thresholds = DEFAULT,
+    thresholds: CertificateThresholds = DEFAULT,
 ) -> SharedForces:
     """The forces at shared vertices.
 
@@ -223,7 +223,7 @@ def _of_bounds(bounds: Bounds, lower: Mask, upper: Mask, row: Integers, free: Ma
 
 
 def nearest_sum(
-    carriers: Sequence[Carrier], wanted: Array, thresholds: Thresholds = DEFAULT
+    carriers: Sequence[Carrier], wanted: Array, thresholds: CertificateThresholds = DEFAULT
 ) -> tuple[list[Array], Array]:
     """Forces of all carriers whose sum is nearest to the wanted one, and what is left over.
 
@@ -263,7 +263,7 @@ def _sweep(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, count
 
 
 def _newton(
-    carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left: Array, thresholds: Thresholds
+    carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left: Array, thresholds: CertificateThresholds
 ) -> bool:
     """One Newton step at each vertex where it leaves less; whether there was any."""
     d = wanted.shape[1]

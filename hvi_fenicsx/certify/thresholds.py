@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
+class CertificateThresholds:
     """When a vertex is on a kink or a bound, and what is rounding.
 
     Attributes:
@@ -80,6 +80,6 @@ class UniquenessThresholds:
     enlarged: float = 1e-6
 
 
-DEFAULT = Thresholds()
+DEFAULT = CertificateThresholds()
 PLAUSIBILITY = PlausibilityThresholds()
 UNIQUENESS = UniquenessThresholds()

@@ -29,7 +29,7 @@ from .part_laws import Modification, unchanged
 from .problem import PlacedContribution, PrescribedComponent, Problem
 from .scaling import Placed, Scales
 from .spaces import coefficients_of
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 _BETWEEN = ", between the vertices of the mesh"
 
@@ -55,7 +55,7 @@ class Model:
     volumetric_ratio: float = np.inf
 
 
-def compose(domain: Domain, model: Model, thresholds: Thresholds = DEFAULT) -> Problem:
+def compose(domain: Domain, model: Model, thresholds: CompositionThresholds = DEFAULT) -> Problem:
     """The problem of a model on a domain. Collective.
 
     Args:
@@ -138,7 +138,7 @@ def _problem(
     contributions: Sequence[PlacedContribution],
     model: Model,
     implausible: tuple[str, ...],
-    thresholds: Thresholds,
+    thresholds: CompositionThresholds,
 ) -> Problem:
     """All contributions together. Collective."""
     conditions, held, fixed = _conditions(context, scales, contributions, thresholds)
@@ -182,7 +182,7 @@ def _surfaces(
     contributions: Sequence[PlacedContribution],
     fixed: Entities,
     model: Model,
-    thresholds: Thresholds,
+    thresholds: CompositionThresholds,
 ) -> tuple[dict[str, Surface], tuple[interfaces.Interface, ...]]:
     """The parts of Γc by name, those of interfaces too, and the interfaces. Collective."""
     surfaces = contact_parts.make_surfaces(context, contributions, fixed, model.interfaces, thresholds)
@@ -192,7 +192,7 @@ def _surfaces(
 
 
 def _conditions(
-    context: DomainForms, scales: Scales, contributions: Sequence[PlacedContribution], thresholds: Thresholds
+    context: DomainForms, scales: Scales, contributions: Sequence[PlacedContribution], thresholds: CompositionThresholds
 ) -> tuple[tuple[fem.DirichletBC, ...], tuple[tuple[str, Entities], ...], Entities]:
     """Dirichlet conditions, the dofs of each with its part, and all these dofs. Collective."""
     wanted = [(str(where), c) for where, _, contribution in contributions for c in contribution.conditions]

@@ -23,7 +23,7 @@ from ..geometry import tangents
 from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
 from .contact_surface import Surface
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def decide(
     stated: Mapping[str, Array],
     fixed: Entities,
     length: float,
-    thresholds: Thresholds = DEFAULT,
+    thresholds: CompositionThresholds = DEFAULT,
 ) -> dict[str, Surface]:
     """The surfaces with the normals that count. Collective.
 
@@ -108,7 +108,7 @@ def _at_shared_vertices(
     surfaces: Mapping[str, Surface],
     flat: Collection[str],
     fixed: Entities,
-    thresholds: Thresholds,
+    thresholds: CompositionThresholds,
 ) -> dict[str, Array]:
     """The normals (m, d) by part, orthogonal or equal to what else a vertex has. Collective."""
     normals = {name: surface.normals.copy() for name, surface in surfaces.items()}
@@ -163,7 +163,7 @@ def _candidates(surfaces: Mapping[str, Surface], fixed: Entities) -> Integers:
     return np.intersect1d(np.concatenate(slanted), shared)
 
 
-def _turned(normal: _Row, rows: Sequence[_Row], thresholds: Thresholds) -> _Row | str:
+def _turned(normal: _Row, rows: Sequence[_Row], thresholds: CompositionThresholds) -> _Row | str:
     """The normal, orthogonal or equal to each row; or why not."""
     rest = normal.direction
     for row in rows:
@@ -194,7 +194,7 @@ def _refusal(normal: _Row, row: _Row, limit: float) -> str:
     )
 
 
-def _largest_turn(normal: _Row, row: _Row, thresholds: Thresholds) -> float:
+def _largest_turn(normal: _Row, row: _Row, thresholds: CompositionThresholds) -> float:
     """By which angle a normal may be turned to be orthogonal or equal to another direction."""
     if not normal.exact:
         return thresholds.uneven

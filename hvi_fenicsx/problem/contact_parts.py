@@ -20,7 +20,7 @@ from .domain_forms import DomainForms
 from .problem import Bounds, BoundsForce, BoundsMove, PlacedContribution
 from .scaling import Scales
 from .spaces import contact_rule, edge_share
-from .thresholds import Thresholds
+from .thresholds import CompositionThresholds
 
 
 def make_surfaces(
@@ -28,7 +28,7 @@ def make_surfaces(
     contributions: Sequence[PlacedContribution],
     fixed: Entities,
     interfaces: Collection[str],
-    thresholds: Thresholds,
+    thresholds: CompositionThresholds,
 ) -> dict[str, Surface]:
     """The surfaces of the boundary parts with bounds or laws, by part, in the scene's order. Collective.
 
@@ -206,7 +206,11 @@ def _coefficients(context: DomainForms, where: Surface, formula: SpatialValue) -
 
 
 def check_bounds(
-    context: DomainForms, bounds: Sequence[Bounds], prescribed: Array, fixed: Entities, thresholds: Thresholds
+    context: DomainForms,
+    bounds: Sequence[Bounds],
+    prescribed: Array,
+    fixed: Entities,
+    thresholds: CompositionThresholds,
 ) -> None:
     """Refuse bounds that exclude a prescribed value: PETSc would silently change it (solver-notes.md). Collective.
 
@@ -233,7 +237,7 @@ def check_bounds(
 
 
 def check_contradictions(
-    context: DomainForms, scales: Scales, bounds: Sequence[Bounds], thresholds: Thresholds
+    context: DomainForms, scales: Scales, bounds: Sequence[Bounds], thresholds: CompositionThresholds
 ) -> None:
     """Refuse bounds that no displacement satisfies: within a part, or of two parts at a vertex of both. Collective.
 
@@ -253,7 +257,7 @@ def check_contradictions(
         raise InputError(f"boundary.{found[0]}; change one of them, or leave the vertex out of one part")
 
 
-def _contradiction(one: Bounds, other: Bounds, unit: float, thresholds: Thresholds) -> list[str]:
+def _contradiction(one: Bounds, other: Bounds, unit: float, thresholds: CompositionThresholds) -> list[str]:
     """The first vertex at which two bounds (or one and itself) contradict each other, in words."""
     _, i, j = np.intersect1d(one.surface.blocks, other.surface.blocks, return_indices=True)
     along = np.sum(one.surface.normals[i] * other.surface.normals[j], axis=1)  # 1, -1, or 0: independent bounds

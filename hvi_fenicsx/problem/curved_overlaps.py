@@ -17,7 +17,7 @@ from typing_extensions import override
 from ..typing import Array, Integers
 from . import curved_shapes, facet_overlaps
 from .facet_overlaps import Facets, OverlapPoints, Overlaps
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 _DEGREE = 12
 """Degree of the quadrature: lengths are square roots of polynomials, nearly constant ones."""
@@ -54,7 +54,7 @@ class CurvedOverlaps(Overlaps):
         return replace(straight, weights=part * speed, on_second=np.column_stack([1.0 - t, t]))
 
 
-def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) -> CurvedOverlaps:
+def in_plane(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> CurvedOverlaps:
     """The intersections of the facets of two sides.
 
     Args:

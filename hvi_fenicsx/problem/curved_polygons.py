@@ -19,7 +19,7 @@ from typing_extensions import override
 from ..typing import Array, Integers, Mask
 from . import curved_shapes, facet_polygons, triangle_clipping
 from .facet_overlaps import Facets, OverlapPoints, Overlaps
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 _EDGES = [[1, 2], [0, 2], [0, 1]]
 """The ends of the edge opposite to each corner."""
@@ -61,7 +61,7 @@ class CurvedPolygons(Overlaps):
         return replace(flat, weights=np.abs(part) * size, on_second=_where(self.others[each], at, flat.on_second))
 
 
-def in_space(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) -> CurvedPolygons:
+def in_space(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> CurvedPolygons:
     """The intersections of the curved facets of two sides in space.
 
     Args:
@@ -109,7 +109,7 @@ class _Pairs:
     own: Array
 
 
-def _pairs(first: Facets, second: Facets, thresholds: Thresholds) -> _Pairs:
+def _pairs(first: Facets, second: Facets, thresholds: CompositionThresholds) -> _Pairs:
     number, other = facet_polygons.candidates(first, second, thresholds)
     frames, starts = facet_polygons.frames_of(first), first.corners[:, 0]
     local = facet_polygons.in_frames(second.points[other], starts[number], frames[number])

@@ -17,14 +17,14 @@ from ..typing import Array, Entities
 from .domain_forms import DomainForms
 from .scaling import Scales
 from .spaces import edge_share
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 
 def make_conditions(
     context: DomainForms,
     scales: Scales,
     wanted: Sequence[tuple[str, Condition]],
-    thresholds: Thresholds = DEFAULT,
+    thresholds: CompositionThresholds = DEFAULT,
 ) -> tuple[fem.DirichletBC, ...]:
     """The conditions, nondimensional. Collective.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..typing import Array, Integers, Mask
 from . import spaces
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +154,7 @@ _KINDS = {2: "interval", 3: "triangle"}
 """Facets by dimension."""
 
 
-def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) -> Overlaps:
+def in_plane(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> Overlaps:
     """The intersections of the facets of two sides in the plane.
 
     Args:
@@ -173,7 +173,7 @@ def in_plane(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) ->
     return _pieces(first, whole, covered)
 
 
-def _intervals(first: Facets, second: Facets, number: int, thresholds: Thresholds) -> Array:
+def _intervals(first: Facets, second: Facets, number: int, thresholds: CompositionThresholds) -> Array:
     """Facets over one of the first side: number, begin, end on it, and where these ends are on the facet, (k, 5)."""
     start, end = first.corners[number]
     length, normal = np.linalg.norm(end - start), first.normals[number]

@@ -16,13 +16,13 @@ from ..geometry import tangents
 from ..typing import Array, Integers, Mask
 from . import triangle_clipping
 from .facet_overlaps import Facets, Overlaps
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 from .triangle_clipping import CORNERS, Polygons, barycentric, twice_areas
 
 _ANGLES = np.array([np.pi / 2, np.pi / 4, np.pi / 4])
 
 
-def in_space(first: Facets, second: Facets, thresholds: Thresholds = DEFAULT) -> Overlaps:
+def in_space(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> Overlaps:
     """The intersections of the facets of two sides in space.
 
     Args:
@@ -60,7 +60,7 @@ class Clipped:
     covered: Mask
 
 
-def clip(outlines: Array, number: Integers, distance: Array, count: int, thresholds: Thresholds) -> Clipped:
+def clip(outlines: Array, number: Integers, distance: Array, count: int, thresholds: CompositionThresholds) -> Clipped:
     """Outlines clipped by the first side's facets, without what lies behind nearer ones.
 
     Args:
@@ -81,7 +81,7 @@ def clip(outlines: Array, number: Integers, distance: Array, count: int, thresho
     return Clipped(corners=corners, outline=outline[of_piece], covered=covered)
 
 
-def candidates(first: Facets, second: Facets, thresholds: Thresholds) -> tuple[Integers, Integers]:
+def candidates(first: Facets, second: Facets, thresholds: CompositionThresholds) -> tuple[Integers, Integers]:
     """Pairs of facets that may lie over each other: the first side's facets, the second's, (p,) each.
 
     Args:
@@ -133,7 +133,7 @@ def in_frames(points: Array, starts: Array, frames: Array) -> Array:
     return np.asarray(np.einsum("pvi,pij->pvj", points - starts[:, None], frames))
 
 
-def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: Thresholds) -> Mask:
+def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: CompositionThresholds) -> Mask:
     """Which pieces do not lie behind nearer ones, (k,)."""
     kept, areas = np.ones(len(number), dtype=bool), pieces.areas
     sums = np.bincount(number, weights=areas, minlength=1)
@@ -147,7 +147,7 @@ def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: Th
     return kept
 
 
-def _covered(pieces: Polygons, number: Integers, count: int, thresholds: Thresholds) -> Mask:
+def _covered(pieces: Polygons, number: Integers, count: int, thresholds: CompositionThresholds) -> Mask:
     """Whether the pieces fill the angle at each corner of the first side's facets, (count, 3)."""
     filled = np.zeros((count, 3))
     for corner, place in enumerate(CORNERS):

@@ -15,10 +15,10 @@ from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Array
 from .contact_surface import Surface
-from .thresholds import Thresholds
+from .thresholds import CompositionThresholds
 
 
-def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, thresholds: Thresholds) -> None:
+def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, thresholds: CompositionThresholds) -> None:
     """Refuse a part with two vertices at one point whose outward normals face each other. Collective.
 
     Args:

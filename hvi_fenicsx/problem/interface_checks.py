@@ -14,7 +14,7 @@ from . import dual_basis
 from .contact_surface import Surface
 from .facet_overlaps import Overlaps
 from .interface_sides import Pair
-from .thresholds import Thresholds
+from .thresholds import CompositionThresholds
 
 
 def check_facing(pair: Pair, overlaps: Overlaps) -> None:
@@ -62,7 +62,7 @@ def check_carried(pair: Pair, overlaps: Overlaps, kept: Mask, busy: Mask) -> Non
         )
 
 
-def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array, thresholds: Thresholds) -> None:
+def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array, thresholds: CompositionThresholds) -> None:
     """Refuse bodies that overlap by more than the facets of their curved sides do. Collective.
 
     Args:

@@ -15,7 +15,7 @@ from . import curved_overlaps, curved_polygons, facet_overlaps, facet_polygons, 
 from .domain_forms import DomainForms
 from .facet_integrals import is_curved
 from .facet_overlaps import Facets, Overlaps
-from .thresholds import Thresholds
+from .thresholds import CompositionThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ class Pair:
     second: Facets
     curved: bool = False
 
-    def overlaps(self, thresholds: Thresholds) -> Overlaps:
+    def overlaps(self, thresholds: CompositionThresholds) -> Overlaps:
         """The intersections of the facets of both sides."""
         if self.first.points.shape[2] == 2:
             flat = curved_overlaps if self.curved else facet_overlaps

@@ -22,7 +22,7 @@ from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
 from .facet_overlaps import Facets, Overlaps
 from .interface_sides import Pair, Sides
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class Interface:
 
 
 def find(
-    context: DomainForms, wanted: Mapping[str, Sides], occupied: Entities, thresholds: Thresholds = DEFAULT
+    context: DomainForms, wanted: Mapping[str, Sides], occupied: Entities, thresholds: CompositionThresholds = DEFAULT
 ) -> tuple[Interface, ...]:
     """The interfaces of a problem. Collective.
 
@@ -79,7 +79,7 @@ def find(
 
 
 def _interface(
-    context: DomainForms, name: str, pairs: Mapping[str, Pair], taken: Integers, thresholds: Thresholds
+    context: DomainForms, name: str, pairs: Mapping[str, Pair], taken: Integers, thresholds: CompositionThresholds
 ) -> Interface:
     """One interface: its intersections, which nodes of its first side carry something, normals, gaps. Collective.
 

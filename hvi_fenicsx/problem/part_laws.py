@@ -24,7 +24,7 @@ from .law_term import LawTerm
 from .problem import PlacedContribution
 from .scaling import Scales
 from .spaces import contact_rule
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 Modification = Callable[[Superpotential], Superpotential]
 """The law that is solved in the place of a law, SI: the same law, smoothed for example."""
@@ -56,7 +56,7 @@ def check_moved(
     comm: MPI.Comm,
     contributions: Sequence[PlacedContribution],
     surfaces: Mapping[str, Surface],
-    thresholds: Thresholds,
+    thresholds: CompositionThresholds,
 ) -> None:
     """Refuse laws beside an obstacle that is moved along what they act on: the body's own displacement. Collective.
 
@@ -168,7 +168,7 @@ def _check_formulas(context: DomainForms, where: Surface, key: str, law: Boundar
 
 
 def _factor(
-    context: DomainForms, where: Surface, key: str, given: SpatialValue, thresholds: Thresholds = DEFAULT
+    context: DomainForms, where: Surface, key: str, given: SpatialValue, thresholds: CompositionThresholds = DEFAULT
 ) -> Array:
     """What tractions or lengths of a law are multiplied by at the vertices of its part, (m,). Collective.
 
@@ -188,7 +188,7 @@ def _factor(
 
 
 def _scaled(
-    law: Superpotential, scales: Scales, place: str, slip: float, thresholds: Thresholds = DEFAULT
+    law: Superpotential, scales: Scales, place: str, slip: float, thresholds: CompositionThresholds = DEFAULT
 ) -> Superpotential:
     """The law in the problem's units.
 

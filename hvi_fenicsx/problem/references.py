@@ -19,7 +19,7 @@ from mpi4py import MPI
 from ..typing import Array, Mask
 from .law_term import LawTerm
 from .problem import Problem
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class References:
     moved: Mask
     driven: Mask
     holding: Mask
-    thresholds: Thresholds = DEFAULT
+    thresholds: CompositionThresholds = DEFAULT
 
     def norms(self, values: Array) -> Array:
         """Euclidean norms of values at this rank's vertices, any shape of (vertices, d), by body. Collective."""
@@ -118,7 +118,7 @@ class References:
         )
 
 
-def of(problem: Problem, load: Array, thresholds: Thresholds = DEFAULT) -> References:
+def of(problem: Problem, load: Array, thresholds: CompositionThresholds = DEFAULT) -> References:
     """The references of a problem. Collective.
 
     Args:

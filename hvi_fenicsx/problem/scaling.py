@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..effects import Drive, Effect, Evaluate, Sizes
 from ..errors import InputError
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, CompositionThresholds
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def choose(
     dimension: int,
     effects: Sequence[Placed],
     evaluate: Callable[[Placed], Evaluate],
-    thresholds: Thresholds = DEFAULT,
+    thresholds: CompositionThresholds = DEFAULT,
 ) -> Scales:
     """The scales of a problem. Collective where ``evaluate`` is.
 

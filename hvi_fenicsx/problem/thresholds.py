@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
+class CompositionThresholds:
     """What counts as rounding, and what a law's traction is judged by.
 
     Attributes:
@@ -56,4 +56,4 @@ class Thresholds:
     piece: int = 2**18
 
 
-DEFAULT = Thresholds()
+DEFAULT = CompositionThresholds()

@@ -3,7 +3,7 @@
 from ..laws.convex_parts import Directional
 from .analyse import analyse, gives_way, load_factors
 from .kernel import FixedDirections, kernel, modes, null_space
-from .least_energy import Rest, Sides, least_energy
+from .least_energy import OneSidedSupports, Rest, least_energy
 from .motions import (
     AnyBody,
     JoinedBodies,
@@ -17,7 +17,7 @@ from .motions import (
 from .pressed import pressed, without_obstacles
 from .reduction import ContactCone, Resistance, RigidProblem
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
-from .thresholds import Thresholds
+from .thresholds import RigidThresholds
 
 __all__ = [
     "AnyBody",
@@ -30,14 +30,14 @@ __all__ = [
     "Mode",
     "MotionFields",
     "Movable",
+    "OneSidedSupports",
     "PaperConditions",
     "Resistance",
     "Rest",
     "RigidBody",
     "RigidProblem",
-    "Sides",
+    "RigidThresholds",
     "Solvability",
-    "Thresholds",
     "analyse",
     "combine",
     "combine_factors",

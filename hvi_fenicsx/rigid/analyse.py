@@ -19,12 +19,12 @@ from .kernel import modes
 from .limit_analysis import Analysis
 from .reduction import ReducedProblem, RigidProblem, reduce
 from .solvability import LoadFactors, Solvability, undecided, unmovable
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, RigidThresholds
 
 Result = TypeVar("Result")
 
 
-def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> Solvability:
+def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds = DEFAULT) -> Solvability:
     """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks.
 
     Args:
@@ -35,7 +35,7 @@ def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFA
     return _judged(comm, problem, thresholds, unmovable(), lambda found: _verdict(problem, found))
 
 
-def gives_way(comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT) -> bool:
+def gives_way(comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds = DEFAULT) -> bool:
     """Whether the load does more work along a rigid motion than the growth resists. Collective; the same on all ranks.
 
     The growth does not hold the body then, whatever the peak does. One minimum tells, where the whole verdict takes one
@@ -64,7 +64,9 @@ def _verdict(problem: RigidProblem, reduced: ReducedProblem) -> Solvability:
         return undecided(modes(reduced.frame, problem.body), analysis.paper_c, str(error))
 
 
-def load_factors(comm: MPI.Comm, problem: RigidProblem, *loads: str, thresholds: Thresholds = DEFAULT) -> LoadFactors:
+def load_factors(
+    comm: MPI.Comm, problem: RigidProblem, *loads: str, thresholds: RigidThresholds = DEFAULT
+) -> LoadFactors:
     """Factors of some loads together, the others constant. Collective; the same on all ranks.
 
     Args:
@@ -88,7 +90,7 @@ def load_factors(comm: MPI.Comm, problem: RigidProblem, *loads: str, thresholds:
 def _judged(
     comm: MPI.Comm,
     problem: RigidProblem,
-    thresholds: Thresholds,
+    thresholds: RigidThresholds,
     unmoved: Result,
     work: Callable[[ReducedProblem], Result],
 ) -> Result:

@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import SolverError
 from ..typing import Array
 from .functional import Functional, Region, SlipIntegral, ball, idle
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, RigidThresholds
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class GapHistory:
     """
 
     scale: float
-    thresholds: Thresholds
+    thresholds: RigidThresholds
     best: float = np.inf
     stalled: int = 0
 
@@ -89,7 +89,7 @@ class Programme:
     frame: Array
     integrals: tuple[SlipIntegral, ...]
     scale: float
-    thresholds: Thresholds = DEFAULT
+    thresholds: RigidThresholds = DEFAULT
     cuts: list[list[Array]] = field(default_factory=list)
     solved: int = 0
 

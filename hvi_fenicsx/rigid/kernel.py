@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from ..typing import Array
 from .motions import Mode, Movable, Places, fields_at, is_place, mode_of
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, RigidThresholds
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,9 @@ class FixedDirections:
             raise ValueError("FixedDirections needs points (k, 3) and directions (k, d) with the same k")
 
 
-def kernel(comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections], thresholds: Thresholds = DEFAULT) -> Array:
+def kernel(
+    comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections], thresholds: RigidThresholds = DEFAULT
+) -> Array:
     """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
 
     First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
@@ -49,7 +51,7 @@ def kernel(comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections], thre
     return np.asarray(comm.bcast(basis, root=0))
 
 
-def _natural_null_space(rows: Array, shifts: int, thresholds: Thresholds) -> Array:
+def _natural_null_space(rows: Array, shifts: int, thresholds: RigidThresholds) -> Array:
     return natural_basis(null_space(rows, thresholds), shifts, thresholds)
 
 
@@ -68,7 +70,7 @@ def triangle(rows: Array) -> Array:
     return np.asarray(np.linalg.qr(rows, mode="r")) if len(rows) else rows
 
 
-def null_space(rows: Array, thresholds: Thresholds = DEFAULT) -> Array:
+def null_space(rows: Array, thresholds: RigidThresholds = DEFAULT) -> Array:
     """Orthonormal basis (n, k) of {z: rows @ z = 0}.
 
     Args:
@@ -82,7 +84,7 @@ def null_space(rows: Array, thresholds: Thresholds = DEFAULT) -> Array:
     return np.asarray(right[values <= thresholds.rounding * values[0]].T)
 
 
-def natural_basis(basis: Array, count: int, thresholds: Thresholds = DEFAULT) -> Array:
+def natural_basis(basis: Array, count: int, thresholds: RigidThresholds = DEFAULT) -> Array:
     """The same space by translations first, then rotations, see `kernel`.
 
     Args:
@@ -100,7 +102,7 @@ def natural_basis(basis: Array, count: int, thresholds: Thresholds = DEFAULT) ->
     return _snap(np.hstack([np.vstack([shifts, zeros]), np.vstack([centre, spins])]))
 
 
-def _sparse_basis(vectors: Array, thresholds: Thresholds) -> Array:
+def _sparse_basis(vectors: Array, thresholds: RigidThresholds) -> Array:
     """Orthonormal basis of the span of the columns (n, k) of `vectors`, along axes where it can be."""
     left, values, _ = np.linalg.svd(vectors, full_matrices=False)
     span = left[:, values > thresholds.rounding]

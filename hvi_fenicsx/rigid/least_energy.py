@@ -18,14 +18,14 @@ from mpi4py import MPI
 
 from ..runtime.mpi import on_root
 from ..typing import Array
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, RigidThresholds
 
 Energy = Callable[[Array], tuple[Array, Array]]
 """The convex energies of parts at amplitudes (k,): values (p,) and a subgradient of each, (p, k). Collective."""
 
 
 @dataclass(frozen=True)
-class Sides:
+class OneSidedSupports:
     """What contact leaves: rows @ a <= limits. The same on all ranks.
 
     Attributes:
@@ -80,8 +80,8 @@ class _CutModel:
     """
 
     work: Array
-    sides: Sides
-    thresholds: Thresholds
+    sides: OneSidedSupports
+    thresholds: RigidThresholds
     heights: list[Array] = field(default_factory=list)
     slopes: list[Array] = field(default_factory=list)
 
@@ -167,7 +167,7 @@ class _CutModel:
 
 
 def least_energy(
-    comm: MPI.Comm, work: Array, energy: Energy, sides: Sides, thresholds: Thresholds = DEFAULT
+    comm: MPI.Comm, work: Array, energy: Energy, sides: OneSidedSupports, thresholds: RigidThresholds = DEFAULT
 ) -> Rest | None:
     """Minimise work·a + Σ_p energy_p(a) over rows @ a <= limits. Collective; the same on all ranks.
 

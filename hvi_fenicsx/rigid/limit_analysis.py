@@ -16,7 +16,7 @@ from .kernel import modes, natural_basis, null_space, triangle
 from .motions import Mode, mode_of
 from .reduction import ReducedProblem, RigidProblem
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to
-from .thresholds import Thresholds
+from .thresholds import RigidThresholds
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Analysis:
     reduced: ReducedProblem
 
     @property
-    def thresholds(self) -> Thresholds:
+    def thresholds(self) -> RigidThresholds:
         """What counts as zero."""
         return self.reduced.thresholds
 

@@ -19,7 +19,7 @@ from ..typing import Array
 from .functional import Functional, SlipIntegral, merged
 from .kernel import FixedDirections, kernel
 from .motions import Movable, Places, fields_at, is_place
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, RigidThresholds
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class ReducedProblem:
     traces: Array
     loads: Mapping[str, Array]
     load_scale: float
-    thresholds: Thresholds
+    thresholds: RigidThresholds
 
     def functional(self, laws: tuple[Directional, ...]) -> Functional:
         """Σ_p ∫ law_p(slip) ds on the cone of contact and of infinite one-sided laws; factors of any sign."""
@@ -200,7 +200,7 @@ class _Rows:
 
 
 def reduce(
-    comm: MPI.Comm, problem: RigidProblem, thresholds: Thresholds = DEFAULT
+    comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds = DEFAULT
 ) -> tuple[Array, ReducedProblem | None]:
     """The kernel's basis (3|6, k) everywhere, and on the root the reduced problem if k > 0. Collective.
 
@@ -230,7 +230,7 @@ def reduce(
     )
 
 
-def _own_rows(problem: RigidProblem, basis: Array, thresholds: Thresholds) -> _Rows:
+def _own_rows(problem: RigidProblem, basis: Array, thresholds: RigidThresholds) -> _Rows:
     """What this rank has of the reduced problem."""
     normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.cones()]
     contact = unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.exact)

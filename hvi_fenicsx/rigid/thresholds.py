@@ -9,7 +9,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
+class RigidThresholds:
     """Limits of the analysis; everything it compares is nondimensional and of order 1.
 
     Attributes:
@@ -60,4 +60,4 @@ class Thresholds:
         ]
 
 
-DEFAULT = Thresholds()
+DEFAULT = RigidThresholds()

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from ..laws import Superpotential
 from ..problem.law_term import LawTerm
-from ..rigid import Rest, Sides, least_energy
+from ..rigid import OneSidedSupports, Rest, least_energy
 from ..runtime.mpi import agree
 from ..system import existence, free_motions
 from ..system.equations import LawModel
@@ -154,7 +154,7 @@ def _rest(system: System, laws: Sequence[Superpotential], x: PETSc.Vec, moves: S
     sides = np.vstack([rows[upper], -rows[lower]]), np.r_[high[upper], -low[lower]]
     mine = np.r_[dofs[upper], dofs[lower]], np.r_[system.upper.array_r[dofs][upper], system.lower.array_r[dofs][lower]]
     every = agree(system.comm, sides)
-    whole = Sides(np.concatenate([s[0] for s in every]), np.concatenate([s[1] for s in every]))
+    whole = OneSidedSupports(np.concatenate([s[0] for s in every]), np.concatenate([s[1] for s in every]))
     found = settle(system, laws, x, moves, whole)
     if found is None:
         return None
@@ -239,7 +239,11 @@ class _LawEnergy:
 
 
 def settle(
-    system: System, laws: Sequence[Superpotential], x: PETSc.Vec, moves: Sequence[PETSc.Vec], sides: Sides | None = None
+    system: System,
+    laws: Sequence[Superpotential],
+    x: PETSc.Vec,
+    moves: Sequence[PETSc.Vec],
+    sides: OneSidedSupports | None = None,
 ) -> Rest | None:
     """Move x rigidly to where the energy of unbroken laws is least. Collective.
 
@@ -254,7 +258,7 @@ def settle(
         The position, or None where nothing stops the bodies; x is then as it was.
     """
     work = np.array([-float(system.load.dot(move)) for move in moves])
-    sides = Sides(np.zeros((0, len(moves))), np.zeros(0)) if sides is None else sides
+    sides = OneSidedSupports(np.zeros((0, len(moves))), np.zeros(0)) if sides is None else sides
     found = least_energy(system.comm, work, _LawEnergy(system, laws, x, moves), sides)
     if found is not None:
         for amplitude, move in zip(found.amplitudes, moves, strict=True):

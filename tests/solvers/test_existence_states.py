@@ -216,7 +216,7 @@ def test_where_existence_cannot_be_decided_a_run_goes_on(
     push: float, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A certificate needs no verdict; without one the result says what is not known, and is written all the same."""
-    hasty = rigid.Thresholds(max_rounds=0)
+    hasty = rigid.RigidThresholds(max_rounds=0)
     monkeypatch.setattr(existence, "analyse", functools.partial(rigid.analyse, thresholds=hasty))
     monkeypatch.setattr(rigid, "load_factors", functools.partial(rigid.load_factors, thresholds=hasty))
     scene = write_scene(tmp_path / "s.toml", block(3, push, 4 * Q, LAW))

@@ -15,7 +15,7 @@ from ...problem.problem import Bounds, Problem
 from ...typing import Array, Entities
 from .bubbles import quadrature
 from .contact_facets import ContactFacets, contact_facets
-from .thresholds import Thresholds
+from .thresholds import EstimateThresholds
 
 
 def varies(value: SpatialValue | None) -> bool:
@@ -120,7 +120,9 @@ class FacetSamples:
         return np.asarray(self.of(value, at) - self.interpolated(at_nodes, at))
 
 
-def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: Thresholds) -> FacetSamples:
+def sample(
+    problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: EstimateThresholds
+) -> FacetSamples:
     """Samples of boundary facets, exact for products of the modes of the data. Collective.
 
     Args:

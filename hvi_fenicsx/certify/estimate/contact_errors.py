@@ -22,7 +22,7 @@ from . import coupled_errors
 from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawTraces, Trace
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, EstimateThresholds
 
 _PLACE = 1 / (2 * np.sqrt(12))
 """Standard deviation, over the distance of two nodes, of the place of a drop that may be anywhere in half of it."""
@@ -48,7 +48,7 @@ def estimate_contact_errors(
     levels: Levels,
     u: fem.Function,
     examination: Examination,
-    thresholds: Thresholds = DEFAULT,
+    thresholds: EstimateThresholds = DEFAULT,
     known: ErrorField | None = None,
 ) -> ContactErrors:
     """Estimate the errors of slip and -σ_t, what smoothing changes included. Collective.

@@ -26,14 +26,14 @@ from .bubbles import of_facet, shape
 from .contact_facets import PartTrace
 from .facet_modes import FacetModes, facet_modes
 from .facet_pressure import redistributed
-from .thresholds import Thresholds
+from .thresholds import EstimateThresholds
 
 _ALONG = 1e-6
 """Share of a mean normal along an axis from which it has a component there."""
 
 
 def squares(
-    problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState], thresholds: Thresholds
+    problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState], thresholds: EstimateThresholds
 ) -> Array:
     """η_K² of the owned cells that the data within facets add. Collective.
 
@@ -112,7 +112,9 @@ def _obstacles(
                 yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
 
 
-def _moved_pressure(problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle, thresholds: Thresholds) -> Array:
+def _moved_pressure(
+    problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle, thresholds: EstimateThresholds
+) -> Array:
     """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
     surface, on = obstacle.bounds.surface, obstacle.on
     trace = PartTrace(problem, bubbles, surface, surface.normals[:, None, :], 1)

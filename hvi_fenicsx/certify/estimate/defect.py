@@ -15,7 +15,7 @@ from mpi4py import MPI
 from ...typing import Array, Entities
 from .bubble_constraints import BubbleBounds, Constraints
 from .bubble_stiffness import BubbleStiffness, Springs
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, EstimateThresholds
 
 
 class LeastEnergy:
@@ -39,7 +39,7 @@ class LeastEnergy:
         stiffness: BubbleStiffness,
         under: Constraints,
         load: Array,
-        thresholds: Thresholds = DEFAULT,
+        thresholds: EstimateThresholds = DEFAULT,
     ) -> None:
         self._bubbles, self._stiffness, self._under, self._thresholds = bubbles, stiffness, under, thresholds
         self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
@@ -109,7 +109,11 @@ def _union(parts: Iterable[Entities]) -> Entities:
 
 
 def find_least_energy(
-    bubbles: fem.Function, stiffness: BubbleStiffness, under: Constraints, load: Array, thresholds: Thresholds = DEFAULT
+    bubbles: fem.Function,
+    stiffness: BubbleStiffness,
+    under: Constraints,
+    load: Array,
+    thresholds: EstimateThresholds = DEFAULT,
 ) -> None:
     """Find the admissible bubbles of least energy under a load. Collective.
 

@@ -28,7 +28,7 @@ from ..contact_state import ContactState
 from ..force_attribution import on_kink, touches
 from ..shared_forces import components
 from .law_traces import nearest
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, EstimateThresholds
 
 
 class DualNorm:
@@ -41,7 +41,9 @@ class DualNorm:
         held: the owned scalar dofs at which u is held.
     """
 
-    def __init__(self, system: System, levels: Levels, u: fem.Function, thresholds: Thresholds = DEFAULT) -> None:
+    def __init__(
+        self, system: System, levels: Levels, u: fem.Function, thresholds: EstimateThresholds = DEFAULT
+    ) -> None:
         self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.tolerance
         self._near, self._x = thresholds.near, system.unknowns(u)
         self.held = _held(system, self._x, thresholds.near)
@@ -129,7 +131,7 @@ def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
 
-def _rising(comm: MPI.Comm, term: LawTerm, u: Array, thresholds: Thresholds) -> Array:
+def _rising(comm: MPI.Comm, term: LawTerm, u: Array, thresholds: EstimateThresholds) -> Array:
     """The rising part of a law's tangent; where it is flat everywhere, a foundation in its place. Collective."""
     argument = term.argument(u)
     convex = term.law.convex

@@ -23,7 +23,7 @@ from . import bubble_constraints, coupled_errors, data_errors, defect, dual_norm
 from .bubble_stiffness import BubbleStiffness
 from .contact_errors import ratio
 from .law_traces import ErrorField, LawTraces
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, EstimateThresholds
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,7 +78,7 @@ class Estimate:
 
 
 def estimate(
-    system: System, levels: Levels, u: fem.Function, examination: Examination, thresholds: Thresholds = DEFAULT
+    system: System, levels: Levels, u: fem.Function, examination: Examination, thresholds: EstimateThresholds = DEFAULT
 ) -> Estimate:
     """Estimate the error of a displacement. Collective.
 

@@ -20,7 +20,7 @@ from ...problem.stiffness_tensor import stiffness_tensor
 from ...typing import Array, Entities
 from . import half_space
 from .boundary_data import FacetSamples, sample
-from .thresholds import Thresholds
+from .thresholds import EstimateThresholds
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,9 @@ class FacetModes(FacetSamples):
         return np.asarray(self.facets.areas / compliance * np.sum(squares, axis=1))
 
 
-def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: Thresholds) -> FacetModes:
+def facet_modes(
+    problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: EstimateThresholds
+) -> FacetModes:
     """The modes on boundary facets. Collective.
 
     Args:

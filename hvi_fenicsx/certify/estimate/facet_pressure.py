@@ -12,7 +12,7 @@ from mpi4py import MPI
 from ...runtime.mpi import total
 from ...typing import Array
 from .facet_modes import FacetModes
-from .thresholds import Thresholds
+from .thresholds import EstimateThresholds
 
 
 def redistributed(
@@ -23,7 +23,7 @@ def redistributed(
     compliance: Array,
     *,
     free: bool,
-    thresholds: Thresholds,
+    thresholds: EstimateThresholds,
 ) -> Array:
     """Pressures p ≥ 0 with w ≤ gap and p (gap - w) = 0, w being what the pushes less p cause, (f, q). Collective.
 

@@ -26,7 +26,7 @@ from .block_forces import BlockForces, gathered, summed
 from .contact_facets import PartTrace
 from .interface_points import InterfacePoints
 from .interface_traces import InterfaceTrace
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, EstimateThresholds
 
 Trace = PartTrace | InterfaceTrace
 """The facets of a part, or of two bodies that meet, between their nodes."""
@@ -140,7 +140,7 @@ class LawTraces:
         problem: Problem,
         u: fem.Function,
         states: Sequence[ContactState],
-        thresholds: Thresholds = DEFAULT,
+        thresholds: EstimateThresholds = DEFAULT,
         *,
         exact: bool,
     ) -> None:

@@ -20,10 +20,10 @@ from .bubble_stiffness import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_springs import LawSprings
 from .law_traces import ErrorField, LawTraces
-from .thresholds import Thresholds
+from .thresholds import EstimateThresholds
 
 
-class CondensedStiffness(BubbleStiffness):
+class VertexStiffness(BubbleStiffness):
     """The bubbles' stiffness with the nodes that follow them and the averaged volumetric energy of both.
 
     The diagonal is that of the shear alone: a preconditioner. Creation is collective.
@@ -39,7 +39,9 @@ class CondensedStiffness(BubbleStiffness):
         pressures: the averaged volumetric stress of bubbles and nodes, by region.
     """
 
-    def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thresholds: Thresholds) -> None:
+    def __init__(
+        self, problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thresholds: EstimateThresholds
+    ) -> None:
         super().__init__(problem, bubbles)
         self._node_inverse, self._tolerance = inverse, thresholds.vertex_tolerance
         self.at_nodes = fem.Function(problem.space)
@@ -113,7 +115,7 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
         inverse: of the system.
     """
     problem, u = traces.problem, traces.u
-    stiffness = CondensedStiffness(problem, traces.bubbles, inverse, traces.thresholds)
+    stiffness = VertexStiffness(problem, traces.bubbles, inverse, traces.thresholds)
     load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
     between, left = traces.tested()
     load[between.blocks] -= between.values

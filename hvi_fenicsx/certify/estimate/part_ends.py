@@ -27,7 +27,7 @@ from . import support_ends
 from .block_forces import gathered, summed
 from .dual_norm import DualNorm
 from .facet_modes import FacetModes, facet_modes
-from .thresholds import Thresholds
+from .thresholds import EstimateThresholds
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def squares(
     u: fem.Function,
     examination: Examination,
     inverse: DualNorm,
-    thresholds: Thresholds,
+    thresholds: EstimateThresholds,
 ) -> Array:
     """η_K² of the owned cells that the ends of parts add. Collective.
 
@@ -136,7 +136,7 @@ def _held(problem: Problem, part: _Part, forces: Array, examination: Examination
     return lacking
 
 
-def _parts(problem: Problem, bubbles: fem.FunctionSpace, thresholds: Thresholds) -> Iterator[_Part]:
+def _parts(problem: Problem, bubbles: fem.FunctionSpace, thresholds: EstimateThresholds) -> Iterator[_Part]:
     """The parts with `where`. Collective."""
     for name, piece in problem.pieces.items():
         if piece.where is not None:

@@ -8,7 +8,7 @@ from .. import thresholds
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
+class EstimateThresholds:
     """How accurately the estimates are computed.
 
     Attributes:
@@ -58,4 +58,4 @@ class Thresholds:
     coarse: float = 0.1
 
 
-DEFAULT = Thresholds()
+DEFAULT = EstimateThresholds()
