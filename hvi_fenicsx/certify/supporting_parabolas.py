@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..laws import TractionGraph
-from ..laws.arc import Arc
+from ..laws.traction_graph import Arc
 from ..typing import Array
 from .law_state import LawState
 from .thresholds import DEFAULT

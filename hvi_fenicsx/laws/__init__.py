@@ -4,12 +4,10 @@ from ..class_registry import load_modules
 from .base import Superpotential
 from .catalogue import Graph, LinearSpring, QuadraticLinear, QuadraticLinearLiteral, Sawtooth, Tresca
 from .convex_parts import ConvexPart, DifferentiablePart, Directional
-from .lengths import Length
-from .mixity import BenzeggaghKenane, Mixity, PowerLaw, mixities
-from .polyline import PolylineLaw, PolylinePart
+from .lengths import BenzeggaghKenane, Length, Mixity, PowerLaw, mixities
+from .polyline import PolylineLaw, PolylinePart, SampledLaw, sample_traction
 from .registry import available, create, describe
-from .sampled import SampledLaw, sample_traction
-from .thresholds import Thresholds
+from .traction_bounds import Thresholds
 from .traction_graph import TractionGraph
 from .vertex_laws import VertexLaws
 from .weakening import Exponential, WeakeningLaw

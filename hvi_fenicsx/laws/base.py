@@ -20,9 +20,8 @@ from typing_extensions import override
 from ..class_registry import enter
 from ..errors import InputError
 from ..typing import Array, Integers
-from .convex_parts import ConvexPart, Directional, ScaledPart, quotient
+from .convex_parts import ConvexPart, Directional, ScaledPart, SplitLaw, quotient
 from .parameter_checks import require_positive
-from .split_law import SplitLaw
 from .traction_bounds import Extremes, extremes
 from .traction_graph import TractionGraph
 

@@ -17,7 +17,7 @@ from ..errors import InputError
 from .base import Superpotential
 from .parameter_checks import require_count, require_number, require_ordered, require_positive
 from .polyline import PolylineLaw
-from .thresholds import DEFAULT
+from .traction_bounds import DEFAULT
 from .traction_graph import TractionGraph
 
 

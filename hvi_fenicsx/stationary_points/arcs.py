@@ -15,7 +15,7 @@ from typing import cast
 
 import numpy as np
 
-from ..laws.arc import Arc
+from ..laws.traction_graph import Arc
 from ..laws.traction_graph import TractionGraph
 from ..typing import Array, Integers, Mask
 

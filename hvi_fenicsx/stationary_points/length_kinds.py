@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..laws.arc import Arc
+from ..laws.traction_graph import Arc
 from ..typing import Array
 from . import stationarity
 from .arcs import FREE, INF, Chain

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hvi_fenicsx.laws.arc import Arc
+from hvi_fenicsx.laws.traction_graph import Arc
 from hvi_fenicsx.stationary_points.arcs import INF, ROUNDING, Chain, on_interval
 
 

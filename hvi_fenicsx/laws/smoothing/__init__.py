@@ -1,11 +1,9 @@
 """Smoothings: from a law with kinks to one without, at a stated price (docs/laws.md)."""
 
 from ...class_registry import load_modules
-from .base import SmoothedLaw, Smoothing, registered
+from .base import SmoothedLaw, Smoothing, available, create, registered
 from .paper import PaperSmoothedLaw, PaperSmoothing
-from .plus_functions import QUADRATIC, Chks, LogExp, Quadratic
-from .registry import available, create
-from .smoothed_law import PlusFunction, PlusSmoothedLaw
+from .smoothed_law import QUADRATIC, Chks, LogExp, PlusFunction, PlusSmoothedLaw, Quadratic
 
 __all__ = [
     "QUADRATIC",

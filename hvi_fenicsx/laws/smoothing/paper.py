@@ -21,7 +21,7 @@ from ..base import Superpotential
 from ..catalogue import QuadraticLinear
 from ..convex_parts import ConvexPart, DifferentiablePart, folded
 from .base import SmoothedLaw, Smoothing
-from .plus_functions import QUADRATIC
+from .smoothed_law import QUADRATIC
 
 
 class PaperSmoothing(Smoothing):

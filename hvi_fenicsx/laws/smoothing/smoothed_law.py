@@ -11,7 +11,9 @@ downward ones those of G, so H + ε ΣD and G + ε ΣD are convex again: the smo
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -21,10 +23,100 @@ from typing_extensions import override
 
 from ...typing import Array
 from ..base import Superpotential
-from ..convex_parts import ConvexPart, DifferentiablePart, folded
+from ..convex_parts import ConvexPart, DifferentiablePart, folded, quotient
 from ..traction_graph import TractionGraph
 from .base import SmoothedLaw, Smoothing
-from .rounded_kinks import RoundedKinks
+
+_LARGEST = float(np.finfo(np.float64).max)
+
+Profiles = tuple[Array, Array, Array]
+"""D, D' and D'', of one shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoundedKinks:
+    """What plus functions of the widths ε/|jump| add at the kinks of a function.
+
+    Attributes:
+        places: of the kinks, (k,).
+        jumps: of the derivative there, positive or negative, (k,).
+        profile: D, D' and D'' of the plus function at z = |t|/e ≥ 0.
+        epsilon: ε.
+    """
+
+    places: Array
+    jumps: Array
+    profile: Callable[[Array], Profiles]
+    epsilon: float
+
+    def less(self, other: RoundedKinks) -> RoundedKinks:
+        """What is added here less what is added at other kinks.
+
+        Args:
+            other: those.
+        """
+        jumps = np.concatenate([self.jumps, -other.jumps])
+        return RoundedKinks(np.concatenate([self.places, other.places]), jumps, self.profile, self.epsilon)
+
+    @cached_property
+    def _heights(self) -> Array:
+        return np.abs(self.jumps)
+
+    @cached_property
+    def _stiffness(self) -> Array:
+        """By what D'' is multiplied at each kink, (k,)."""
+        with np.errstate(over="ignore"):
+            return np.sign(self.jumps) * np.minimum(self._heights / self.epsilon * self._heights, _LARGEST)
+
+    def profiles(self, x: Array) -> Profiles:
+        """D, D', D'' (m, k) of each point and kink, at their distance in units of the kink's width.
+
+        Args:
+            x: points, (m,).
+        """
+        return self._profiles(np.abs(x[:, None] - self.places))
+
+    def _profiles(self, distances: Array) -> Profiles:
+        with np.errstate(over="ignore"):
+            return self.profile(distances / self.epsilon * self._heights)
+
+    def values(self, profiles: Profiles) -> Array:
+        """What is added to the function, (m,).
+
+        Args:
+            profiles: of the points.
+        """
+        return np.asarray(self.epsilon * (profiles[0] * np.sign(self.jumps)).sum(axis=1))
+
+    def slopes(self, x: Array, profiles: Profiles) -> Array:
+        """What is added to the right derivative, (m,).
+
+        Args:
+            x: points, (m,).
+            profiles: of them.
+        """
+        # Right of a kink the plus function's slope is 1 + D', left of it -D'; the 1 is the function's own jump.
+        turned = np.where(x[:, None] >= self.places, profiles[1], -profiles[1])
+        return np.asarray(turned @ self.jumps)
+
+    def curvatures(self, profiles: Profiles) -> Array:
+        """What is added to the second derivative, (m,).
+
+        Args:
+            profiles: of the points.
+        """
+        with np.errstate(over="ignore"):
+            return np.asarray((profiles[2] * self._stiffness).sum(axis=1))
+
+    def curvature_range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """The least and the largest of these on intervals, where D'' never rises and all jumps are positive, (m,) each.
+
+        Args:
+            low: begin of the intervals, (m,).
+            high: end of the intervals, (m,).
+        """
+        near, far = folded(low[:, None] - self.places, high[:, None] - self.places)
+        return self.curvatures(self._profiles(far)), self.curvatures(self._profiles(near))
 
 
 @dataclass(frozen=True)
@@ -225,3 +317,63 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
         return PlusSmoothedLaw(
             self.law.scaled(length, traction), self.epsilon_absolute / (length * traction), self.plus
         )
+
+
+@dataclass(frozen=True)
+class Quadratic(PlusFunction):
+    """Zang's: 0 for t ≤ -e/2, (t + e/2)²/(2e) between, t for t ≥ e/2. The paper's, and the default.
+
+    The difference from max(t, 0) is zero for |t| ≥ e/2.
+    """
+
+    name = "quadratic"
+    kappa = 1.0 / 8.0
+    bands = (0.5,)
+    unimodal = True
+    parabolic = True
+
+    @override
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
+        rest = np.maximum(0.5 - z, 0.0)
+        return 0.5 * rest**2, -rest, np.where(z < 0.5, 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Chks(PlusFunction):
+    """Chen, Harker, Kanzow, Smale: (t + √(t² + 4e²))/2. Smooth of every order.
+
+    The difference from max(t, 0) is at most e²/|t|.
+    """
+
+    name = "chks"
+    kappa = 1.0
+    unimodal = True
+
+    @override
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
+        root = np.hypot(z, 2.0)
+        # (√(z² + 4) - z)/2 and its derivative, written without the difference of near equals.
+        difference = quotient(np.full_like(z, 2.0), root + z)
+        return difference, -difference / root, 2.0 / root**3
+
+
+@dataclass(frozen=True)
+class LogExp(PlusFunction):
+    """e log(1 + exp(t/e)), the neural networks' softplus. Smooth of every order.
+
+    The difference from max(t, 0) is at most e exp(-|t|/e).
+    """
+
+    name = "log_exp"
+    kappa = math.log(2.0)
+    bands = (2.0, 8.0, 32.0)
+    unimodal = True
+
+    @override
+    def profile(self, z: Array) -> tuple[Array, Array, Array]:
+        small = np.exp(-z)
+        share = small / (1.0 + small)
+        return np.log1p(small), -share, share / (1.0 + small)
+
+
+QUADRATIC = Quadratic()
