@@ -21,7 +21,7 @@ from hvi_fenicsx.compat import NOT_A_NUMBER
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.solvers.condensed import onto_bounds
 from hvi_fenicsx.solvers.context import SolveContext
-from hvi_fenicsx.solvers.law_models import smooth_models
+from hvi_fenicsx.solvers.law_models import VertexModel
 from hvi_fenicsx.solvers.method import Counts, Method, SolveResult
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system.held_solver import HeldPreconditioner
@@ -58,7 +58,7 @@ class SolverRun(ABC):
     def __init__(self, context: SolveContext, x: PETSc.Vec) -> None:
         self.context, self.solver, self.system = context, context.solver, context.system
         self.options = context.options
-        self.models = smooth_models(self.system)
+        self.models = [VertexModel(term.law) for term in self.system.terms]
         self.counts, self.stopped = Counts(), False
         self.residual = x.duplicate()
         self.matrix = self.system.jacobian.matrix.copy()

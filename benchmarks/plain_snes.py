@@ -8,7 +8,7 @@ from petsc4py import PETSc
 
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.law_models import Cells, ExactLaw
+from hvi_fenicsx.solvers.law_models import Cells, VertexModel
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.system import System
@@ -20,7 +20,9 @@ def solve(system: System, tolerance: float) -> dict[str, Any]:
     """Seconds are taken by the caller; iterations, and whether the inequality holds within the tolerance."""
     solver = ActiveSetSolver(system, (), LinearSettings.choose(system, "gamg"), Timer())
     x, _ = resting_start(solver, [t.law for t in system.terms], tolerance)
-    models = [ExactLaw(t.law, Cells.around(t.law.convex, t.argument(x.array_r), radial=t.radial)) for t in system.terms]
+    models = [
+        VertexModel(t.law, Cells.around(t.law.convex, t.argument(x.array_r), radial=t.radial)) for t in system.terms
+    ]
     snes = PETSc.SNES().create(system.comm)
     snes.setType("vinewtonrsls")
     residual, equations, jacobian = system.load.duplicate(), system.equations, system.jacobian

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..runtime.timing import Timer
-from ..solvers.law_models import Cells, ExactLaw
+from ..solvers.law_models import Cells, VertexModel
 from ..system.factorisation import Factorisation, form_of
 from ..system.system import System
 from ..typing import Array, Integers
@@ -57,7 +57,7 @@ def _by_inertia(problem: Problem, u: fem.Function, found: Growth) -> str:
     models = []
     for term in system.terms:
         argument = term.argument(x.array_r)
-        models.append(ExactLaw(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
+        models.append(VertexModel(term.law, Cells.around(term.law.convex, argument, radial=term.radial)))
     system.jacobian.set_rates(system.equations.tangents(x, models))
     strong, weak = np.flatnonzero(found.strong), np.flatnonzero(found.weak)
     with negative_eigenvalues(system) as negative:

@@ -60,7 +60,7 @@ def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable
     )
 
     run = PathRun(prepared, PathTable(memory=False))
-    if not run.is_straight and run.size > prepared.options.thresholds.path.curved_unknowns:
+    if not run.is_straight and 2 * run.size > prepared.options.thresholds.curve_unknowns:
         run.free()
         return failed
     path = run.follow(Control(interrupted=interrupted))
@@ -85,7 +85,7 @@ def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
         return False
     if obstacle_force.pressed(prepared.problem) is not None:
         return False
-    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.options.thresholds.path.vertex_unknowns:
+    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.options.thresholds.vertex_unknowns:
         return False
     system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
     return True

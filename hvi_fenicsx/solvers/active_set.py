@@ -26,7 +26,7 @@ from ..system.system import System
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
 from .snes_views import InactiveSolve, unextracted
-from .thresholds import DEFAULT, FULL_STEPS, ActiveSetThresholds, Thresholds
+from .thresholds import DEFAULT, FULL_STEPS, Thresholds
 
 StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
@@ -70,7 +70,7 @@ class ActiveSetSolver:
         self.system, self.settings, self.timer = system, settings, timer
         self.held = HeldPreconditioner(system, levels, settings, timer)
         self.interrupted, self.thresholds = interrupted, thresholds
-        self.convergence = ConvergenceTest(system, thresholds.active_set)
+        self.convergence = ConvergenceTest(system, thresholds)
         self.progress: StepReport | None = None
         self._residual = system.load.duplicate()
 
@@ -210,7 +210,7 @@ class _SnesRun:
         foundation: float,
     ) -> None:
         self.owner, self.models, self.tolerance = owner, models, tolerance
-        self.thresholds, self.steady, self.foundation = owner.thresholds.active_set, steady, foundation
+        self.thresholds, self.steady, self.foundation = owner.thresholds, steady, foundation
         self.lower, self.upper = lower, upper
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
         self.sizes, self.failure = NOT_MEASURED, ""
@@ -228,7 +228,7 @@ class _SnesRun:
         snes.setObjective(lambda _, x: system.equations.energy(x, self.models))
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=max_iterations)
-        near = self.thresholds.on_bound * float(np.min(system.references.scale))
+        near = self.thresholds.near * float(np.min(system.references.scale))
         with default_options({"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": near}):
             snes.setOptionsPrefix(prefix())
             snes.getKSP().setOptionsPrefix(f"{prefix()}inactive_")
@@ -249,8 +249,8 @@ class _SnesRun:
         Where net forces are left, which residuals by vertex do not tell, its norm falls as far as they have to.
         """
         thresholds = self.thresholds
-        least = thresholds.moving_accuracy if moved else 0.0 if self.steady else thresholds.finest_accuracy
-        wanted = max(thresholds.forcing * self.tolerance, least * self.last)
+        least = thresholds.loose if moved else 0.0 if self.steady else thresholds.accurate
+        wanted = max(thresholds.margin * self.tolerance, least * self.last)
         balanced = not np.any(self.sizes.net > 0.0)
         reached = self.owner.convergence.reaches(wanted, self.sizes.forces) if balanced else None
         return Goal(rtol=wanted / self.last, reached=reached)
@@ -310,10 +310,10 @@ class StallTest:
             search are of use where the energy falls, even if the residual does not.
     """
 
-    def __init__(self, thresholds: ActiveSetThresholds, *, full_steps: bool) -> None:
+    def __init__(self, thresholds: Thresholds, *, full_steps: bool) -> None:
         self._thresholds, self._full_steps = thresholds, full_steps
         self._last = self._least = np.inf
-        self._still = self._slow = self._useless = 0
+        self._still, self._slow, self._useless = False, 0, 0
 
     def gives_up(self, residual: float) -> bool:
         """Whether to give up after a step.
@@ -321,17 +321,12 @@ class StallTest:
         Args:
             residual: relative, after the step.
         """
-        self._note(residual)
-        thresholds, most = self._thresholds, self._thresholds.stalled_steps
-        at_rounding = residual < thresholds.rounding_below
-        circles = self._full_steps and self._useless >= thresholds.useless_steps
-        return self._still >= most or (at_rounding and self._slow >= 2 * most) or circles
-
-    def _note(self, residual: float) -> None:
-        thresholds = self._thresholds
-        self._still = self._still + 1 if abs(residual - self._last) < thresholds.still * self._last else 0
+        thresholds, stood = self._thresholds, self._still
+        self._still = abs(residual - self._last) < thresholds.still * self._last
         self._slow = self._slow + 1 if residual > 0.5 * self._last else 0
-        falls = residual < thresholds.useful_fall * self._least
+        falls = residual < (1.0 - thresholds.still) * self._least
         self._useless = 0 if falls else self._useless + 1
-        self._least = residual if falls else self._least
-        self._last = residual
+        self._least, self._last = min(self._least, residual), residual
+        useless = self._useless if self._full_steps else 0
+        slow = self._slow if residual < thresholds.largest_rounding else 0
+        return (stood and self._still) or max(slow, useless) >= thresholds.useless_steps

@@ -1,28 +1,26 @@
-"""The method where none is named: the branch iteration, from other starts too if it finds no equilibrium.
+"""The method where none is named: the branch iteration from unbroken bonds, and where that fails, the load path.
 
-The unbroken branch comes first. For a narrowly smoothed law, the solution of the unsmoothed law is the next start. For
-a body that rolls or tips on its way to rest, it is the position at rest of the rigid body (:mod:`.rigid_start`). In the
-metastable state the iteration may slide off while an equilibrium exists on other pieces of the laws: starts on the
-pieces of the resting slips, with every bond broken, and a continuation in the smoothing look for it there. Where laws
-push, the only equilibrium may be no minimum of the energy, from which every descent leads away; Newton's method on the
-laws themselves, and through narrowing smoothings, looks for such ones last. Where an equilibrium may not exist, the
-search ends after a number of Newton steps.
+Loading decides which equilibrium is meant, or that there is none (:mod:`.load_path_start`). Where its path is not
+followed, or ends before the whole load, few other starts are tried. Each buys cases that nothing else solves (the hard
+cases, docs/hard-cases.md): bodies at rest on their supports, where they roll or tip on the way; the pieces of the
+slips at rest, and every bond broken, where the iteration slides off in the metastable state; and, where laws push,
+Newton's method through narrowing smoothings, which finds equilibria that are no minimum of the energy
+(:mod:`.newton_continuation`). Where an equilibrium may not exist, the search ends after a number of Newton steps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 
 from petsc4py import PETSc
 
 from ..errors import SolverError
-from ..laws import Superpotential
 from . import load_path_start, newton_continuation
-from .branch import BranchIteration, Continuation
+from .branch import BranchIteration
 from .context import SolveContext
-from .law_models import Majorant
+from .law_models import VertexModel
 from .load_path_start import PathStart
 from .method import Counts, SolveResult
 from .resting_start import at_rest, resting_start
@@ -69,7 +67,7 @@ class Auto(BranchIteration):
 
     def __init__(self, context: SolveContext) -> None:
         self._held, self._interrupted = context.solvability.state == "held", context.solver.interrupted
-        most = None if self._held else context.options.thresholds.branch.search_steps
+        most = None if self._held else context.options.thresholds.search_steps
         self._limit = _StepLimit(context.solver.interrupted, most)
         super().__init__(replace(context, solver=context.solver.with_interruption(self._limit)))
 
@@ -99,21 +97,23 @@ class Auto(BranchIteration):
             return along
         if cut:
             first = BranchIteration(self.context, self._laws, self._epsilon).solve()
-        return first if first.converged or first.interrupted else self._further(first)
-
-    def _further(self, first: SolveResult) -> SolveResult:
-        """The first of the further starts' results that converged; else that of the first start."""
+        if first.converged or first.interrupted:
+            return first
         counts = Counts()
         counts.add(first.counts)
-        for other in self._others():
-            counts.add(other.counts)
-            if other.converged or other.interrupted:
-                return replace(other, counts=counts)
-        return first
+        return self._first_of(self._others(), counts) or first
+
+    def _first_of(self, others: Iterator[SolveResult], counts: Counts) -> SolveResult | None:
+        """The first result that converged or was interrupted; to the counts the iterations of all are added."""
+        for found in others:
+            counts.add(found.counts)
+            if found.converged or (found.interrupted and not self._limit.cut):
+                return replace(found, counts=counts)
+        return None
 
     def _most_without_path(self) -> int | None:
         laws = [term.exact for term in self.system.terms]
-        return load_path_start.first_steps(laws, self.options.thresholds.path)
+        return load_path_start.first_steps(laws, self.thresholds.few_steps, self.options.max_iterations)
 
     def _asks_for_path(self) -> bool:
         """Whether loading decides which equilibrium is meant, or if there is one."""
@@ -126,7 +126,7 @@ class Auto(BranchIteration):
         A body that is held has an equilibrium, be it off the path.
         """
         with self.context.timer("setup"):
-            path = load_path_start.follow(self.system, self.options.thresholds.path, self._interrupted)
+            path = load_path_start.follow(self.system, self.options.thresholds, self._interrupted)
         if path is None or (path.x is None and self._held):
             return None
         if path.x is None:
@@ -144,40 +144,26 @@ class Auto(BranchIteration):
         """
         counts = Counts()
         counts.add(first.counts)
-        resting, _ = resting_start(self.solver, self._laws)
-        for found in self._not_by_loading(resting):
-            counts.add(found.counts)
-            if found.converged or (found.interrupted and not self._limit.cut):
-                return replace(found, counts=counts, off_path=path.reason)
+        found = self._first_of(self._others(self.thresholds.few_steps), counts)
+        if found is not None:
+            return replace(found, off_path=path.reason)
         self._limit.next_start()
         reason = f"no equilibrium on the loading path: {path.reason}"
         return replace(first, counts=counts, interrupted=False, reason=reason, borne=path.borne)
 
-    def _not_by_loading(self, resting: PETSc.Vec) -> Iterator[SolveResult]:
-        """Results from starts that may lead elsewhere than loading does: few steps of each, more where a law pushes."""
-        yield from self._on_other_pieces(resting, self.options.thresholds.path.other_steps)
+    def _others(self, most: int | None = None) -> Iterator[SolveResult]:
+        """Results from other starts, one after the other, each in so many Newton steps at most."""
+        if most is None:
+            yield from self._from_rest()
+        yield from self._on_other_pieces(most)
         self._limit.next_start()
         growths = [term.exact.growth for term in self.system.terms]
         if any(min(growth.minus, growth.plus) < 0.0 for growth in growths):
             yield from self._attempt(newton_continuation.solve, self.context)
 
-    def _others(self) -> Iterator[SolveResult]:
-        """Results from further starts, one after the other."""
-        exact = [term.exact for term in self.system.terms]
-        if any(law is not true for law, true in zip(self._laws, exact, strict=True)):
-            for found in self._attempt(self._iteration(exact).solve):
-                yield from self._from_exact(found)
-        yield from self._from_rest()
+    def _on_other_pieces(self, most: int | None) -> Iterator[SolveResult]:
+        """On the pieces of the slips at rest, and with every bond broken, to either side."""
         resting, _ = resting_start(self.solver, self._laws)
-        yield from self._on_other_pieces(resting)
-        yield from self._attempt(Continuation(self.context).solve)
-        for start in (self.system.undisplaced(), resting):
-            yield from self._attempt(newton_continuation.stay_on_kinks, self.context, start)
-            yield from self._attempt(self._iteration().newton, start)
-        yield from self._attempt(newton_continuation.solve, self.context)
-
-    def _on_other_pieces(self, resting: PETSc.Vec, most: int | None = None) -> Iterator[SolveResult]:
-        """On the pieces of the slips at rest, and with every bond broken, each in so many Newton steps at most."""
         for factor in (1.0, self.thresholds.broken_slip, -self.thresholds.broken_slip):
             pieces = resting.copy()
             pieces.scale(factor)
@@ -189,7 +175,7 @@ class Auto(BranchIteration):
 
         The bonds are as they are at rest, then unbroken.
         """
-        rested = at_rest(self.context, self._laws, self._majorants, self.thresholds.rest_tolerance)
+        rested = at_rest(self.context, self._laws, self._majorants, self.thresholds.accurate)
         if rested is None:
             return
         unbroken = rested[0].duplicate()
@@ -197,18 +183,12 @@ class Auto(BranchIteration):
         for bonds in (rested[0], unbroken):
             yield from self._attempt(self._iteration().solve, rested[0], bonds)
 
-    def _majorants(self, x: PETSc.Vec) -> list[Majorant]:
+    def _majorants(self, x: PETSc.Vec) -> list[VertexModel]:
         return self._convex.majorants(self._convex.cells(x), self._convex.subgradients(x))
 
-    def _from_exact(self, exact: SolveResult) -> Iterator[SolveResult]:
-        """From the unsmoothed law's solution: its sticking vertices slip by less than the width of the smoothing."""
-        if exact.converged:
-            yield from self._attempt(self._iteration().solve, self.system.unknowns(exact.u))
-
-    def _iteration(self, laws: Sequence[Superpotential] | None = None) -> BranchIteration:
-        """A branch iteration in the same context, by default on the same laws."""
-        laws = self._laws if laws is None else laws
-        return BranchIteration(self.context, laws, self._epsilon, check_bounded=True)
+    def _iteration(self) -> BranchIteration:
+        """A branch iteration in the same context, on the same laws."""
+        return BranchIteration(self.context, self._laws, self._epsilon, check_bounded=True)
 
     @staticmethod
     def _attempt(solve: Callable[..., SolveResult], *start: PETSc.Vec | None) -> Iterator[SolveResult]:

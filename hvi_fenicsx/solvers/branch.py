@@ -10,7 +10,7 @@ Newton step with the true curvature is tried and kept if the energy does not ris
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -56,7 +56,7 @@ class BranchIteration(Method):
         check_bounded: bool = False,
     ) -> None:
         super().__init__(context)
-        self.thresholds, self.counts = context.options.thresholds.branch, Counts()
+        self.thresholds, self.counts = context.options.thresholds, Counts()
         self.energies: list[float] = []
         self._laws = [t.law for t in self.system.terms] if laws is None else list(laws)
         self._epsilon = context.epsilon if epsilon is None else epsilon
@@ -113,21 +113,21 @@ class BranchIteration(Method):
     def _descend(self, x: PETSc.Vec, cells: list[Cells], xi: list[Array]) -> Outcome:
         """Convex steps from and into x until ξ no longer changes. The first ξ may be that of another point."""
         outcome, before = no_step(), math.inf
-        for _ in range(self.thresholds.convex_steps):
+        for _ in range(self.thresholds.most_changes):
             cells, outcome, done = self._step(x, cells, xi)
             self._check_fall(before, outcome, x)
             before = self.energies[-1]
             if done:
                 return outcome
             xi = self._convex.subgradients(x)
-        return replace(outcome, converged=False, reason=f"ξ still changes after {self.thresholds.convex_steps} steps")
+        return replace(outcome, converged=False, reason=f"ξ still changes after {self.thresholds.most_changes} steps")
 
     def _off_kinks(self, x: PETSc.Vec) -> PETSc.Vec | None:
         """A point of lower energy, where x is on a kink of G, which hides a descent: both sides are tried."""
-        distance, references = self.thresholds.kink_distance, self.system.references
+        distance, references = self.thresholds.near, self.system.references
         near = [t.reach(distance * references.at(t.surface.blocks)) for t in self.system.terms]
         on = [
-            law.concave.left(a - d) < law.concave.right(a + d) - self.thresholds.kink_jump * law.traction_scale
+            np.abs(a[:, None] - law.concave.kinks) <= d[:, None]
             for law, a, d in zip(self._laws, self._convex.arguments(x), near, strict=True)
         ]
         if not self._convex.anywhere(on):
@@ -159,7 +159,7 @@ class BranchIteration(Method):
 
     def _tolerances(self) -> list[float]:
         """Tolerances of a convex step, one after the other: loose first, unless ξ is expected not to change."""
-        wanted, loose = self.options.tolerance, self.thresholds.loose_tolerance
+        wanted, loose = self.options.tolerance, self.thresholds.coarse_tolerance
         return [wanted] if wanted >= loose or self._straight else [loose, wanted]
 
     @property
@@ -237,9 +237,9 @@ class Continuation(Method):
             start: not used; each width starts from the solution of the width before.
         """
         counts, start, context = Counts(), None, self.context
-        thresholds = self.options.thresholds.branch
-        loose = context.with_options(tolerance=max(thresholds.loose_tolerance, self.options.tolerance))
-        for width in (w for w in thresholds.widths if w > (context.epsilon or 0.0)):
+        thresholds = self.options.thresholds
+        loose = context.with_options(tolerance=max(thresholds.coarse_tolerance, self.options.tolerance))
+        for width in widths(context, 1.0):
             laws = [QUADRATIC.relative(t.exact, width) for t in self.system.terms]
             found = BranchIteration(loose, laws, width, check_bounded=True).solve(start)
             counts.add(found.counts)
@@ -248,3 +248,16 @@ class Continuation(Method):
         last = BranchIteration(context, check_bounded=True).solve(start)
         counts.add(last.counts)
         return replace(last, method=self.name, counts=counts)
+
+
+def widths(context: SolveContext, first: float) -> Iterator[float]:
+    """Relative widths of the smoothing that a continuation goes through, down to the wanted one.
+
+    Args:
+        context: with the wanted width.
+        first: the widest.
+    """
+    width, thresholds = first, context.options.thresholds
+    while width > max(thresholds.narrowest, context.epsilon or 0.0):
+        yield width
+        width *= thresholds.narrowing

@@ -11,7 +11,7 @@ from ..system.levels import Levels
 from ..system.system import System
 from ..typing import Integers
 from .method import SolveResult
-from .thresholds import ActiveSetThresholds
+from .thresholds import Thresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,7 @@ class CoarseStart:
     way: float | None = None
 
 
-def prolonged(start: CoarseStart, system: System, thresholds: ActiveSetThresholds) -> PETSc.Vec:
+def prolonged(start: CoarseStart, system: System, thresholds: Thresholds) -> PETSc.Vec:
     """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective.
 
     Args:
@@ -79,7 +79,7 @@ def _relative_dofs(system: System) -> Integers:
     return np.concatenate([one.surface.dofs.ravel() for one in system.problem.interfaces])
 
 
-def make_admissible(x: PETSc.Vec, system: System, thresholds: ActiveSetThresholds) -> None:
+def make_admissible(x: PETSc.Vec, system: System, thresholds: Thresholds) -> None:
     """Move unknowns within their bounds, onto a bound that only rounding keeps them from, and to prescribed values.
 
     Args:
@@ -88,7 +88,7 @@ def make_admissible(x: PETSc.Vec, system: System, thresholds: ActiveSetThreshold
         thresholds: what counts as on a bound.
     """
     at, d = system.jacobian.rows.dofs, system.problem.scales.dimension
-    near = thresholds.on_bound * system.references.at(at // d)
+    near = thresholds.near * system.references.at(at // d)
     values, lower, upper = (vector.array_r[at] for vector in (x, system.lower, system.upper))
     values = np.where(values <= lower + near, lower, np.where(values >= upper - near, upper, values))
     x.array[at] = values

@@ -9,7 +9,6 @@ f(a, b) = √(a² + b²) - (a + b), and ½‖Φ‖² is minimised by a trust-reg
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,13 +17,13 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 
 from ..errors import InputError
-from ..laws import Superpotential
 from ..system.equations import LawModel
 from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
 from ..system.system import System
 from ..typing import Array, Integers
 from .context import SolveContext
+from .law_models import VertexModel
 from .method import Counts, Method, SolveResult
 
 _STATUS = {
@@ -34,29 +33,6 @@ _STATUS = {
     4: "the merit function falls no more and the steps vanish",
 }
 """Texts for scipy's status."""
-
-
-@dataclass(frozen=True)
-class MeanDerivative:
-    """The law as in the paper's MATLAB formula: at a kink the mean of both sides, sign(0) being 0.
-
-    Attributes:
-        law: j.
-    """
-
-    law: Superpotential
-
-    def value(self, x: Array) -> Array:
-        """Energy per area."""
-        return self.law.value(x)
-
-    def derivative(self, x: Array) -> Array:
-        """The mean of the one-sided derivatives."""
-        return (self.law.left(x) + self.law.right(x)) / 2
-
-    def second(self, x: Array) -> Array:
-        """H'' - G''."""
-        return self.law.convex.second(x) - self.law.concave.second(x)
 
 
 def onto_bounds(system: System, x: PETSc.Vec, residual: PETSc.Vec) -> PETSc.Vec:
@@ -96,7 +72,7 @@ class Condensation(Method):
                 f'solver.method = "{self.name}" is dense and runs in one process, not in {self.system.comm.size}: '
                 'leave out --np (mpirun), or use method = "auto"'
             )
-        self.models = [MeanDerivative(t.law) for t in self.system.terms]
+        self.models = [VertexModel(t.law) for t in self.system.terms]
         self.stopped = False
 
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
@@ -150,8 +126,8 @@ class Condensation(Method):
     def _limits(self) -> dict[str, Any]:
         """When least squares end; not by the gradient, which is small wherever Φ is."""
         thresholds = self.options.thresholds
-        most = min(thresholds.evaluations, self.options.max_iterations)
-        return {"max_nfev": most, "ftol": thresholds.least_decrease, "xtol": thresholds.least_step, "gtol": None}
+        most = self.options.max_iterations
+        return {"max_nfev": most, "ftol": thresholds.energy_rounding, "xtol": thresholds.least_step, "gtol": None}
 
     def _record(self, mixed: _Complementarity, x: Array, points: list[Array]) -> None:
         """Keep and report an accepted point."""

@@ -175,4 +175,4 @@ class SolverOptions:
         if self.second_order is not None:
             return self.second_order
         plane = system.problem.scales.dimension == 2
-        return system.dofs <= (self.thresholds.inertia_plane if plane else self.thresholds.inertia_space)
+        return system.dofs <= (self.thresholds.inertia_plane if plane else self.thresholds.nested_from)

@@ -15,7 +15,7 @@ from ..system.held_solver import Reached
 from ..system.net_forces import ActingForces, Holder, NetForces
 from ..system.system import System
 from ..typing import Array, Mask
-from .thresholds import ActiveSetThresholds
+from .thresholds import Thresholds
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +76,12 @@ class ConvergenceTest:
         thresholds: what counts as rounding, and as being on a bound.
     """
 
-    def __init__(self, system: System, thresholds: ActiveSetThresholds) -> None:
+    def __init__(self, system: System, thresholds: Thresholds) -> None:
         self._system, self._thresholds = system, thresholds
         rows = system.jacobian.rows.dofs
         self._limits = traction_limits(system)[rows]
         self._blocks = rows // system.problem.scales.dimension
-        self._near = thresholds.on_bound * system.references.at(self._blocks)
+        self._near = thresholds.near * system.references.at(self._blocks)
         self._net = NetForceTest(system, thresholds)
 
     def sizes(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> Sizes:
@@ -221,7 +221,7 @@ class NetForceTest:
         thresholds: what counts as being on a bound.
     """
 
-    def __init__(self, system: System, thresholds: ActiveSetThresholds) -> None:
+    def __init__(self, system: System, thresholds: Thresholds) -> None:
         self._system, self._thresholds = system, thresholds
         self._d = system.problem.scales.dimension
         self._contact = (system.jacobian.rows.dofs[:: self._d] // self._d).astype(np.int32)
@@ -253,7 +253,7 @@ class NetForceTest:
             capable=self._capable,
             noise=np.ones(system.references.count),
             summation=0.0,
-            tiny=self._thresholds.along,
+            tiny=self._thresholds.nothing,
         )
         found = [self._relative(net_forces.along(system.references, y, acting)) for y in self._motions]
         return np.array([left for left, _ in found]), np.array([noise for _, noise in found])
@@ -267,7 +267,7 @@ class NetForceTest:
 
     def _relative(self, net: NetForces) -> tuple[float, float]:
         """The largest net force and its rounding, along motions in which anything acts at all."""
-        acts = net.acts(self._thresholds.nothing_acts)
+        acts = net.acts(self._thresholds.nothing)
         scale = np.where(acts, net.scale, np.inf)
         return float(np.max(net.left / scale, initial=0.0)), float(np.max(net.rounding / scale, initial=0.0))
 
@@ -286,7 +286,7 @@ class NetForceTest:
         system = self._system
         bounds = system.bounds[k]
         dofs, sign = bounds.component()
-        normal, near = sign * x.array_r[dofs], self._thresholds.on_bound * system.references.at(bounds.surface.blocks)
+        normal, near = sign * x.array_r[dofs], self._thresholds.near * system.references.at(bounds.surface.blocks)
         return system.problem.bounds[k].surface, bounds.beyond(normal) >= -near
 
     def _local(self, vectors: Array) -> Array:

@@ -22,9 +22,9 @@ from . import kink_bounds
 from .context import SolveContext
 from .convergence import Outcome
 from .fallbacks import Attempt, first_success
-from .law_models import Cells, ExactLaw, Majorant, SecantMajorant
+from .law_models import Cells, VertexModel
 from .method import Counts
-from .thresholds import FULL_STEPS
+from .thresholds import ENERGY, EXACT, FULL_STEPS
 
 UNBOUNDED = "the body slides away on what is left of its bonds"
 
@@ -44,7 +44,7 @@ class ConvexStep:
     ) -> None:
         self._system, self._solver = context.system, context.solver
         self._laws, self._counts, self._check_bounded = laws, counts, check_bounded
-        self._options, self._thresholds = context.options, context.options.thresholds.branch
+        self._options, self._thresholds = context.options, context.options.thresholds
         self._residual = context.system.load.duplicate()
 
     def arguments(self, x: PETSc.Vec) -> list[Array]:
@@ -67,14 +67,14 @@ class ConvexStep:
         moved = arguments if shifts is None else [a + s for a, s in zip(arguments, shifts, strict=True)]
         return [law.concave.left(a) for law, a in zip(self._laws, moved, strict=True)]
 
-    def majorants(self, cells: Sequence[Cells], xi: Sequence[Array]) -> list[Majorant]:
+    def majorants(self, cells: Sequence[Cells], xi: Sequence[Array]) -> list[VertexModel]:
         """H - ξ, by term.
 
         Args:
             cells: where each vertex is kept, by term.
             xi: ξ by term, (m,) each.
         """
-        return [Majorant(law, c, s) for law, c, s in zip(self._laws, cells, xi, strict=True)]
+        return [VertexModel(law, c, s) for law, c, s in zip(self._laws, cells, xi, strict=True)]
 
     def energy(self, x: PETSc.Vec) -> float:
         """The true energy at x. Collective."""
@@ -112,13 +112,13 @@ class ConvexStep:
         Returns:
             The cells at the end, and how it ended.
         """
-        for _ in range(self._thresholds.cell_changes):
+        for _ in range(self._thresholds.most_changes):
             models = self.majorants(cells, xi)
             outcome = self._within(x, models, cells, tolerance, steady=steady)
             moves = self._overloaded(x, models)
             if not outcome.converged or not self.anywhere(moves):
                 return cells, outcome
-            cells = [c.moved(m, self._thresholds.ramp_shrinks) for c, m in zip(cells, moves, strict=True)]
+            cells = [c.moved(m, self._thresholds.narrowing) for c, m in zip(cells, moves, strict=True)]
         return cells, replace(outcome, converged=False, reason="the states of the convex kinks keep changing")
 
     def measure(self, x: PETSc.Vec, cells: Sequence[Cells], xi: Sequence[Array]) -> float:
@@ -194,8 +194,8 @@ class ConvexStep:
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
         if drops is not None:
             lower, upper = kink_bounds.held_on(self._system.terms, (lower, upper), drops)
-        exact = [ExactLaw(law, c) for law, c in zip(self._laws, cells, strict=True)]
-        most = self._thresholds.newton_steps
+        exact = [VertexModel(law, c) for law, c in zip(self._laws, cells, strict=True)]
+        most = self._thresholds.few_steps
         found = self._solver.solve(
             x, exact, self._options.tolerance, lower=lower, upper=upper, line_search=FULL_STEPS, max_iterations=most
         )
@@ -204,7 +204,7 @@ class ConvexStep:
             return found, found.converged and not self.anywhere(self._overloaded(x, exact))
         return found, self.measure(x, cells, self._carried(x, exact, drops)) <= self._options.tolerance
 
-    def _carried(self, x: PETSc.Vec, exact: Sequence[ExactLaw], drops: Sequence[Array]) -> list[Array]:
+    def _carried(self, x: PETSc.Vec, exact: Sequence[VertexModel], drops: Sequence[Array]) -> list[Array]:
         """The ξ that balance what holds vertices on drops, by term, (m,) each."""
         self._system.equations.residual(x, self._residual, exact)
         found = []
@@ -215,43 +215,39 @@ class ConvexStep:
             found.append(middle + np.divide(force, term.weights, out=np.zeros_like(force), where=held))
         return found
 
-    def _overloaded(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
+    def _overloaded(self, x: PETSc.Vec, models: Sequence[VertexModel]) -> list[npt.NDArray[np.int64]]:
         """To which cell each vertex moves whose kink cannot carry its force, by term."""
         if kink_bounds.exist([m.cells for m in models]):
             self._system.equations.residual(x, self._residual, models)
         return self._beyond_kinks(x, models)
 
-    def _beyond_kinks(self, x: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> list[npt.NDArray[np.int64]]:
+    def _beyond_kinks(self, x: PETSc.Vec, models: Sequence[VertexModel]) -> list[npt.NDArray[np.int64]]:
         """As :meth:`_overloaded`, where the residual at x is known."""
         if not kink_bounds.exist([m.cells for m in models]):
             return [np.zeros(len(m.cells.index), dtype=np.int64) for m in models]
-        slack = self._thresholds.kink_slack * self._options.tolerance
+        slack = self._thresholds.margin * self._options.tolerance
         return kink_bounds.overloaded(self._system, x, self._residual, models, slack)
 
     def _within(
-        self, x: PETSc.Vec, models: Sequence[Majorant], cells: Sequence[Cells], tolerance: float, *, steady: bool
+        self, x: PETSc.Vec, models: Sequence[VertexModel], cells: Sequence[Cells], tolerance: float, *, steady: bool
     ) -> Outcome:
         """Minimise the majorant with each vertex kept in its cell, from and into x."""
         bounds = kink_bounds.slip_bounds(self._system, cells)
         attempts = self._attempts(models, steady=steady)
-        return first_success(self._solver, x, attempts, tolerance, bounds, self._counts)
+        most = self._options.max_iterations
+        return first_success(self._solver, x, attempts, tolerance, bounds, self._counts, most)
 
-    def _attempts(self, models: Sequence[Majorant], *, steady: bool) -> Iterator[Attempt | str]:
+    def _attempts(self, models: Sequence[VertexModel], *, steady: bool) -> Iterator[Attempt | str]:
         """Ways to solve the step; after the first failure a reason instead, where it has no solution."""
-        secants = [SecantMajorant(m, m.law.length_scale) for m in models]
-        for secant, search, most in self._thresholds.attempts:
-            yield Attempt(
-                models=secants if secant else models,
-                line_search=search,
-                max_iterations=min(most, self._options.max_iterations),
-                lowers_energy=secant,
-                steady=steady,
-                foundation=self._thresholds.foundation if secant else 0.0,
-            )
-            if not self._check_bounded:
-                self._check_bounded = True
-                if self._is_unbounded([m.xi for m in models]):
-                    yield UNBOUNDED
+        yield Attempt(models=models, line_search=FULL_STEPS, steady=steady)
+        if not self._check_bounded:
+            self._check_bounded = True
+            if self._is_unbounded([m.xi for m in models if m.xi is not None]):
+                yield UNBOUNDED
+        yield Attempt(models=models, line_search=EXACT)
+        secants = [replace(m, secant_from=m.law.length_scale) for m in models]
+        yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
+        yield Attempt(models=models, line_search=FULL_STEPS)
 
     def _is_unbounded(self, xi: Sequence[Array]) -> bool:
         system = self._system

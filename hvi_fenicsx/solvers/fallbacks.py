@@ -13,7 +13,7 @@ from .active_set import ActiveSetSolver
 from .convergence import Outcome
 from .method import Counts
 from .projected_newton import ProjectedNewton
-from .thresholds import EXACT
+from .thresholds import ENERGY, EXACT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,9 +23,6 @@ class Attempt:
     Attributes:
         models: what takes the place of the laws, by term.
         line_search: PETSc's name, or that of the projected Newton method.
-        max_iterations: Newton steps at most.
-        lowers_energy: whether it lowers the energy even where it does not converge; the next attempt then begins where
-            this one ended, else where this one began.
         start: where to begin instead; None for where it would.
         steady: as in :meth:`.ActiveSetSolver.solve`.
         foundation: likewise.
@@ -33,8 +30,6 @@ class Attempt:
 
     models: Sequence[LawModel]
     line_search: str
-    max_iterations: int
-    lowers_energy: bool
     start: PETSc.Vec | None = None
     steady: bool = False
     foundation: float = 0.0
@@ -47,6 +42,7 @@ def first_success(
     tolerance: float,
     bounds: tuple[PETSc.Vec, PETSc.Vec],
     counts: Counts,
+    most: int,
 ) -> Outcome:
     """The outcome of the first attempt that converges, else of the one with the smallest residual. Collective.
 
@@ -57,6 +53,7 @@ def first_success(
         tolerance: as in :meth:`.ActiveSetSolver.solve`.
         bounds: lower and upper bounds.
         counts: gets the iterations of all.
+        most: Newton steps of each at most.
     """
     begin, best = x.copy(), x.copy()
     outcome = found = Outcome(False, 0, 0, float("inf"), "not started")
@@ -67,14 +64,15 @@ def first_success(
         if attempt.start is not None:
             attempt.start.copy(begin)
         begin.copy(x)
-        found = _solve(solver, x, attempt, tolerance, bounds)
+        found = _solve(solver, x, attempt, tolerance, bounds, most)
         counts.add_outcome(found)
         if found.measure < outcome.measure or found.converged:
             outcome = found
             x.copy(best)
         if found.converged or found.interrupted:
             break
-        if attempt.lowers_energy and np.isfinite(found.measure):
+        # an energy that has fallen is kept; else the next attempt begins where this one began
+        if attempt.line_search == ENERGY and np.isfinite(found.measure):
             x.copy(begin)
     best.copy(x)
     for vector in (begin, best):
@@ -83,11 +81,16 @@ def first_success(
 
 
 def _solve(
-    solver: ActiveSetSolver, x: PETSc.Vec, attempt: Attempt, tolerance: float, bounds: tuple[PETSc.Vec, PETSc.Vec]
+    solver: ActiveSetSolver,
+    x: PETSc.Vec,
+    attempt: Attempt,
+    tolerance: float,
+    bounds: tuple[PETSc.Vec, PETSc.Vec],
+    most: int,
 ) -> Outcome:
     """How one attempt ends, from and into x. Collective."""
     if attempt.line_search == EXACT:
-        return ProjectedNewton(solver, attempt.models, *bounds).solve(x, tolerance, attempt.max_iterations)
+        return ProjectedNewton(solver, attempt.models, *bounds).solve(x, tolerance, most)
     return solver.solve(
         x,
         attempt.models,
@@ -95,7 +98,7 @@ def _solve(
         lower=bounds[0],
         upper=bounds[1],
         line_search=attempt.line_search,
-        max_iterations=attempt.max_iterations,
+        max_iterations=most,
         steady=attempt.steady,
         foundation=attempt.foundation,
     )

@@ -12,7 +12,7 @@ from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..system.system import System
 from ..typing import Array, Integers, Mask
-from .law_models import Cells, ExactLaw, Majorant
+from .law_models import Cells, VertexModel
 
 
 def exist(cells: Sequence[Cells]) -> bool:
@@ -73,7 +73,7 @@ def _keep_in_cells(term: LawTerm, cells: Cells, lower: PETSc.Vec, upper: PETSc.V
 
 
 def overloaded(
-    system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant | ExactLaw], slack: float
+    system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[VertexModel], slack: float
 ) -> list[Integers]:
     """To which cell a vertex moves whose kink cannot carry its force: -1, 0 or 1, (m,) by term.
 
@@ -98,7 +98,7 @@ def overloaded(
     return moves
 
 
-def _left_to_radial(system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[Majorant | ExactLaw]) -> Array:
+def _left_to_radial(system: System, x: PETSc.Vec, residual: PETSc.Vec, models: Sequence[VertexModel]) -> Array:
     """The residual (n,) without what contact and the kinks of signed slips hold: laws of |u_t| need not carry that."""
     lower, upper = system.lower.copy(), system.upper.copy()
     for term, model in zip(system.terms, models, strict=True):
@@ -111,9 +111,7 @@ def _left_to_radial(system: System, x: PETSc.Vec, residual: PETSc.Vec, models: S
     return np.where(held, 0.0, residual.array_r)
 
 
-def _signed_moves(
-    term: LawTerm, model: Majorant | ExactLaw, argument: Array, residual: PETSc.Vec, excess: Array
-) -> Integers:
+def _signed_moves(term: LawTerm, model: VertexModel, argument: Array, residual: PETSc.Vec, excess: Array) -> Integers:
     """The moves for a law of a signed slip."""
     c, part, weight = model.cells, model.law.convex, term.weights
     force = np.einsum("md,md->m", term.directions[:, 0, :], term.surface.values(residual.array_r))
@@ -160,7 +158,7 @@ class Shared:
         forces: what bounds and other kinks leave to them, (n,).
     """
 
-    def __init__(self, terms: Sequence[LawTerm], models: Sequence[Majorant | ExactLaw], forces: Array) -> None:
+    def __init__(self, terms: Sequence[LawTerm], models: Sequence[VertexModel], forces: Array) -> None:
         self._terms, self._models, self._forces = terms, models, forces
         self._spare = [self._spare_of(number) for number in range(len(terms))]
 

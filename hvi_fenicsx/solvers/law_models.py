@@ -13,9 +13,8 @@ from typing import Literal
 import numpy as np
 
 from ..laws import ConvexPart, Superpotential
-from ..system.system import System
 from ..typing import Array, Integers
-from .thresholds import DEFAULT, BranchThresholds
+from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Cells:
 
     @classmethod
     def around(
-        cls, part: ConvexPart, x: Array, *, radial: bool = False, thresholds: BranchThresholds = DEFAULT.branch
+        cls, part: ConvexPart, x: Array, *, radial: bool = False, thresholds: Thresholds = DEFAULT.branch
     ) -> Cells:
         """The cells that hold x; on a kink the cell to its right, for a law of |u_t| the stuck one.
 
@@ -73,103 +72,65 @@ class Cells:
         return Cells(self.kinks, self.index + step, self.ramp * (shrinks if np.any(step > 0) else 1.0))
 
 
-def _inside(part: ConvexPart, cells: Cells, x: Array) -> Array:
-    """Derivative of H, continued from inside of the cell to its ends."""
-    if cells.ramp > 0:
-        return part.right(np.maximum(x, cells.ramp)) * np.minimum(x / cells.ramp, 1.0)
-    at_lower, at_upper = x <= cells.lower, x >= cells.upper
-    lower, upper = np.where(at_lower, cells.lower, x), np.where(at_upper, cells.upper, x)
-    return np.where(at_lower, part.right(lower), np.where(at_upper, part.left(upper), part.right(x)))
-
-
-def _curvature(part: ConvexPart, cells: Cells, x: Array) -> Array:
-    """Second derivative of H; on the ramp, that of the ramp."""
-    if cells.ramp > 0:
-        steep = part.right(np.array([cells.ramp])) / cells.ramp
-        return np.where(x < cells.ramp, steep, part.second(np.maximum(x, cells.ramp)))
-    return part.second(x)
+UNDIVIDED = Cells(np.empty(0), np.zeros(1, dtype=np.int64))
+"""The whole line as one cell."""
 
 
 @dataclass(frozen=True)
-class Majorant:
-    """H(x) - ξ x: a convex function that is nowhere less than j, and equal where ξ ∈ ∂G, up to a constant.
+class VertexModel:
+    """What takes the place of a law j = H - G at its vertices: j itself, or with ξ ∈ ∂G its majorant H - ξ.
 
     Attributes:
         law: j.
-        cells: where each vertex stays.
-        xi: ξ, (m,).
+        cells: where each vertex stays; undivided, the mean of both sides counts at kinks, as in the paper's formula.
+        xi: ξ, (m,): the majorant is nowhere less than j, and equal at the arguments of ξ, up to a constant; None: j.
+        secant_from: the stiffness is the secant's H'/x, of slips of this at least, where it exceeds the tangent's.
+            Where H'/x falls with |x| that parabola is greater than H, so that full steps lower the energy
+            (iteratively reweighted least squares; Kačanov); None: the tangent's.
     """
 
     law: Superpotential
-    cells: Cells
-    xi: Array
+    cells: Cells = UNDIVIDED
+    xi: Array | None = None
+    secant_from: float | None = None
 
     def value(self, x: Array) -> Array:
         """Energy per area."""
-        return self.law.convex.value(x) - self.xi * x
+        return self.law.value(x) if self.xi is None else self.law.convex.value(x) - self.xi * x
 
     def derivative(self, x: Array) -> Array:
-        """H' - ξ."""
-        return _inside(self.law.convex, self.cells, x) - self.xi
-
-    def second(self, x: Array) -> Array:
-        """H'' ≥ 0."""
-        return _curvature(self.law.convex, self.cells, x)
-
-
-@dataclass(frozen=True)
-class SecantMajorant:
-    """A majorant with the secant stiffness H'/x where it exceeds H'': where the law is flat, steps remain finite.
-
-    Where H'/x falls with |x| (friction, adhesion) the secant parabola is greater than H, so that full steps lower the
-    energy (iteratively reweighted least squares; Kačanov).
-
-    Attributes:
-        model: the majorant.
-        least: the slip of the secant is this at least.
-    """
-
-    model: Majorant
-    least: float
-
-    def value(self, x: Array) -> Array:
-        """Energy per area."""
-        return self.model.value(x)
-
-    def derivative(self, x: Array) -> Array:
-        """H' - ξ."""
-        return self.model.derivative(x)
-
-    def second(self, x: Array) -> Array:
-        """The larger of tangent and secant stiffness."""
-        traction = np.abs(_inside(self.model.law.convex, self.model.cells, x))
-        return np.maximum(self.model.second(x), traction / np.maximum(np.abs(x), self.least))
-
-
-@dataclass(frozen=True)
-class ExactLaw:
-    """The law j itself, with its true (perhaps negative) curvature.
-
-    Attributes:
-        law: j.
-        cells: where each vertex stays.
-    """
-
-    law: Superpotential
-    cells: Cells
-
-    def value(self, x: Array) -> Array:
-        """Energy per area."""
-        return self.law.value(x)
-
-    def derivative(self, x: Array) -> Array:
-        """H' - G', the middle of G's interval on a kink of G."""
+        """H' less ξ, or less the middle of G's interval."""
         concave = self.law.concave
-        return _inside(self.law.convex, self.cells, x) - (concave.left(x) + concave.right(x)) / 2
+        falling = (concave.left(x) + concave.right(x)) / 2 if self.xi is None else self.xi
+        return self._inside(x) - falling
 
     def second(self, x: Array) -> Array:
-        """H'' - G''."""
-        return _curvature(self.law.convex, self.cells, x) - self.law.concave.second(x)
+        """H'', of j less G''."""
+        if self.xi is None:
+            return self._curvature(x) - self.law.concave.second(x)
+        if self.secant_from is None:
+            return self._curvature(x)
+        secant = np.abs(self._inside(x)) / np.maximum(np.abs(x), self.secant_from)
+        return np.maximum(self._curvature(x), secant)
+
+    def _inside(self, x: Array) -> Array:
+        """Derivative of H, continued from inside of the cell to its ends."""
+        part, cells = self.law.convex, self.cells
+        if cells is UNDIVIDED:
+            return (part.left(x) + part.right(x)) / 2
+        if cells.ramp > 0:
+            return part.right(np.maximum(x, cells.ramp)) * np.minimum(x / cells.ramp, 1.0)
+        at_lower, at_upper = x <= cells.lower, x >= cells.upper
+        lower, upper = np.where(at_lower, cells.lower, x), np.where(at_upper, cells.upper, x)
+        return np.where(at_lower, part.right(lower), np.where(at_upper, part.left(upper), part.right(x)))
+
+    def _curvature(self, x: Array) -> Array:
+        """Second derivative of H; on the ramp, that of the ramp."""
+        part, ramp = self.law.convex, self.cells.ramp
+        if ramp > 0:
+            steep = part.right(np.array([ramp])) / ramp
+            return np.where(x < ramp, steep, part.second(np.maximum(x, ramp)))
+        return part.second(x)
 
 
 @dataclass(frozen=True)
@@ -195,8 +156,3 @@ class TangentAtRest:
     def second(self, x: Array) -> Array:
         """H''(0)."""
         return self.law.convex.second(np.zeros_like(x))
-
-
-def smooth_models(system: System) -> list[ExactLaw]:
-    """The laws with their true curvature, by term; they have no kinks, so each has one cell."""
-    return [ExactLaw(t.law, Cells.around(t.law.convex, np.zeros(len(t.surface.blocks)))) for t in system.terms]

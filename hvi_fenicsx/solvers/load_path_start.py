@@ -25,7 +25,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking
 from ..system.system import System
 from .method import Borne
-from .thresholds import PathThresholds
+from .thresholds import Thresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,16 +55,17 @@ def softens(law: Superpotential) -> bool:
     return 0.0 < unsmoothed.steepest_fall < np.inf if graph is None else bool(np.any(graph.slopes < 0.0))
 
 
-def first_steps(laws: Sequence[Superpotential], thresholds: PathThresholds) -> int | None:
+def first_steps(laws: Sequence[Superpotential], few: int, many: int) -> int | None:
     """Newton steps of a start without the path, before the path is followed; None: any number.
 
     Args:
         laws: the laws.
-        thresholds: these numbers.
+        few: of such steps, where the path is straight between events.
+        many: of them, where it is a curve, which takes longer.
     """
     if not any(softens(law) for law in laws):
         return None
-    return thresholds.quick_steps if _are_straight(laws) else thresholds.curved_steps
+    return few if _are_straight(laws) else many
 
 
 def _are_straight(laws: Sequence[Superpotential]) -> bool:
@@ -72,7 +73,7 @@ def _are_straight(laws: Sequence[Superpotential]) -> bool:
     return all(law.graph is not None for law in laws)
 
 
-def follow(system: System, thresholds: PathThresholds, interrupted: Callable[[], bool]) -> PathStart | None:
+def follow(system: System, thresholds: Thresholds, interrupted: Callable[[], bool]) -> PathStart | None:
     """The start, where its path can be followed in short time; None where it cannot, or is lost. Collective.
 
     A path of other than piecewise linear equations is followed where laws soften and Γc has few unknowns.
@@ -107,7 +108,7 @@ def _expanded(condensation: Condensation, found: FullLoad) -> PathStart:
 
 
 def _on_first_rank(
-    system: System, problem: CondensedProblem, thresholds: PathThresholds, interrupted: Callable[[], bool]
+    system: System, problem: CondensedProblem, thresholds: Thresholds, interrupted: Callable[[], bool]
 ) -> FullLoad | None:
     """Where the path leads, the same on all ranks to the last digit. Collective."""
     if not _is_short(system, problem, thresholds):
@@ -121,11 +122,11 @@ def _on_first_rank(
     return on_root_asking(system.comm, followed, interrupted)
 
 
-def _is_short(system: System, problem: CondensedProblem, thresholds: PathThresholds) -> bool:
+def _is_short(system: System, problem: CondensedProblem, thresholds: Thresholds) -> bool:
     """Whether the path is piecewise linear, or a curve of few unknowns that softening makes worth while."""
     return is_straight(problem) or problem.size <= _most_on_curve([t.exact for t in system.terms], thresholds)
 
 
-def _most_on_curve(laws: Sequence[Superpotential], thresholds: PathThresholds) -> int:
+def _most_on_curve(laws: Sequence[Superpotential], thresholds: Thresholds) -> int:
     """The unknowns up to which a curve is followed: none where no law softens, which makes it worth while."""
-    return thresholds.whole_curve_unknowns if any(softens(law) for law in laws) else 0
+    return thresholds.curve_unknowns if any(softens(law) for law in laws) else 0

@@ -26,7 +26,7 @@ from .coarse_start import CoarseStart
 from .context import RunControl, SolveContext, SolverOptions
 from .method import Counts, Method, SolveResult
 from .quadratic import LinearSolve
-from .thresholds import ActiveSetThresholds
+from .thresholds import Thresholds
 
 _LOG = logger("solvers")
 
@@ -113,10 +113,10 @@ def solve_from_coarser(
         SolverError: a convex step raised the energy.
     """
     if start.result.interrupted or control.interrupted():
-        return _stopped(system, start, options.thresholds.active_set)
+        return _stopped(system, start, options.thresholds)
     kind, found = registry.choose(options, system), start.result
     takes = found.converged and kind.takes_start
-    first = coarse_start.prolonged(start, system, options.thresholds.active_set) if takes else None
+    first = coarse_start.prolonged(start, system, options.thresholds) if takes else None
     context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
     _log_level(system, kind)
     result = kind(context).solve() if first is None else kind(context).solve(first)
@@ -132,7 +132,7 @@ def solve_from_coarser(
     return LevelSolution(system=system, levels=start.levels, result=result)
 
 
-def _stopped(system: System, start: CoarseStart, thresholds: ActiveSetThresholds) -> LevelSolution:
+def _stopped(system: System, start: CoarseStart, thresholds: Thresholds) -> LevelSolution:
     """What was found on the coarser mesh: where the solve is to stop, nothing is set up for it any more. Collective."""
     u = system.displacement(coarse_start.prolonged(start, system, thresholds))
     result = replace(
@@ -174,7 +174,7 @@ def solve_from_displacement(
     levels = coarser_levels(model, system, options, control)
     first = system.unknowns(u)
     first.scale(1.0 / system.problem.scales.displacement)
-    coarse_start.make_admissible(first, system, options.thresholds.active_set)
+    coarse_start.make_admissible(first, system, options.thresholds)
     _log_level(system, kind)
     context = SolveContext.create(system, levels, solvability, options, control)
     result = kind(context).solve(first)

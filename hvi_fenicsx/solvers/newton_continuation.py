@@ -8,7 +8,7 @@ support, until the drop carries what they take up.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..laws import Superpotential
 from ..laws.catalogue import LinearSpring
 from ..laws.smoothing import QUADRATIC
 from ..typing import Array
-from .branch import BranchIteration
+from .branch import BranchIteration, widths
 from .context import SolveContext
 from .method import Counts, SolveResult
 
@@ -32,10 +32,14 @@ def solve(context: SolveContext) -> SolveResult:
     Args:
         context: the system and how to solve it.
     """
+    still = _stay_on_kinks(context, context.system.undisplaced())
+    if still.converged:
+        return still
     found = held = BranchIteration(context, [_SPRING] * len(context.system.terms)).solve()
     counts = Counts()
-    counts.add(held.counts)
-    for width in _widths(context) if held.converged else ():
+    for one in (still, held):
+        counts.add(one.counts)
+    for width in widths(context, context.options.thresholds.widest) if held.converged else ():
         start, laws = (
             found if found.converged else held,
             [QUADRATIC.relative(t.exact, width) for t in context.system.terms],
@@ -51,14 +55,10 @@ def solve(context: SolveContext) -> SolveResult:
     return replace(held, converged=False, counts=counts)
 
 
-def stay_on_kinks(context: SolveContext, x: PETSc.Vec) -> SolveResult:
+def _stay_on_kinks(context: SolveContext, x: PETSc.Vec) -> SolveResult:
     """A stationary point near x at which the vertices that x has on kinks of G stay there. Collective.
 
     No smoothing leads to it where a kink has a traction of one sign only, as a literal law has at zero.
-
-    Args:
-        context: the system and how to solve it.
-        x: where to begin.
     """
     kinks = [_kinks_at(term.law, term.argument(x.array_r)) for term in context.system.terms]
     return BranchIteration(context).newton(x, kinks)
@@ -67,15 +67,6 @@ def stay_on_kinks(context: SolveContext, x: PETSc.Vec) -> SolveResult:
 def _kinks_at(law: Superpotential, argument: Array) -> Array:
     """The kink of G that each argument is exactly on, else NaN."""
     return np.where(np.isin(argument, law.concave.kinks), argument, np.nan)
-
-
-def _widths(context: SolveContext) -> Iterator[float]:
-    """Relative widths of the smoothing, down to the wanted one."""
-    thresholds = context.options.thresholds.branch
-    width = thresholds.widest
-    while width > max(thresholds.narrowest, context.epsilon or 0.0):
-        yield width
-        width *= thresholds.narrowing
 
 
 def _drops(context: SolveContext, smoothed: Sequence[Superpotential], x: PETSc.Vec) -> list[Array]:

@@ -193,7 +193,7 @@ class ObstacleForceSolve:
         if not kind.takes_start:
             return self._anew(way, None)
         first = system.unknowns(before.result.u)
-        coarse_start.make_admissible(first, system, self._options.thresholds.active_set)
+        coarse_start.make_admissible(first, system, self._options.thresholds)
         context = SolveContext.create(system, before.levels, self._solvability, self._options, self._control)
         result = kind(context).solve(first)
         self._counts.add(result.counts)

@@ -20,7 +20,9 @@ from ..system.held_solver import Goal
 from ..typing import Array
 from .active_set import ActiveSetSolver
 from .convergence import Outcome
-from .thresholds import ProjectedNewtonThresholds
+from .thresholds import Thresholds
+
+_ROUNDING = float(np.finfo(np.float64).eps)
 
 
 class ProjectedNewton:
@@ -36,7 +38,7 @@ class ProjectedNewton:
     def __init__(self, solver: ActiveSetSolver, models: Sequence[LawModel], lower: PETSc.Vec, upper: PETSc.Vec) -> None:
         self._solver, self._system, self._models = solver, solver.system, models
         self._lower, self._upper = lower, upper
-        self._thresholds: ProjectedNewtonThresholds = solver.thresholds.projected_newton
+        self._thresholds: Thresholds = solver.thresholds
         self._residual, self._trial = self._system.load.duplicate(), self._system.load.duplicate()
         self._linear = 0
         bodies, d = self._system.problem.bodies, self._system.problem.scales.dimension
@@ -75,7 +77,7 @@ class ProjectedNewton:
                 break
             stalled = 0 if sizes.worst < 0.5 * best else stalled + 1
             best = min(best, sizes.worst)
-            if stalled > self._thresholds.stalled_steps:
+            if stalled > self._thresholds.useless_steps:
                 reason = "the residual no longer falls"
                 break
             if iteration == most or not self._step(x):
@@ -107,7 +109,7 @@ class ProjectedNewton:
         right.array[fixed] = 0.0
         step.set(0.0)
         held.prepare(fixed)
-        self._linear += held.solve(right, step, Goal(rtol=self._thresholds.linear_tolerance))[0]
+        self._linear += held.solve(right, step, Goal(rtol=self._thresholds.accurate))[0]
         step.array[fixed] = 0.0
         right.destroy()
         return step
@@ -119,10 +121,7 @@ class ProjectedNewton:
         behind, ahead = self._slopes(x, step, begin), self._slopes(x, step, end)
         flat = -self._thresholds.flat * behind
         falls = behind < 0.0
-        for _ in range(self._thresholds.doublings):
-            onward = falls & (ahead < -flat)
-            if not np.any(onward):
-                break
+        while np.any(onward := falls & (ahead < -flat) & (end < self._thresholds.runaway)):
             begin, behind = np.where(onward, end, begin), np.where(onward, ahead, behind)
             end = np.where(onward, 2.0 * end, end)
             ahead = self._slopes(x, step, end)
@@ -135,9 +134,7 @@ class ProjectedNewton:
         (begin, end), (behind, ahead) = ends, slopes
         found = np.where(flat > 0.0, end, 0.0)
         left = (flat > 0.0) & (np.abs(ahead) > flat) & (ahead > 0.0)
-        for _ in range(self._thresholds.searches):
-            if not np.any(left):
-                break
+        while np.any(left := left & (begin < end * (1.0 - _ROUNDING))):
             middle = np.where(left, self._between(begin, end, behind, ahead), found)
             slope = self._slopes(x, step, middle)
             found = middle
@@ -151,7 +148,7 @@ class ProjectedNewton:
         """Where a straight line between two slopes is zero, but not too near to the beginning."""
         rise = ahead - behind
         share = np.divide(-behind, rise, out=np.full_like(rise, 0.5), where=rise > 0.0)
-        return np.asarray(begin + np.clip(share, self._thresholds.least_share, 0.5) * (end - begin))
+        return np.asarray(begin + np.clip(share, self._thresholds.flat, 0.5) * (end - begin))
 
     def _slopes(self, x: PETSc.Vec, step: PETSc.Vec, lengths: Array) -> Array:
         """The slopes of the energy along the projected path from x, by body: they share no force. Collective."""

@@ -14,9 +14,10 @@ from petsc4py import PETSc
 from ..system.system import System
 from .convergence import Outcome
 from .fallbacks import Attempt, first_success
-from .law_models import ExactLaw, smooth_models
+from .law_models import VertexModel
 from .method import Counts, Method, SolveResult
 from .resting_start import at_rest, resting_start
+from .thresholds import ENERGY, EXACT, FULL_STEPS
 
 
 def is_equation(system: System) -> bool:
@@ -42,22 +43,21 @@ class LinearSolve(Method):
         Args:
             start: not used; one linear solve needs none.
         """
-        x, models, counts = self.system.undisplaced(), smooth_models(self.system), Counts()
-        outcome = Outcome(False, 0, 0, float("inf"), "not started")
-        for _ in range(self.options.thresholds.linear_solves):
-            outcome = self._step(x, models, outcome.measure)
+        x, models, counts = self.system.undisplaced(), [VertexModel(term.law) for term in self.system.terms], Counts()
+        outcome, left, falls = Outcome(False, 0, 0, float("inf"), "not started"), float("inf"), True
+        while falls and not outcome.converged:
+            outcome = self._step(x, models, left)
             counts.linear += outcome.linear
-            if outcome.converged:
-                break
+            falls, left = outcome.measure < self.options.thresholds.margin * left, outcome.measure
         self.context.tell(self.name, None, 1, outcome.measure, 0)
         reason = "stationary" if outcome.converged else outcome.reason
         return SolveResult(
             u=self.system.displacement(x), method=self.name, converged=outcome.converged, reason=reason, counts=counts
         )
 
-    def _step(self, x: PETSc.Vec, models: Sequence[ExactLaw], left: float) -> Outcome:
+    def _step(self, x: PETSc.Vec, models: Sequence[VertexModel], left: float) -> Outcome:
         """One solve of the residual equation, of which ``left`` is known, and the residual left then. Collective."""
-        rtol = self.options.thresholds.linear_margin * self.options.tolerance / min(left, 1.0)
+        rtol = self.options.thresholds.margin * self.options.tolerance / min(left, 1.0)
         step = self.solver.newton_step(x, np.empty(0, np.int32), models, rtol)
         return self.solver.check_step(step, x, models, self.options.tolerance)
 
@@ -101,27 +101,20 @@ class ConvexProgramme(Method):
     def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
         """Attempts until one converges, from and into x; the outcome of the best one. Collective."""
         bounds = self.system.lower, self.system.upper
-        return first_success(self.solver, x, self._attempts(counts), self.options.tolerance, bounds, counts)
+        tolerance, most = self.options.tolerance, self.options.max_iterations
+        return first_success(self.solver, x, self._attempts(counts), tolerance, bounds, counts, most)
 
     def _attempts(self, counts: Counts) -> Iterator[Attempt]:
         """From the start, then from bodies at rest on their supports."""
-        models = smooth_models(self.system)
-        for number, (search, most) in enumerate(self.options.thresholds.programme_attempts):
-            start = self._from_rest(models, counts) if number == 1 else None
-            limit = min(most, self.options.max_iterations)
-            steady = self.context.steady and number == 0
-            yield Attempt(
-                models=models,
-                line_search=search,
-                max_iterations=limit,
-                lowers_energy=search == "bt",
-                start=start,
-                steady=steady,
-            )
+        models = [VertexModel(term.law) for term in self.system.terms]
+        yield Attempt(models=models, line_search=FULL_STEPS, steady=self.context.steady)
+        yield Attempt(models=models, line_search=FULL_STEPS, start=self._from_rest(models, counts))
+        yield Attempt(models=models, line_search=EXACT)
+        yield Attempt(models=models, line_search=ENERGY)
 
-    def _from_rest(self, models: list[ExactLaw], counts: Counts) -> PETSc.Vec | None:
+    def _from_rest(self, models: list[VertexModel], counts: Counts) -> PETSc.Vec | None:
         """The displacement of bodies at rest on their supports; None where there is none."""
-        rtol = min(self.options.thresholds.branch.rest_tolerance, self.options.tolerance)
+        rtol = min(self.options.thresholds.accurate, self.options.tolerance)
         laws = [term.law for term in self.system.terms]
         rested = at_rest(self.context, laws, lambda _: models, rtol)
         if rested is None:

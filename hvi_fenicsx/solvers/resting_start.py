@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -18,7 +19,7 @@ from ..system.system import System
 from ..typing import Array, Integers
 from .active_set import ActiveSetSolver
 from .context import SolveContext
-from .law_models import Cells, Majorant, SecantMajorant, TangentAtRest
+from .law_models import Cells, TangentAtRest, VertexModel
 
 
 def contact_dofs(system: System) -> Integers:
@@ -45,7 +46,7 @@ def resting_start(
     Returns:
         The displacement, and iterations of the linear solver.
     """
-    rtol = solver.thresholds.start_tolerance if rtol is None else rtol
+    rtol = solver.thresholds.loose if rtol is None else rtol
     system = solver.system
     contact = contact_dofs(system)
     bodies = system.problem.bodies.labels[contact // system.problem.scales.dimension]
@@ -184,10 +185,10 @@ def models(solver: ActiveSetSolver, laws: Sequence[Superpotential], x: PETSc.Vec
         laws: what is solved, by term.
         x: the rigid position.
     """
-    return [SecantMajorant(m, m.law.length_scale) for m in unbroken(solver.system, laws, x)]
+    return [replace(m, secant_from=m.law.length_scale) for m in unbroken(solver.system, laws, x)]
 
 
-def unbroken(system: System, laws: Sequence[Superpotential], x: PETSc.Vec) -> list[Majorant]:
+def unbroken(system: System, laws: Sequence[Superpotential], x: PETSc.Vec) -> list[VertexModel]:
     """H - ξ with unbroken bonds, by term, each vertex in the cell that holds it.
 
     Args:
@@ -199,7 +200,7 @@ def unbroken(system: System, laws: Sequence[Superpotential], x: PETSc.Vec) -> li
     for term, law in zip(system.terms, laws, strict=True):
         a = term.argument(x.array_r)
         cells = Cells.around(law.convex, a, radial=term.radial)
-        found.append(Majorant(law, cells, law.concave.left(np.zeros_like(a))))
+        found.append(VertexModel(law, cells, law.concave.left(np.zeros_like(a))))
     return found
 
 

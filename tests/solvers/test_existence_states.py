@@ -13,7 +13,6 @@ from scenes import DELTA, STEEL, P, Q, Table, block, displacement, model, points
 
 from hvi_fenicsx import Scene, rigid, solve, workflow
 from hvi_fenicsx.cli import main
-from hvi_fenicsx.solvers.thresholds import BranchThresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import boundedness, existence
 from hvi_fenicsx.workflow import Thresholds
@@ -170,7 +169,7 @@ def test_a_convex_step_has_a_solution_as_long_as_its_branch_bears_the_push(
 
 
 def test_the_search_for_an_equilibrium_that_need_not_exist_ends() -> None:
-    brief = Thresholds(solvers=SolverThresholds(branch=BranchThresholds(search_steps=3)))
+    brief = Thresholds(solvers=SolverThresholds(search_steps=3))
     found = solved(block(3, 0.97 * GAMMA, Q, LAW), brief)
     assert found.solvability.state == "metastable"
     assert found.exit_code == 4

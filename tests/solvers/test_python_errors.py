@@ -13,7 +13,7 @@ from scenes import P, model, quadratic_linear, solved
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene import Scene
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.law_models import smooth_models
+from hvi_fenicsx.solvers.law_models import VertexModel
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system.equations import Equations
 from hvi_fenicsx.system.linear_settings import LinearSettings
@@ -67,6 +67,6 @@ def test_a_solve_that_petsc_gives_up_tells_its_linear_iterations(monkeypatch: py
     x, _ = resting_start(solver, [term.law for term in system.terms])
     monkeypatch.setattr(Equations, "tangents", failing_at(2, Equations.tangents, FloatingPointError()))
     bounds = {"lower": system.lower, "upper": system.upper}
-    ended = solver.solve(x, smooth_models(system), 1e-14, line_search="basic", **bounds)
+    ended = solver.solve(x, [VertexModel(term.law) for term in system.terms], 1e-14, line_search="basic", **bounds)
     assert (ended.converged, ended.newton, ended.linear) == (False, 1, 1)
     assert ended.reason.startswith("PETSc error")

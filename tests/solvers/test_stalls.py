@@ -11,13 +11,13 @@ from scenes import model, quadratic_linear
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver, StallTest
-from hvi_fenicsx.solvers.law_models import Cells, ExactLaw
-from hvi_fenicsx.solvers.thresholds import ActiveSetThresholds
+from hvi_fenicsx.solvers.law_models import Cells, VertexModel
+from hvi_fenicsx.solvers.thresholds import Thresholds
 from hvi_fenicsx.system.linear_settings import LinearSettings
 
 
 def steps_until_given_up(residuals: Iterable[float], *, full_steps: bool = True) -> int | None:
-    test = StallTest(ActiveSetThresholds(useless_steps=10), full_steps=full_steps)
+    test = StallTest(Thresholds(useless_steps=10), full_steps=full_steps)
     return next((step for step, residual in enumerate(residuals) if test.gives_up(residual)), None)
 
 
@@ -48,7 +48,7 @@ def test_a_solve_that_is_cut_off_says_so_in_words() -> None:
     x = system.load.duplicate()
     x.set(0.0)
     (term,) = system.terms
-    laws = [ExactLaw(term.law, Cells.around(term.law.convex, term.argument(x.array_r), radial=term.radial))]
+    laws = [VertexModel(term.law, Cells.around(term.law.convex, term.argument(x.array_r), radial=term.radial))]
     found = solver.solve(x, laws, 1e-8, lower=system.lower, upper=system.upper, max_iterations=1)
     solver.destroy()
     assert not found.converged

@@ -11,15 +11,13 @@ from mpi4py import MPI
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.load_paths.following import PathRun
 from hvi_fenicsx.paths.load_path import LoadPath
-from hvi_fenicsx.solvers.thresholds import PathThresholds
 from hvi_fenicsx.workflow import DEFAULT
 
 
 def path_run(table: dict[str, Any], *, formed: bool, comm: MPI.Comm = MPI.COMM_WORLD) -> PathRun:
     """A path that is to be followed with or without S as an array."""
-    limits = PathThresholds(largest_dense=10**6 if formed else 0)
     linear = replace(DEFAULT.solvers.linear, solve_overhead=np.inf if formed else 0.0)
-    thresholds = replace(DEFAULT, solvers=replace(DEFAULT.solvers, path=limits, linear=linear))
+    thresholds = replace(DEFAULT, solvers=replace(DEFAULT.solvers, largest_dense=10**6 if formed else 0, linear=linear))
     scene = Scene.model_validate(table)
     assert scene.path is not None
     return PathRun(prepare(scene, comm, thresholds=thresholds), scene.path)
