@@ -186,6 +186,10 @@ class PolylineLaw(Superpotential):
     def energy_scale(self) -> float:
         return self._scales[1]
 
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return PolylineInUnits(self, length, traction)
+
     @property
     def _corners(self) -> Array:
         """Displacements that mean something where the law has no kink off zero."""
@@ -213,6 +217,40 @@ class PolylineLaw(Superpotential):
         return float(
             np.max(np.abs(np.concatenate([g.left[inside], g.right[inside], self.left(ends), self.right(ends)])))
         )
+
+
+@dataclass(frozen=True)
+class PolylineInUnits(PolylineLaw, register=False):
+    """A polyline law in other units: its table in these.
+
+    Attributes:
+        law: the law.
+        length: the unit of displacements.
+        traction: the unit of tractions.
+    """
+
+    name = "scaled"
+    law: PolylineLaw
+    length: float
+    traction: float
+
+    @override
+    def build(self) -> TractionGraph:
+        return self.law.graph.scaled(self.length, self.traction)
+
+    @override
+    def piece(self, x: Array) -> Integers:
+        return self.law.piece(x * self.length)
+
+    @override
+    @cached_property
+    def _scales(self) -> tuple[float, float]:
+        length, energy = self.law.length_scale, self.law.energy_scale
+        return length / self.length, energy / (self.length * self.traction)
+
+    @override
+    def scaled(self, length: float, traction: float) -> Superpotential:
+        return PolylineInUnits(self.law, self.length * length, self.traction * traction)
 
 
 def _limit(traction: npt.ArrayLike, slope: float) -> float:
@@ -275,7 +313,7 @@ def sample_traction(
         raise InputError(
             f"ends = {list(ends)!r}, samples = {samples!r}: give ascending finite ends > 0 and samples >= 1"
         )
-    pieces = [_sample_piece(traction, a, b, samples, thresholds.inside) for a, b in itertools.pairwise(stops)]
+    pieces = [_sample_piece(traction, a, b, samples) for a, b in itertools.pairwise(stops)]
     size = max(float(np.abs(t).max()) for _, t in pieces)
     points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > thresholds.jump * size else 0.0)]
     for (x, t), follower in zip(pieces, [*pieces[1:], None], strict=True):
@@ -285,14 +323,11 @@ def sample_traction(
     return tuple(points)
 
 
-def _sample_piece(
-    traction: Callable[[Array], Array], a: float, b: float, samples: int, offset: float
-) -> tuple[Array, Array]:
+def _sample_piece(traction: Callable[[Array], Array], a: float, b: float, samples: int) -> tuple[Array, Array]:
     """Abscissae and tractions of a piece; at its ends those just inside, for the one-sided limits."""
     x: Array = np.linspace(a, b, samples + 1, dtype=np.float64)
     inside = x.copy()
-    inside[0] = max(np.nextafter(a, b), a + offset * (b - a))
-    inside[-1] = min(np.nextafter(b, a), b - offset * (b - a))
+    inside[0], inside[-1] = np.nextafter(a, b), np.nextafter(b, a)
     values = np.asarray(traction(inside), dtype=np.float64)
     if values.shape != x.shape or not np.all(np.isfinite(values)):
         raise InputError(

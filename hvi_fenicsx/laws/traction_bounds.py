@@ -21,27 +21,21 @@ class Thresholds:
     """Limits of the search for extreme tractions, and of sampling.
 
     Attributes:
-        resolution: relative sharpness of the bounds.
-        near: the least displacement that is sampled, over the law's length scale.
+        resolution: relative sharpness of the bounds, and the least displacement sampled, over the law's length scale.
         far: the largest displacement that is searched, over the largest of 1, the law's length scale and its kinks;
             beyond it the law's growth is trusted.
         first_samples: displacements of the first grid, in geometric progression.
-        rounds: bisections at most.
         most_intervals: intervals up to which bisection goes on.
         jump: relative to the largest traction, a smaller difference of the limits at an end is not meant as a jump.
         most_drops: drops of a sawtooth: each is a piece of the law, which is looked at at every vertex.
-        inside: how far inside of a piece its one-sided limits are taken, over the piece's length.
     """
 
     resolution: float = 1e-6
-    near: float = 1e-6
     far: float = 1e12
     first_samples: int = 400
-    rounds: int = 80
     most_intervals: int = 200_000
     jump: float = 1e-9
     most_drops: int = 1_000
-    inside: float = 1e-12
 
 
 DEFAULT = Thresholds()
@@ -100,7 +94,9 @@ def _grid(law: SplitLaw, thresholds: Thresholds) -> Array:
     kinks = np.abs(law.kinks)
     reach = thresholds.far * max(unit, 1.0, *kinks)
     return np.asarray(
-        np.unique(np.concatenate([[0.0], kinks, np.geomspace(thresholds.near * unit, reach, thresholds.first_samples)]))
+        np.unique(
+            np.concatenate([[0.0], kinks, np.geomspace(thresholds.resolution * unit, reach, thresholds.first_samples)])
+        )
     )
 
 
@@ -109,18 +105,13 @@ def _supremum(law: SplitLaw, grid: Array, objective: _Objective, thresholds: Thr
     a, b = grid[:-1], grid[1:]
     best = _sample(law, grid, objective)
     tolerance = thresholds.resolution * max(abs(best), _typical(law, grid, objective))
-    bound = np.array([best])
-    for _ in range(thresholds.rounds):
-        bound = _bound(law, a, b, objective)
-        undecided = bound > best + tolerance
-        if not undecided.any() or a.size > thresholds.most_intervals:
-            break
+    while (undecided := (bound := _bound(law, a, b, objective)) > best + tolerance).any():
         a, b = a[undecided], b[undecided]
         middle = 0.5 * (a + b)
+        if a.size > thresholds.most_intervals or np.any((middle == a) | (middle == b)):
+            break
         best = max(best, _sample(law, middle, objective))
         a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
-    else:
-        undecided = bound > best + tolerance
     if undecided.any():
         return float(bound.max())
     return best + tolerance if best > 0 else best

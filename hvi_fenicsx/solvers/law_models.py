@@ -35,9 +35,7 @@ class Cells:
     ramp: float = 0.0
 
     @classmethod
-    def around(
-        cls, part: ConvexPart, x: Array, *, radial: bool = False, thresholds: Thresholds = DEFAULT.branch
-    ) -> Cells:
+    def around(cls, part: ConvexPart, x: Array, *, radial: bool = False, thresholds: Thresholds = DEFAULT) -> Cells:
         """The cells that hold x; on a kink the cell to its right, for a law of |u_t| the stuck one.
 
         Args:
