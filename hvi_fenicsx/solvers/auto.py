@@ -144,7 +144,7 @@ class Auto(BranchIteration):
         """
         counts = Counts()
         counts.add(first.counts)
-        found = self._first_of(self._others(self.thresholds.few_steps), counts)
+        found = self._first_of(self._others(2 * self.thresholds.few_steps), counts)
         if found is not None:
             return replace(found, off_path=path.reason)
         self._limit.next_start()

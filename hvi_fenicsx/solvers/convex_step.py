@@ -195,7 +195,7 @@ class ConvexStep:
         if drops is not None:
             lower, upper = kink_bounds.held_on(self._system.terms, (lower, upper), drops)
         exact = [VertexModel(law, c) for law, c in zip(self._laws, cells, strict=True)]
-        most = self._thresholds.few_steps
+        most = 2 * self._thresholds.few_steps
         found = self._solver.solve(
             x, exact, self._options.tolerance, lower=lower, upper=upper, line_search=FULL_STEPS, max_iterations=most
         )

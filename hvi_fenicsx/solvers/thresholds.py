@@ -78,7 +78,7 @@ class Thresholds:
     coarse_tolerance: float = 1e-4
     still: float = 1e-3
     useless_steps: int = 10
-    few_steps: int = 15
+    few_steps: int = 8
     search_steps: int = 1_000
     most_changes: int = 200
     runaway: float = 1e8
