@@ -15,8 +15,7 @@ from typing import cast
 
 import numpy as np
 
-from ..laws.traction_graph import Arc
-from ..laws.traction_graph import TractionGraph
+from ..laws.traction_graph import Arc, TractionGraph
 from ..typing import Array, Integers, Mask
 
 INF = math.inf
