@@ -17,6 +17,7 @@ import argparse
 import contextlib
 import io
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -170,7 +171,8 @@ def executed(words: list[str], ranks: int) -> tuple[int, str]:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
             return hvi(words), printed.getvalue()
     start = ["mpirun", "-n", str(ranks), sys.executable, "-P", "-m", "mpi4py", "-m", "hvi_fenicsx"]
-    done = subprocess.run([*start, *words], capture_output=True, text=True, check=False, timeout=LIMIT)
+    patient = {**os.environ, "OMPI_MCA_mpi_yield_when_idle": "1"}  # or ranks that wait would take others' cores
+    done = subprocess.run([*start, *words], capture_output=True, text=True, check=False, timeout=LIMIT, env=patient)
     return done.returncode, done.stdout
 
 
