@@ -97,9 +97,9 @@ def _path(summary: Record, folder: Path) -> Record:
         "peak_factor": path["peak_factor"],
         "folds": path["folds"],
         "jumps": rounded([[jump["factor"], jump["released"]] for jump in path["jumps"]][:ROWS]),
-        "balance": rounded([path["work"], path["dissipated"]]),
         "factors": [row["factor"] for row in _numbers(shown, ("factor",))],
-        "energies": [list(row.values()) for row in _numbers(shown, ("energy", "work", "dissipated"))],
+        "energies": [list(row.values()) for row in _numbers(shown, ("energy", "work", "dissipated"))]
+        + [rounded([path["work"], path["dissipated"]])],
         "forces": [list(row.values()) for row in _numbers(shown, forces)],
         "displacements": [list(row.values()) for row in _numbers(shown, moved)],
         "stable": "".join(row["stable"] or "?" for row in shown),
