@@ -120,7 +120,7 @@ def execute(
                     options=options, scene=scene, folder=folder, timer=timer, interrupted=interrupt.requested
                 )
                 code = work(session)
-            on_root(COMM, lambda: [run_log.finish() for run_log in run_logs])
+            on_root(COMM, lambda: _finish(run_logs))
             folder.commit(scene)
             say(console.warnings([*folder.kept, *petsc_options.unread(options.petsc)]))
             first = on_root(COMM, lambda: f"; open {PAGE} there" if (target / PAGE).is_file() else "")
@@ -144,6 +144,12 @@ def on_first_rank(make: Callable[[], H]) -> list[H]:
     made: list[H] = []
     on_root(COMM, lambda: made.append(make()))
     return made
+
+
+def _finish(run_logs: Iterable[log.RunLog]) -> None:
+    """Close logs; an error of writing is raised. Rank 0 only."""
+    for run_log in run_logs:
+        run_log.finish()
 
 
 def say(lines: Iterable[str]) -> None:

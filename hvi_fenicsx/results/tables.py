@@ -63,12 +63,13 @@ def contact_rows(parts: Mapping[str, ContactPart]) -> Iterator[tuple[Any, ...]]:
         parts: by their names, as :func:`.contact_parts.contact_parts` finds them.
     """
     for name, part in parts.items():
-        columns = ([_counted(v) if c in _WHOLE else v for v in part[c].tolist()] for c in CONTACT[1:])
-        yield from zip([name] * len(part), *columns, strict=True)
+        yield from zip([name] * len(part), *(_column(part, column) for column in CONTACT[1:]), strict=True)
 
 
-def _counted(value: float) -> int | None:
-    return int(value) if math.isfinite(value) else None
+def _column(part: ContactPart, name: str) -> list[float | int | None]:
+    """The cells of a column; whole numbers are counts and the numbers of pieces."""
+    values: Any = part[name].tolist()
+    return [int(v) if math.isfinite(v) else None for v in values] if name in _WHOLE else values
 
 
 def boundary_rows(solution: Solution) -> Iterator[tuple[Any, ...]]:
@@ -119,7 +120,7 @@ def write_path(file: Path, path: LoadPath) -> None:
 
 
 def _path_row(path: LoadPath, row: PathRow) -> Iterator[Any]:
-    point = [] if row.point is None else row.point.tolist()
+    point: Any = [] if row.point is None else row.point.tolist()
     yield from (float(row.factor), row.event, row.part, *point, *[None] * (3 - len(point)))
     yield from (float(row.energy), float(row.work), float(row.dissipated), int(row.stable))
     for part in path.parts:

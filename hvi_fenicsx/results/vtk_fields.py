@@ -66,7 +66,7 @@ def _strain_of_parts(problem: Problem, u: Array) -> Array:
     space, d = problem.space, problem.scales.dimension
     cell, variant = basix.CellType[space.mesh.topology.cell_name()], basix.LagrangeVariant.gll_warped
     lagrange = basix.create_element(basix.ElementFamily.P, cell, nodes.degree(space), variant)
-    slopes = lagrange.tabulate(1, nodes.middles_of_parts(space)[:, 1:])[1:, :, :, 0]
+    slopes: Array = np.asarray(lagrange.tabulate(1, nodes.middles_of_parts(space)[:, 1:]))[1:, :, :, 0]
     cells = nodes.owned_cells(space)
     found = np.zeros((len(cells), slopes.shape[1], 3, 3))
     for start in range(0, len(cells), _AT_ONCE):
