@@ -34,7 +34,7 @@ class Basis:
     """
 
     def __init__(self, state: StraightState, rate: Array, driver: int, inverse: CellInverse | None = None) -> None:
-        self._thresholds = state.points.thresholds.exact
+        self._thresholds = state.points.thresholds
         self._state, self._rate, self.driver = state, rate, driver
         if inverse is None or driver != FACTOR:
             self._factorise()
@@ -56,7 +56,7 @@ class Basis:
         """The values that the basis takes to a column, (n,); factorised anew where the inverse has lost digits."""
         found = self.roughly(right)
         left = right - self._product(found, self.driver)
-        if not np.max(np.abs(left), initial=0.0) <= self._thresholds.kept * np.max(np.abs(right), initial=0.0):
+        if not np.max(np.abs(left), initial=0.0) <= self._thresholds.slow * np.max(np.abs(right), initial=0.0):
             self._factorise()
             found = self.roughly(right)
             left = right - self._product(found, self.driver)
@@ -88,10 +88,10 @@ class Basis:
             0 where that, or an exchange, costs no fewer digits: nothing is done; else the direction in which the
             driving variable goes on, relative to before, for the coordinate to go on as it did.
         """
-        if _strength(self.column, changed) >= self._thresholds.weak:
+        if _strength(self.column, changed) >= self._thresholds.small:
             return 0
         spread = self.roughly(self._state.column(changed))
-        if _strength(spread, changed) < self._thresholds.weak:
+        if _strength(spread, changed) < self._thresholds.small:
             return 0
         self._inverse.exchange(spread, changed)
         return 1 if spread[changed] > 0.0 else -1
@@ -114,7 +114,7 @@ class Basis:
             if self.driver != FACTOR:
                 found.exchange(self.column, self.driver)
             left = self._product(found.solve(self._rate), FACTOR) - self._rate
-            allowed = self._thresholds.kept * np.max(np.abs(self._rate), initial=0.0)
+            allowed = self._thresholds.slow * np.max(np.abs(self._rate), initial=0.0)
             known = bool(np.max(np.abs(left), initial=0.0) <= allowed)
         return found if known else None
 

@@ -81,8 +81,8 @@ def ways_on(branch: StraightBranch) -> list[Way]:
     Args:
         branch: it is at the state.
     """
-    points, limits, sizes = branch.points, branch.points.thresholds.exact, branch.sizes()
-    ends = [_ends(branch.state, i, limits.near_end * float(sizes[i])) for i in range(len(points))]
+    points, limits, sizes = branch.points, branch.points.thresholds, branch.sizes()
+    ends = [_ends(branch.state, i, limits.none * float(sizes[i])) for i in range(len(points))]
     branching = [i for i, (backward, forward) in enumerate(ends) if backward != forward]
     if len(branching) > limits.branching:
         return []

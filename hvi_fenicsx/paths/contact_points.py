@@ -11,7 +11,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
 from .lengths import VectorPoints
 from .segments import refuse_shared
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, ROUNDING, FollowingThresholds
 from .vertex_laws import VertexLaw, is_straight, vertex_laws
 
 
@@ -44,7 +44,7 @@ class PointLaws:
     """
 
     def __init__(
-        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: Thresholds = DEFAULT
+        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: FollowingThresholds = DEFAULT
     ) -> None:
         laws = vertex_laws(problem, remember)
         self._problem, self.thresholds, self.vertices = problem, thresholds, laws
@@ -111,10 +111,6 @@ class PointLaws:
         if opening is None:
             return self.laws[k]
         return self.laws[len(self.one) + self._length_of(opening)]
-
-
-ROUNDING = 1e-12
-"""A stiffness below this share of the largest is none: the unknown moves with a body that is free."""
 
 
 def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence[Integers]) -> tuple[float, Array]:

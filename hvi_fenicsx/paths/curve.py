@@ -45,7 +45,7 @@ class Curve(Events):
         self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float, fineness: float = 1.0
     ) -> None:
         super().__init__(constant, rate, points, z, factor)
-        self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, self.limits.shortest
+        self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, self.limits.standing
         self._next = self.length
         self.disagreement: Callable[[Arc], float] = lambda move: 0.0
         self._size = self._extent()
@@ -114,7 +114,7 @@ class Curve(Events):
         first, until, safe = float(np.min(ways, initial=np.inf)), self._until(aim), self._safe()
         way = min(first, until, safe)
         # what ends with the factor at its aim goes on from there, if at all
-        if until <= way * (1.0 + 0.1 * self.limits.rounding):
+        if until <= way * (1.0 + 0.1 * self.limits.reached):
             way = until
             outcome, point, condition = Outcome.FACTOR, None, self.at_factor(aim)
         elif way == first:

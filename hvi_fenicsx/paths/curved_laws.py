@@ -10,7 +10,7 @@ import numpy as np
 from ..laws import Superpotential
 from ..typing import Array, Integers, Mask
 from .segments import Segment, between
-from .thresholds import CurveThresholds
+from .thresholds import FollowingThresholds
 from .vertex_laws import VertexLaw
 
 
@@ -104,7 +104,7 @@ class Deviations:
         thresholds: how far inside the ends of pieces the law is taken, and how far steps go.
     """
 
-    def __init__(self, laws: Sequence[Sequence[VertexLaw]], thresholds: CurveThresholds) -> None:
+    def __init__(self, laws: Sequence[Sequence[VertexLaw]], thresholds: FollowingThresholds) -> None:
         self._thresholds = thresholds
         self._m = len(laws)
         curved = [(k, law) for k, several in enumerate(laws) for law in several if law.curved]
@@ -143,7 +143,7 @@ class Deviations:
         """
         found, slopes = np.zeros(self._m), np.zeros(self._m)
         for group in self._groups:
-            live = group.gathered(self._thresholds.inset)
+            live = group.gathered(self._thresholds.rounding)
             if live.points.size:
                 lacking, steeper = live.lacks(group.law, x[live.points])
                 found += np.bincount(live.points, lacking, minlength=self._m)
@@ -158,7 +158,7 @@ class Deviations:
         """
         found = np.full(self._m, np.inf)
         for group in self._groups:
-            points = group.gathered(self._thresholds.inset).points
+            points = group.gathered(self._thresholds.rounding).points
             np.minimum.at(found, points, self._thresholds.reach * (group.law.length_scale + np.abs(x[points])))
         return found
 

@@ -26,9 +26,7 @@ class Distances:
         rounding: a displacement this near to a break of a law, or to a bound, may be there.
     """
 
-    def __init__(
-        self, problem: CondensedProblem, remember: Collection[int], rounding: float = DEFAULT.curve.near_break
-    ) -> None:
+    def __init__(self, problem: CondensedProblem, remember: Collection[int], rounding: float = DEFAULT.reached) -> None:
         self._rounding = rounding
         self._factors = factors(problem)
         self._problem = multiplied(problem, self._factors)
@@ -158,5 +156,5 @@ class StateOnGraphs:
     def _change(self, load: Array) -> Array:
         if self._points.straight:
             return StraightState(self._points, self._z).inverse().solve(load)
-        matrix, rank = self._points.jacobian(self._points.values(self._z)), self._points.thresholds.curve.rank
+        matrix, rank = self._points.jacobian(self._points.values(self._z)), self._points.thresholds.rounding
         return np.asarray(np.linalg.lstsq(matrix, load, rcond=rank)[0])

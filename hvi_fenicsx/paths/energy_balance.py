@@ -142,7 +142,7 @@ class EnergyBalance:
         for sign, ends in ((-1.0, before), (1.0, after)):
             change += sign * (ends.energy - ends.elastic + ends.dissipated - ends.constant)
         size = max(self._size, before.size, after.size)
-        return abs(change) / (self._points.thresholds.curve.agreed * size or 1.0)
+        return abs(change) / (self._points.thresholds.agreed * size or 1.0)
 
     def _strained(self, arc: Arc) -> float:
         """The change of ½ xᵀ S x, without the rounding that large displacements leave in each of its ends."""

@@ -13,7 +13,7 @@ from ..typing import Array, Integers
 from .branch import Branch, Refused
 from .relations import ContactPoints, Values
 from .rigid_motions import are_same
-from .thresholds import DEFAULT, CurveThresholds
+from .thresholds import DEFAULT, FollowingThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class Equations(Branch):
     def __init__(self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float) -> None:
         self._rate, self.points, self._most = rate, points, 0.0
         self.trend, self.unstable = 0, 0
-        self.limits = points.thresholds.curve
+        self.limits = points.thresholds
         largest = float(np.max(np.abs(rate) / points.forces, initial=0.0))
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
@@ -96,7 +96,7 @@ class Equations(Branch):
     @override
     def rising(self) -> float:
         rate, tangent = float(self.here.tangent[-1]), self.here.tangent
-        return rate if abs(rate) > self.limits.rounding * float(np.max(np.abs(tangent))) else 0.0
+        return rate if abs(rate) > self.limits.reached * float(np.max(np.abs(tangent))) else 0.0
 
     @override
     def at_rest(self, peak: float) -> bool:
@@ -160,7 +160,7 @@ class Equations(Branch):
             numpy.linalg.LinAlgError: the function stands along the curve.
         """
         found = self._tangent(values, row, sign)
-        for _ in range(self.limits.directions):
+        for _ in range(self.limits.many):
             setting_out = self.points.setting_out(values, found[:-1])
             if setting_out is None or np.allclose(setting_out.energies, values.energies, rtol=1e-14, atol=0.0):
                 break
@@ -184,7 +184,7 @@ class Equations(Branch):
         for _ in range(self.limits.refinements):
             step = factors.across(change_along(found))
             change = float(np.max(np.abs(step)))
-            if not change <= self.limits.slow * last:
+            if not change <= self.limits.near * last:
                 return found if change <= 1e-13 * size else None
             found, last = found - step, change
             if change <= 1e-15 * size:
@@ -205,7 +205,7 @@ class Equations(Branch):
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
         length = float(np.max(np.abs(y - self.here.y)))
         noise = max(1e-10 * (1.0 + length), 1e-14 / self._sharpness(gradient(y)) * size)
-        expected = self.limits.slow * length
+        expected = self.limits.near * length
         for _ in range(limits.corrections):
             values = self.points.values(y[:-1])
             left, off = self.residual(y, values), value(y)
@@ -217,10 +217,10 @@ class Equations(Branch):
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
             y = y - step
-            allowed = max(noise, limits.part * length) if digits else noise
+            allowed = max(noise, limits.slow * length) if digits else noise
             if change <= 1e-14 * size or (change <= allowed and change >= 0.1 * last):
                 return y
-            last, expected = change, self.limits.slow * change
+            last, expected = change, self.limits.near * change
         if last <= noise:
             return y
         raise Refused
@@ -365,7 +365,7 @@ class Bordered:
         numpy.linalg.LinAlgError: the matrix is singular.
     """
 
-    def __init__(self, matrix: Array, thresholds: CurveThresholds = DEFAULT.curve) -> None:
+    def __init__(self, matrix: Array, thresholds: FollowingThresholds = DEFAULT) -> None:
         self._thresholds = thresholds
         self._row = matrix[-1].copy()
         self._exchanges: list[_Exchange] = []
@@ -392,12 +392,12 @@ class Bordered:
             columns: their numbers, (k,).
             values: the new ones, (n, k).
         """
-        if len(self._exchanges) == self._thresholds.exchanges:
+        if len(self._exchanges) == self._thresholds.many:
             return False
         spike = np.stack([self._solved(np.append(v, self._row[i])) for i, v in zip(columns, values.T, strict=True)], 1)
         own = spike[columns]
         size = float(np.max(np.abs(spike)))
-        if not np.isfinite(size) or np.linalg.svd(own, compute_uv=False)[-1] <= self._thresholds.across * size:
+        if not np.isfinite(size) or np.linalg.svd(own, compute_uv=False)[-1] <= self._thresholds.small * size:
             return False
         spike[columns] -= np.eye(len(columns))
         self._exchanges.append(
@@ -419,7 +419,7 @@ class Bordered:
         Args:
             row: the row, (n + 1,).
         """
-        return abs(float(row @ self.along)) > self._thresholds.across * float(np.linalg.norm(row)) * self._length
+        return abs(float(row @ self.along)) > self._thresholds.small * float(np.linalg.norm(row)) * self._length
 
     def step(self, left: Array, row: Array, value: float) -> Array:
         """The change that takes out what is left of the equations and of another row, (n + 1,).

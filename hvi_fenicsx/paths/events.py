@@ -101,7 +101,7 @@ class Events(Equations):
         shares = self._shares(move)
         rest = y[-1] - aim / self.unit
         over = rest * (start.y[-1] - aim / self.unit) < 0.0 and move.outcome is not Outcome.FACTOR
-        beyond = abs(rest) / abs(y[-1] - start.y[-1]) if over and abs(rest) > self.limits.rounding else 0.0
+        beyond = abs(rest) / abs(y[-1] - start.y[-1]) if over and abs(rest) > self.limits.reached else 0.0
         point = int(np.argmin(shares)) if shares.size else 0
         if over and abs(rest) > 1e-13 * (1.0 + abs(y[-1])) and 1.0 - beyond <= float(np.min(shares, initial=1.0)):
             guess = start.y + (1.0 - beyond) * (y - start.y)
@@ -126,7 +126,7 @@ class Events(Equations):
         return found
 
     def _moved(self, outcome: Outcome, point: int | None, y: Array) -> Arc:
-        if float(self.here.tangent @ (y - self.here.y)) < -self.limits.rounding:
+        if float(self.here.tangent @ (y - self.here.y)) < -self.limits.reached:
             raise Refused
         move = Arc(outcome=outcome, point=point, before=self.here, after=self._after(y))
         if outcome is Outcome.END and not self._arrives(move):
@@ -177,7 +177,7 @@ class Events(Equations):
     def _up_to(self, move: Arc, outcome: Outcome, point: int | None) -> Arc | None:
         """The step up to where a rate of the factor, now or in the mean, or of a point is 0; None: it is too short."""
         whole = float(self.here.tangent @ (move.after.y - self.here.y))
-        if whole <= self.limits.shortest:
+        if whole <= self.limits.standing:
             return None
         rate = self._rate_of(outcome, point)
         if rate(self.here) * rate(move.after) >= 0.0:

@@ -97,7 +97,7 @@ class Follower(LoadHistory):
         return z
 
     def _at_no_load(self, z: Array, towards: float) -> Array | Nowhere:
-        held = self._is_held(self._options.thresholds.settling.first_load * towards)
+        held = self._is_held(self._options.thresholds.small * towards)
         return settled(self._problem, self._points, z, towards, self._watcher, held=held)
 
     def _loaded(self, constant: CondensedProblem) -> Array | None:
@@ -148,7 +148,7 @@ class Follower(LoadHistory):
     @override
     def _towards(self, aim: float) -> Iterator[PathState]:
         self._orient(aim)
-        self._cycles = Cycles(self._x, self._options.thresholds.exact.same_place)
+        self._cycles = Cycles(self._x, self._options.thresholds.undecided)
         while self.end is None and self.factor != aim:
             if self._adrift or self._must_jump(aim):
                 yield from self._taken_up() if self._adrift else self._jump(aim)
@@ -224,7 +224,7 @@ class Follower(LoadHistory):
             return self._state(state.event, place=state.place, bifurcation=True)
         if found is Cycle.CLOSED or (found is not None and self._points.straight):
             self._go_round(found)
-        elif self._cycles.standing > self._options.thresholds.exact.standing + 4 * len(self._points):
+        elif self._cycles.standing > self._options.thresholds.waits + 4 * len(self._points):
             self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
         return state
 
@@ -273,7 +273,7 @@ class Follower(LoadHistory):
         """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""
         yield landed
         self._empty_jumps = 0 if landed.released > 1e-12 * abs(landed.energy) else self._empty_jumps + 1
-        if self._empty_jumps > self._options.thresholds.jump.empty:
+        if self._empty_jumps > self._options.thresholds.empty:
             self._lose(self.factor, f"at the factor {self.factor:.6g} jumps release no energy: rounding alone leads on")
             yield self._state(Event.END)
 

@@ -13,7 +13,7 @@ from ..typing import Array
 from .follower import Follower
 from .state import End, Follow, PathOptions, PathState, Watch
 from .substitutions import without_fixed
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, FollowingThresholds
 from .vertex_laws import is_straight
 
 
@@ -46,7 +46,7 @@ class FullLoad:
 
 
 def at_full_load(
-    problem: CondensedProblem, most_events: int, watch: Watch | None = None, thresholds: Thresholds = DEFAULT
+    problem: CondensedProblem, most_events: int, watch: Watch | None = None, thresholds: FollowingThresholds = DEFAULT
 ) -> FullLoad | None:
     """The equilibrium to which a path leads. None where this says nothing: the path is lost, or does not begin.
 

@@ -18,7 +18,7 @@ from .motion import Relaxation
 from .relations import ContactPoints
 from .segments import Kind, Segment
 from .state import Watch
-from .thresholds import SettlingThresholds
+from .thresholds import FollowingThresholds
 
 
 class Nowhere(Enum):
@@ -90,13 +90,13 @@ def settled(
         watch: whether to stop, and who is told of the motion.
         held: whether there is an equilibrium at this factor, so that no way leads off.
     """
-    limits = points.thresholds.settling
-    first = limits.first_load * towards
+    limits = points.thresholds
+    first = limits.small * towards
     watch.jumps(first)
     motion = Relaxation(problem, points, z, problem.load(first), held=held, step=watch.step)
     if not motion.run(np.zeros(len(points))) or motion.escapes:
         return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
-    heading, most = -int(np.sign(first)), limits.steps + limits.more_steps * len(points)
+    heading, most = -int(np.sign(first)), limits.many + limits.waits * len(points)
     try:
         branch = branch_from(points, problem.force, problem.force_rate, motion.z, first, heading=heading)
         branch.set_out(heading, watch.step)
@@ -111,7 +111,7 @@ def settled(
     return Nowhere.UNKNOWN
 
 
-def no_load(problem: CondensedProblem, x: Array, first: float, limits: SettlingThresholds) -> float:
+def no_load(problem: CondensedProblem, x: Array, first: float, limits: FollowingThresholds) -> float:
     """A factor that is none: beside the first one, and beside the rounding of the elastic forces.
 
     Args:
@@ -123,7 +123,7 @@ def no_load(problem: CondensedProblem, x: Array, first: float, limits: SettlingT
     stiffest = float(np.max(problem.elastic.diagonal, initial=0.0))
     rounding = np.finfo(float).eps * stiffest * float(np.max(np.abs(x), initial=0.0))
     load = float(np.max(np.abs(problem.force_rate), initial=0.0)) or 1.0
-    return max(limits.no_load * abs(first), limits.roundings * rounding / load)
+    return max(limits.none * abs(first), limits.roundings * rounding / load)
 
 
 def constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> CondensedProblem | None:

@@ -66,9 +66,9 @@ class Jump(ABC):
 
     def landing(self) -> Landing | None:
         """Where it leads; None where this was not found, with the points where they were."""
-        limits, kept = self._points.thresholds.jump, self._points.kept()
-        many = limits.steps + limits.later_steps * len(self._points)
-        first, later = (many, 0) if self._points.straight else (limits.steps, many)
+        limits, kept = self._points.thresholds, self._points.kept()
+        many = limits.many + limits.waits * len(self._points)
+        first, later = (many, 0) if self._points.straight else (limits.many, many)
         ways: list[Callable[[], Landing | None]] = [
             lambda: self._held_back(first),
             self._released,
@@ -115,7 +115,7 @@ class Jump(ABC):
 
     @property
     def _most_standing(self) -> int:
-        return self._points.thresholds.exact.standing + 4 * len(self._points)
+        return self._points.thresholds.waits + 4 * len(self._points)
 
     @abstractmethod
     def _none(self, branch: Branch) -> float:
@@ -151,7 +151,7 @@ class Jump(ABC):
     def _pushed_off(self) -> Landing | None:
         """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
         rate = self._problem.force_rate
-        push = self._points.thresholds.jump.push * self._heading
+        push = self._points.thresholds.slow * self._heading
         push = push * np.max(np.abs(self._load)) / np.max(np.abs(rate), initial=1e-300)
         found = self._relaxed(self._z.copy(), self._load + push * rate)
         return found if found is None or found.z is None else self._come_to_rest(found.z)
@@ -178,12 +178,12 @@ class StraightJump(Jump):
 
     @override
     def _none(self, branch: Branch) -> float:
-        return self._points.thresholds.exact.balanced * float(np.max(np.abs(self._load), initial=0.0))
+        return self._points.thresholds.none * float(np.max(np.abs(self._load), initial=0.0))
 
     @override
     def _beyond(self) -> Array:
         assert isinstance(self._branch, StraightBranch)
-        return self._branch.beyond(self._points.thresholds.jump.beyond)
+        return self._branch.beyond(self._points.thresholds.near)
 
 
 def _restraints_of(path: StraightBranch, inverse: CellInverse) -> Iterator[Array]:
@@ -237,7 +237,7 @@ class CurvedJump(Jump):
         curve = Curve(self._load, restraint * float(np.mean(points.forces)), points, self._z.copy(), 0.0)
         curve.head(row)
         tangent = curve.here.tangent
-        if any(np.allclose(tangent, other, rtol=0.0, atol=curve.limits.rounding) for other in self._tried):
+        if any(np.allclose(tangent, other, rtol=0.0, atol=curve.limits.reached) for other in self._tried):
             return None
         self._tried.append(tangent)
         if curve.rising > 1e-7:
@@ -269,7 +269,7 @@ class CurvedJump(Jump):
     def _beyond(self) -> Array:
         curve = Curve(self._problem.force, self._problem.force_rate, self._points, self._z.copy(), 0.0)
         curve.place(self._here.y.copy(), self._here.tangent)
-        curve.length = self._points.thresholds.jump.beyond
+        curve.length = self._points.thresholds.near
         return curve.advance(np.inf).after.y[:-1]
 
 
@@ -331,7 +331,7 @@ def _motions(problem: CondensedProblem, points: ContactPoints, here: Place, path
     else:
         found = [path]
     seen: list[Array] = []
-    same = points.thresholds.jump.same
+    same = points.thresholds.small
     for motion in found:
         size = float(np.max(np.abs(motion), initial=0.0))
         if size and not any(np.allclose(motion / size, other, rtol=0.0, atol=same) for other in seen):

@@ -87,7 +87,7 @@ class LoadHistory(ABC):
     @property
     def _small(self) -> float:
         """A difference of factors that does not count."""
-        return self._options.thresholds.at_limit * max(map(abs, self._options.programme))
+        return self._options.thresholds.slow * max(map(abs, self._options.programme))
 
     def _limit(self, factor: float) -> float:
         """The last factor that may be borne, from one on towards the aim of the present leg."""

@@ -11,9 +11,7 @@ import numpy as np
 from ..errors import ExitCode
 from ..typing import Array
 from .state import End, Event
-
-_ROUNDING = 1e-9
-"""A part of the largest factor that is zero beside it."""
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +86,7 @@ class LoadPath:
     def peak(self) -> int:
         """The row of the largest factor that is borne, in the direction in which the path begins."""
         size = np.abs(self.factors)
-        ahead = self.factors[np.flatnonzero(size > _ROUNDING * np.max(size, initial=0.0))[:1]]
+        ahead = self.factors[np.flatnonzero(size > DEFAULT.none * np.max(size, initial=0.0))[:1]]
         return int(np.argmax(self.factors * np.sign(ahead))) if len(ahead) else 0
 
     @property
@@ -140,7 +138,7 @@ class LoadPath:
     def _at_peak(self, factor: float) -> bool:
         """Whether a factor is the largest one but for rounding; both are negative where a path begins that way."""
         peak = self.rows[self.peak].factor
-        return abs(factor - peak) <= _ROUNDING * abs(peak)
+        return abs(factor - peak) <= DEFAULT.none * abs(peak)
 
     @property
     def ending(self) -> str:
@@ -152,7 +150,7 @@ class LoadPath:
     def _shown(self, number: int) -> str:
         """The factor of a row in digits; 0 where it is rounding."""
         factor = self.factors[number]
-        return f"{factor:.6g}" if abs(factor) > _ROUNDING * np.max(np.abs(self.factors)) else "0"
+        return f"{factor:.6g}" if abs(factor) > DEFAULT.none * np.max(np.abs(self.factors)) else "0"
 
     def strongest(self, part: str) -> int:
         """The row in which the resultant at a part is largest.

@@ -59,7 +59,7 @@ class Relaxation:
         step: Callable[[], None],
     ) -> None:
         self._problem, self._points, self._load, self._step = problem, points, load, step
-        self._limits = points.thresholds.jump
+        self._limits = points.thresholds
         self.z, self.escapes, self.theta = z.copy(), False, 1.0
         self._infinite = np.inf if held else self._limits.far * (points.scale + self._extent())
 
@@ -79,7 +79,7 @@ class Relaxation:
             self._points.elastic = elastic
 
     def _moved(self) -> bool:
-        for _ in range(self._limits.times + self._limits.more_times * len(self._points)):
+        for _ in range(self._limits.times * (1 + len(self._points))):
             if self._at_rest():
                 return self._settled()
             if self._is_out_of_reach():
@@ -115,7 +115,7 @@ class Relaxation:
         self._points.elastic = self._problem.elastic
         z = branch_from(self._points, self._load, np.zeros_like(self._load), self.z, 0.0).balanced(0.0)
         values, low, high = self._points.values(z), self._points.low, self._points.high
-        allowed = self._points.thresholds.curve.rounding * (1.0 + np.abs(values.s))
+        allowed = self._points.thresholds.reached * (1.0 + np.abs(values.s))
         beyond = np.maximum(low - values.s, values.s - high) > allowed
         if np.any(beyond) or self._points.unstable_directions(values):
             return False
@@ -141,7 +141,7 @@ class Relaxation:
         branch = branch_from(points, points.elastic @ values.x + values.force, left, self.z, 0.0)
         branch.set_out(1.0, self._step)
         if isinstance(branch, Curve):
-            branch.shortest = self._limits.shortest
+            branch.shortest = self._limits.small
         went = self._followed(branch)
         self.z = branch.z.copy()
         if points.on_drops():

@@ -166,7 +166,7 @@ class Crossing:
         """
         values, stiffest = self._curve.here.values, float(np.max(np.diag(self._points.stiffness)))
         forces = (stiffest * np.abs(values.moves) + np.abs(values.rises)) * np.abs(self._all_rates())
-        return bool(forces[k] <= self._limits.slow_force * np.max(forces))
+        return bool(forces[k] <= self._limits.slow * np.max(forces))
 
     def _turned_back(self, k: int, *, forward: bool) -> Array:
         """Coordinates and factor on the secant of where the bonds have been, (n + 1,)."""
@@ -174,7 +174,7 @@ class Crossing:
         x, force = float(values.lengths[k]), float(values.tractions[k])
         points.remember(k, x, force)
         self._turned.add(k)
-        points.enter(k, piece_at(points.chain(k), x, self._limits.at_end, forward=forward))
+        points.enter(k, piece_at(points.chain(k), x, self._limits.standing, forward=forward))
         y = curve.here.y.copy()
         points.set(y, k, points.coordinate(k, x, force))
         return y

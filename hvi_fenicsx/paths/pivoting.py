@@ -63,7 +63,7 @@ class StraightBranch(Branch):
         inverse: CellInverse | None = None,
         heading: int = 1,
     ) -> None:
-        self._thresholds, self._stiffness = points.thresholds.exact, points.elastic
+        self._thresholds, self._stiffness = points.thresholds, points.elastic
         self.points, self.state = points, StraightState(points, z)
         self._constant, self.rate, self._factor, self._size = constant, rate, factor, 0.0
         self.heading, self.trend, self.unstable, self._driven = heading, 0, 0, 0.0
@@ -233,7 +233,7 @@ class StraightBranch(Branch):
         small = np.where(rates > 0.0, -self.small, self.small)
         distance, small = np.where(inward, 0.0, distance), np.where(inward, self._behind, small)
         steep = self._steepness()
-        rounding = self._thresholds.neutral if self.stands else self._thresholds.still
+        rounding = self._thresholds.reached if self.stands else self._thresholds.standing
         moves = speed * steep > rounding * self._fastest(speed)
         at = np.flatnonzero(moves & np.isfinite(distance))
         slack, beyond = np.maximum(distance[at], 0.0), np.maximum(-distance[at], 0.0)
@@ -287,7 +287,7 @@ class StraightBranch(Branch):
         values = self.values
         force = float(self.points.bond_forces(values)[i])
         x = self.points.remember(i, float(values.x[i]), force)
-        number = piece_at(self.points.chain(i), x, self._thresholds.at_end, forward=forward)
+        number = piece_at(self.points.chain(i), x, self._thresholds.rounding, forward=forward)
         self._enter(i, number, self.points.chain(i)[number].coordinate(x, force))
 
     def _enter(self, i: int, number: int, coordinate: float) -> None:
@@ -323,7 +323,7 @@ class StraightBranch(Branch):
         points, rates = self.points, self.rates
         forces = _largest(np.where(points.moving, points.slope, points.rise) * rates)
         size = self._stiffest * _largest(np.where(points.moving, rates, 0.0)) + forces
-        return abs(self.factor_rate) * self._live < self._thresholds.neutral * size
+        return abs(self.factor_rate) * self._live < self._thresholds.reached * size
 
     def beyond(self, share: float) -> Array:
         """The coordinates a part of the way farther to the next end, (n,).

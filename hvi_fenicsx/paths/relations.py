@@ -115,7 +115,7 @@ class ContactPoints(PointStatuses):
             direction: of the coordinates, (n,).
         """
         vectors, p = self.vectors, self.of_lengths
-        rest = values.s[p] <= self.thresholds.curve.no_length
+        rest = values.s[p] <= self.thresholds.rounding
         if not vectors.differ or not np.any(rest):
             return None
         e = np.where(rest[vectors.owner], vectors.directions(direction), values.directions)
@@ -129,7 +129,7 @@ class ContactPoints(PointStatuses):
         Args:
             values: of the points.
         """
-        return np.asarray(np.abs(values.lengths) <= self.thresholds.curve.rounding * self.length)
+        return np.asarray(np.abs(values.lengths) <= self.thresholds.reached * self.length)
 
     def allowances(self, values: Values, rates: Array, fastest: float) -> Array:
         """How near to an end of its segment a point is there, (m,): on a steep segment a short way is a large force.
@@ -141,10 +141,10 @@ class ContactPoints(PointStatuses):
             rates: how fast s changes, (m,).
             fastest: how fast the fastest coordinate does.
         """
-        curve, size = self.thresholds.curve, 1.0 + np.abs(values.s)
+        limits, size = self.thresholds, 1.0 + np.abs(values.s)
         steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
-        steep[np.abs(rates) <= curve.undecided * fastest] = 1.0
-        return np.asarray(np.maximum(curve.rounding / steep, curve.left) * size)
+        steep[np.abs(rates) <= limits.undecided * fastest] = 1.0
+        return np.asarray(np.maximum(limits.reached / steep, limits.left) * size)
 
     def turning_back(self, values: Values, rates: Array) -> Mask:
         """Which bonds with memory go back, (m,); a vector that has not left 0 passes it instead.
@@ -224,7 +224,7 @@ class ContactPoints(PointStatuses):
         if self.straight:
             resists = ~self.moving | (np.abs(self.slope) > ZERO * self.stiffest)
             return unresisted(self.rigid, self.rigid[:, resists], rate)
-        none = self.thresholds.curve.unresisted * self.stiffest
+        none = self.thresholds.flat * self.stiffest
         resists = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
         return unresisted(self.rigid, (self._axes(values.directions).sparse[resists] @ self.rigid.T).T, rate)
 

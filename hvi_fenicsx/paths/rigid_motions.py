@@ -16,12 +16,7 @@ from typing import Self
 import numpy as np
 
 from ..typing import Array, Integers
-
-_NONE = 1e-9
-"""A part of a motion, or of the loads' work on it, that is none."""
-
-_SAME = 1e-6
-"""A difference of motions that is none."""
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +45,7 @@ class Unresisted:
     def _works(self) -> Array:
         """What the load does on the motions, (k,); 0 where that is rounding."""
         works = self.motions @ self.rate
-        none = _NONE * float(np.linalg.norm(self.rate))
+        none = DEFAULT.none * float(np.linalg.norm(self.rate))
         return np.asarray(np.where(np.linalg.norm(works) > none, works, 0.0))
 
     @cached_property
@@ -72,7 +67,7 @@ def unresisted(rigid: Array, resisted: Array, rate: Array) -> Unresisted:
         resisted: their parts where laws or bounds resist, (k, m).
         rate: the load that grows, (n,).
     """
-    return Unresisted(motions=_without(rigid, resisted, _NONE), rate=rate)
+    return Unresisted(motions=_without(rigid, resisted, DEFAULT.none), rate=rate)
 
 
 def _without(motions: Array, parts: Array, none: float) -> Array:
@@ -92,7 +87,7 @@ def are_same(motions: Array, others: Array) -> bool:
     """
     if len(motions) != len(others):
         return False
-    return bool(np.max(np.abs(others - (others @ motions.T) @ motions), initial=0.0) <= _SAME)
+    return bool(np.max(np.abs(others - (others @ motions.T) @ motions), initial=0.0) <= DEFAULT.slow)
 
 
 def pins(motions: Array) -> Integers:

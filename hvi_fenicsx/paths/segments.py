@@ -19,11 +19,10 @@ from ..laws.traction_graph import TractionGraph
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .lengths import VectorPoints
+from .thresholds import ROUNDING
 from .vertex_laws import VertexLaw
 
 _SIDES = ("left", "right")
-_ROUNDING = 1e-12
-"""A jump so small beside the forces there is none."""
 
 
 class Kind(Enum):
@@ -180,7 +179,7 @@ class Component:
             slope: of the force there.
         """
         line = float(self.force(np.array([x]), "right")[0])
-        return abs(line - slope * x) <= _ROUNDING * (abs(line) + abs(slope * x))
+        return abs(line - slope * x) <= ROUNDING * (abs(line) + abs(slope * x))
 
     def changes(self, at: float) -> bool:
         """Whether the graph has another piece from a displacement on."""
@@ -216,7 +215,7 @@ def chain(components: Sequence[Component], lower: float, upper: float) -> tuple[
     if math.isfinite(lower):
         found.append(Segment(kind=Kind.BOUND, x=lower, force=right[lower], rise=1.0, low=-math.inf, high=0.0))
     for start, end in itertools.pairwise(ends):
-        if start > lower and abs(right[start] - left[start]) > _ROUNDING * size[start]:
+        if start > lower and abs(right[start] - left[start]) > ROUNDING * size[start]:
             found.append(_jump(components, start, left[start], right[start]))
         anchor = 0.0 if start < 0.0 < end else start if math.isfinite(start) else end
         found.append(_piece(components, start, end, anchor, (left if anchor == end else right)[anchor]))

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, FollowingThresholds
 
 
 class Event(StrEnum):
@@ -160,7 +160,7 @@ class PathOptions:
     held: tuple[float, float] = (0.0, 0.0)
     stops: Sequence[float] = ()
     fineness: float = 1.0
-    thresholds: Thresholds = DEFAULT
+    thresholds: FollowingThresholds = DEFAULT
 
 
 class Stopped(Exception):

@@ -19,7 +19,7 @@ from ..typing import Array, Integers, Mask
 from .contact_points import PointLaws
 from .curved_laws import Deviations
 from .segments import Component, Kind, Segment, beside_opening, chain, from_zero
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, FollowingThresholds
 from .vertex_laws import VertexLaw, shares
 
 
@@ -61,14 +61,14 @@ class PointStatuses(PointLaws):
     """
 
     def __init__(
-        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: Thresholds = DEFAULT
+        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: FollowingThresholds = DEFAULT
     ) -> None:
         super().__init__(problem, remember, thresholds)
         self.elastic, self.rigid = problem.elastic, problem.elastic.rigid
         self._made: dict[tuple[object, ...], tuple[Segment, ...]] = {}
         self._groups = list({law.group: law.laws for law in self.vertices}.values())
         self._ends = np.cumsum([len(laws.weights) for laws in self._groups])[:-1]
-        self._deviations = Deviations(self.laws, thresholds.curve)
+        self._deviations = Deviations(self.laws, thresholds)
         m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)
         self.low, self.high, self.outward = np.zeros(m), np.zeros(m), np.zeros(m)
@@ -269,7 +269,7 @@ class PointStatuses(PointLaws):
         """
         vectors = self.vectors
         lengths, directions = vectors.polar(z)
-        moved = lengths > self.thresholds.curve.no_length
+        moved = lengths > self.thresholds.rounding
         along = np.where(moved, vectors.along(directions, direction), vectors.lengths(direction))
         return np.concatenate([direction[self.one], along, direction[vectors.opening_unknowns]])
 

@@ -11,6 +11,7 @@ from ..typing import Array
 from .relations import ContactPoints, Values
 from .rigid_motions import are_same, pins
 from .state import PathState
+from .thresholds import ROUNDING
 
 
 class StraightState:
@@ -125,7 +126,7 @@ class StraightState:
             return found
         operator = LinearOperator((free.size, free.size), matvec=response, dtype=np.float64)
         try:
-            accuracy = self.points.thresholds.exact.softest
+            accuracy = self.points.thresholds.flat
             found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=accuracy)[1][:, 0]
         except ArpackNoConvergence:
             pass
@@ -154,6 +155,6 @@ def _coordinates(points: ContactPoints, x: Array, force: Array) -> Array:
         found[i] = segment.coordinate(float(x[i]), float(force[i]))
         length = segment.high - segment.low
         for end in (segment.low, segment.high):
-            if abs(found[i] - end) <= 1e-12 * (length if np.isfinite(length) else abs(found[i])):
+            if abs(found[i] - end) <= ROUNDING * (length if np.isfinite(length) else abs(found[i])):
                 found[i] = end
     return found

@@ -10,9 +10,7 @@ import numpy as np
 from ..laws import Superpotential, TractionGraph, VertexLaws
 from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
-
-_ROUNDING = 1e-12
-"""A displacement so small beside the length scale of a law is none."""
+from .thresholds import ROUNDING
 
 
 def is_straight(problem: CondensedProblem) -> bool:
@@ -114,7 +112,7 @@ class VertexLaw:
         """
         zero = np.zeros(1)
         jumps = self.law.left(zero)[0] != self.law.right(zero)[0]
-        return bool(jumps or abs(x) > _ROUNDING * self.law.length_scale)
+        return bool(jumps or abs(x) > ROUNDING * self.law.length_scale)
 
     def remember(self, x: float, traction: float) -> None:
         """Note a coordinate and its traction.
@@ -184,7 +182,7 @@ def shares(laws: Sequence[VertexLaw], x: float, force: float) -> list[float]:
         return [force / laws[0].weight]
     breaks = np.concatenate([law.graph.breaks for law in laws])
     nearest = float(breaks[np.argmin(np.abs(breaks - x))])
-    at = nearest if abs(nearest - x) <= _ROUNDING * abs(nearest) else x
+    at = nearest if abs(nearest - x) <= ROUNDING * abs(nearest) else x
     left, right = (np.array([law.traction(at, side) for law in laws]) for side in ("left", "right"))
     weights = np.array([law.weight for law in laws])
     jump = float(weights @ (right - left))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..paths.thresholds import Thresholds as FollowingThresholds
+from ..paths.thresholds import FollowingThresholds
 from ..system.thresholds import Thresholds as LinearThresholds
 
 FULL_STEPS = "basic"

@@ -30,7 +30,7 @@ from hvi_fenicsx.paths.motion import Relaxation
 from hvi_fenicsx.paths.passages import Crossing, _Approach
 from hvi_fenicsx.paths.relations import ContactPoints, Values
 from hvi_fenicsx.paths.state import End, Event, Follow, PathOptions, PathState
-from hvi_fenicsx.paths.thresholds import CurveThresholds, JumpThresholds, Thresholds
+from hvi_fenicsx.paths.thresholds import FollowingThresholds
 from hvi_fenicsx.paths.vertex_laws import is_straight
 from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
 from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
@@ -500,7 +500,7 @@ def test_a_curve_is_followed_with_few_factorisations(monkeypatch: pytest.MonkeyP
     made = []
 
     class Counted(Bordered):
-        def __init__(self, matrix: Array, thresholds: CurveThresholds) -> None:
+        def __init__(self, matrix: Array, thresholds: FollowingThresholds) -> None:
             made.append(1)
             super().__init__(matrix, thresholds)
 
@@ -607,7 +607,7 @@ def beam(nodes: int, delta: float) -> CondensedProblem:
 @pytest.mark.long
 def test_a_motion_rests_where_all_bonds_are_on_their_graphs() -> None:
     """Near a limit point the last correction may lead far: one bond of this beam was told 0.0075 below its floor."""
-    given, in_time = beam(20, 0.03), Thresholds(jump=JumpThresholds(steps=0, later_steps=0))
+    given, in_time = beam(20, 0.03), FollowingThresholds(many=0, waits=0)
     _, states = path(given, programme=(20.0,), remember=(0,), thresholds=in_time)
     assert min(float(np.min(state.x)) for state in states) > -1e-9
     assert largest_distance(given, states, (0,)) < 1e-8

@@ -19,7 +19,7 @@ from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.relations import ContactPoints
 from hvi_fenicsx.paths.segments import Segment
 from hvi_fenicsx.paths.state import End, Event, Follow, PathOptions, PathState
-from hvi_fenicsx.paths.thresholds import ExactThresholds, Thresholds
+from hvi_fenicsx.paths.thresholds import FollowingThresholds
 from hvi_fenicsx.paths.vertex_laws import vertex_laws
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
@@ -137,7 +137,7 @@ def test_what_hardly_moves_does_not_drive_and_the_path_is_the_same(monkeypatch: 
     monkeypatch.setattr(np.linalg, "inv", counted)
     _, states = path(given, follow=Follow.EXACT)
     kept = len(made)
-    _, others = path(given, follow=Follow.EXACT, thresholds=Thresholds(exact=ExactThresholds(weak=0.0)))
+    _, others = path(given, follow=Follow.EXACT, thresholds=FollowingThresholds(small=0.0))
     assert len(states) == len(others) > 100
     for one, other in zip(states, others, strict=True):
         assert (one.event, one.unstable) == (other.event, other.unstable)
