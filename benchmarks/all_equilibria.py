@@ -16,9 +16,9 @@ from typing import Any
 import common
 
 from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
+from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.reduced.condensation import Condensation
-from hvi_fenicsx.stationary_points.all_points import Enumeration
-from hvi_fenicsx.stationary_points.condensed_form import scalar_problem
 from hvi_fenicsx.workflow import prepare
 
 MODEL = {"law": "quadratic_linear", "gamma1": 3e6, "gamma2": 1.5e6, "delta": 9e-6}

@@ -17,8 +17,8 @@ from covering import Case, Table, cases
 from hard_cases import AXES
 from mpi4py import MPI
 
+from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.stationary_points.bodies import Equilibria
 from hvi_fenicsx.workflow import finish
 
 UNDECIDED = ("metastable", "borderline")

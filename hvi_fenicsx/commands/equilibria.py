@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from .. import console, results
+from ..equilibrium_search.bodies import Equilibria
+from ..equilibrium_search.found import Clock, Found, Saved, certified_in_words, counted
 from ..errors import ExitCode, NotWrittenError
 from ..report.html import equilibria_page
 from ..report.pictures import equilibria as picture
@@ -16,9 +18,6 @@ from ..results.whole import made, picture_process, write_whole
 from ..runtime import journal
 from ..runtime.mpi import on_root, time_over
 from ..runtime.timing import Timer
-from ..stationary_points.bodies import Equilibria
-from ..stationary_points.found import Found, Saved
-from ..stationary_points.progress_words import Clock, certified_in_words, counted
 from ..workflow import Preparation, prepare
 from . import equilibria_files as files
 from . import session

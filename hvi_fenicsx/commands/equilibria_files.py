@@ -9,6 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..certify.contact_state import ContactState
+from ..equilibrium_search.bodies import Equilibria
+from ..equilibrium_search.found import Found
+from ..equilibrium_search.search import falls_passed
+from ..equilibrium_search.stationarity import StationaryPoint
 from ..errors import ExitCode
 from ..results import ResultFolder, plain, tables
 from ..results.summary import common
@@ -16,10 +20,6 @@ from ..results.whole import write_record
 from ..runtime import writing
 from ..runtime.mpi import largest, on_root
 from ..scene import dump_scene
-from ..stationary_points.bodies import Equilibria
-from ..stationary_points.found import Found
-from ..stationary_points.point_list import StationaryPoint
-from ..stationary_points.search import falls_passed
 from ..typing import Array
 from ..workflow import Preparation, Solution
 

@@ -8,13 +8,12 @@ from typing import Any
 
 from mpi4py import MPI
 
+from ..equilibrium_search import bodies
+from ..equilibrium_search.found import Clock, Found, certified_in_words
 from ..runtime import log
 from ..runtime.argument_checks import require_between, require_switch
 from ..runtime.mpi import time_over
 from ..scene import Scene
-from ..stationary_points import bodies
-from ..stationary_points.found import Found
-from ..stationary_points.progress_words import Clock, certified_in_words
 from ..workflow import Solution
 from .model import Model
 from .solution import ModelSolution

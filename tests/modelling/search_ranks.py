@@ -10,8 +10,8 @@ from mpi4py import MPI
 from scenes import block, quadratic_linear
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.errors import SolverError
-from hvi_fenicsx.stationary_points.bodies import Equilibria
 
 comm = MPI.COMM_WORLD
 records: list[str] = []

@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hvi_fenicsx.equilibrium_search.arcs import INF, ROUNDING, Chain, on_interval
 from hvi_fenicsx.laws.traction_graph import Arc
-from hvi_fenicsx.stationary_points.arcs import INF, ROUNDING, Chain, on_interval
 
 
 def is_convex(arcs: Sequence[Arc]) -> bool:

@@ -17,13 +17,13 @@ from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear, solved
 
 from hvi_fenicsx.certify import certificate
+from hvi_fenicsx.equilibrium_search.bodies import Equilibria
+from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.load_paths.following import Control, PathRun
 from hvi_fenicsx.scene import PathTable
 from hvi_fenicsx.solvers import refinement
 from hvi_fenicsx.solvers.method import SolveResult
 from hvi_fenicsx.solvers.refinement import refined
-from hvi_fenicsx.stationary_points.all_points import Enumeration
-from hvi_fenicsx.stationary_points.bodies import Equilibria
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))

@@ -1,0 +1,250 @@
+"""Smaller cells by the balance of whole bodies: net forces and moments, and the elastic part of the displacement.
+
+With τ = f - Sx the forces that laws and bounds bear, a rigid motion r (Sr = 0) demands r·τ = r·f. And
+x = Tx_p + G(f - τ), where x_p are a few unknowns, pivots, that fix the rigid motion T x_p. So intervals of the forces,
+which also cells that reach far have, bound the differences of displacements: those to the pivots, and of any two that
+all rigid motions move alike, as two vertices that slide on one floor.
+
+Elastic forces have no net force: what Sr is off zero by the rounding of S (:mod:`.rigid_motions`) is taken for zero.
+Else a body a million slips away would be held by rounding, where a load that is above its limit by 1e-7 pulls. What is
+beyond rounding counts, and so does what I - T_p - GS is off zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from ..typing import Array, Integers
+from .arcs import ArcTable
+from .rigid_motions import RigidMotions
+from .scalar_problem import ScalarProblem
+from .tightening import GraphClip, clipped_again
+
+EPSILON = float(np.finfo(float).eps)
+
+
+class RigidBalance:
+    """What net balance and elasticity leave of a cell.
+
+    Args:
+        problem: the problem.
+
+    Attributes:
+        pivots: unknowns that fix the rigid motions, one for each.
+        motions: T, (n, k).
+        exact: whether S resists no motion, and G is near enough to an inverse for bounds of what it is off.
+        softness: the largest square of each e whose elastic energy is ½, (n,); where this is exact.
+    """
+
+    def __init__(self, problem: ScalarProblem) -> None:
+        self._problem, n = problem, problem.size
+        self._widened = problem.thresholds.cells.widened
+        self._arcs = ArcTable.of(problem.chains[:n])
+        self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
+        motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
+        self.pivots: Integers = motions.pivots
+        self.motions: Array = motions.shapes
+        self._same = np.all(self.motions[:, None, :] == self.motions, axis=2)
+        self._beside = np.flatnonzero(self._same.sum(axis=1) > 1)
+        others = np.ix_(motions.others, motions.others)
+        self._flexibility = np.zeros((n, n))
+        self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
+        resistance, rounding = motions.resistance(problem.stiffness)
+        self._net = np.where(resistance <= rounding, 0.0, resistance + rounding)
+        self._rest = self._error()
+        self.exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
+        self.softness = np.diag(self._flexibility) + 2.0 * np.diag(self._rest @ np.abs(self._flexibility))
+
+    def _error(self) -> Array:
+        """How far G is off the inverse on elastic parts, for exact numbers, rounding included, (n, n)."""
+        stiffness, n = self._problem.stiffness, self._problem.size
+        rest = np.eye(n) - self._flexibility @ stiffness
+        rest[:, self.pivots] -= self.motions
+        sizes = np.eye(n) + np.abs(self._flexibility) @ np.abs(stiffness)
+        sizes[:, self.pivots] += np.abs(self.motions)
+        return np.asarray(np.abs(rest) + n * EPSILON * sizes)
+
+    def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        """A smaller cell with the same stationary points; None if there is none in it.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+        """
+        limits = self._problem.thresholds.cells
+        return clipped_again(self._once, low, high, most_rounds=limits.rigid_passes, progress=limits.rigid_progress)
+
+    def forces(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        """What laws and bounds bear in a cell, (n,) each; None if the net forces cannot be in balance.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+        """
+        return self._balanced(*self._forces(low, high), low, high)
+
+    def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        if (forces := self.forces(low, high)) is None:
+            return None
+        rounding = self._widened * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
+        ends = self._graphs.clipped(low, high, forces[0] - rounding, forces[1] + rounding)
+        if ends is None or not np.all(np.isfinite(forces)):
+            return ends
+        parts = self._elastic_parts(*ends, *forces)
+        moved = self.moved(*ends, *parts.ends)
+        return None if moved is None else self._moved_alike(*moved, parts)
+
+    def elastic_parts(self, low: Array, high: Array, forces: tuple[Array, Array]) -> tuple[Array, Array]:
+        """The intervals of e = x - T x_p in a cell, (n,) each.
+
+        Args:
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
+            forces: what laws and bounds bear there.
+        """
+        moved_low, moved_high = product(self.motions, low[self.pivots], high[self.pivots])
+        first, last = low - moved_high, high - moved_low
+        if not np.all(np.isfinite(forces)):
+            return first, last
+        begin, end = self._elastic_parts(low, high, *forces).ends
+        return np.maximum(first, begin), np.minimum(last, end)
+
+    def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""
+        problem, arcs = self._problem, self._arcs
+        begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
+        meets = arcs.meets(low, high) | ((low == high)[:, None] & (begin <= end))
+        with np.errstate(invalid="ignore"):
+            ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
+        least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
+        most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
+        wide = self._widened * (np.abs(least) + np.abs(most))
+        least, most = least - wide, most + wide
+        return np.where(low <= problem.lower, -np.inf, least), np.where(high >= problem.upper, np.inf, most)
+
+    def _balanced(self, least: Array, most: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals of the forces: the net force along each rigid motion is that of the load."""
+        force, size = self._problem.force, np.maximum(np.abs(low), np.abs(high))
+        for j in range(len(self.pivots)):
+            motion, net = self.motions[:, j], self._net[:, j]
+            i = np.flatnonzero(motion)
+            r = motion[i]
+            ends = np.sort(np.stack([r * least[i], r * most[i]]), axis=0)
+            finite = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=0)
+            error = float(net @ size) + len(force) * EPSILON * float(np.abs(motion) @ np.abs(force) + finite.sum())
+            total = float(motion @ force)
+            new = np.stack([total - error - _sum_of_others(ends[1]), total + error - _sum_of_others(ends[0])])
+            new = np.sort(new / r, axis=0)
+            least[i], most[i] = np.maximum(least[i], new[0]), np.minimum(most[i], new[1])
+        return None if np.any(least > most) else (least, most)
+
+    def moved(self, low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals of the displacements x = T x_p + e; None if one is empty.
+
+        Args:
+            low: of x, (n,), finite.
+            high: of x, (n,), finite.
+            first: of e, (n,), finite.
+            last: of e, (n,), finite.
+        """
+        begin, end = low[self.pivots], high[self.pivots]
+        for j in range(len(begin)):
+            motion = self.motions[:, j]
+            i = np.flatnonzero(motion)
+            others = np.delete(np.arange(len(begin)), j)
+            rest_low, rest_high = product(self.motions[np.ix_(i, others)], begin[others], end[others])
+            ways = np.sort(np.stack([low[i] - last[i] - rest_high, high[i] - first[i] - rest_low]) / motion[i], axis=0)
+            slack = self._widened * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
+            begin[j], end[j] = max(begin[j], ways[0].max() - slack), min(end[j], ways[1].min() + slack)
+        if np.any(begin > end):
+            return None
+        moved_low, moved_high = product(self.motions, begin, end)
+        slack = self._widened * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
+        low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
+        return None if np.any(low > high) else (low, high)
+
+    def _moved_alike(self, low: Array, high: Array, parts: ElasticParts) -> tuple[Array, Array] | None:
+        """Smaller intervals of displacements that all motions move alike: they differ as their elastic parts do."""
+        k = self._beside
+        if not k.size:
+            return low, high
+        most = np.where(self._same[np.ix_(k, k)], parts.differences(k), np.inf)
+        least, low, high = -most.T, low.copy(), high.copy()
+        begin = (low[k] + least - self._widened * (np.abs(low[k]) + np.abs(least))).max(axis=1)
+        end = (high[k] + most + self._widened * (np.abs(high[k]) + np.abs(most))).min(axis=1)
+        low[k], high[k] = np.maximum(low[k], begin), np.minimum(high[k], end)
+        return None if np.any(low > high) else (low, high)
+
+    def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> ElasticParts:
+        """The intervals of e, made short: G is changed along rigid motions, where the net force is known."""
+        problem, motions, n = self._problem, self.motions, self._problem.size
+        weights = (most - least) ** 2 + 1e-300
+        normal = motions.T @ (weights[:, None] * motions)
+        shift = -np.linalg.lstsq(normal, (self._flexibility * weights @ motions).T, rcond=None)[0].T
+        flexibility = self._flexibility + shift @ motions.T
+        rows, middle = flexibility * (0.5 * (most - least)), flexibility @ (problem.force - 0.5 * (least + most))
+        reach = np.abs(rows).sum(axis=1)
+        size = np.maximum(np.abs(low), np.abs(high))
+        if self.exact:  # then only e is off, by less than itself
+            size = np.minimum(size, 2.0 * np.max(np.abs(middle) + reach))
+        forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
+        sizes = np.abs(self._flexibility) @ forces + np.abs(shift) @ (np.abs(motions.T) @ forces)
+        error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * sizes
+        return ElasticParts(middle=middle, rows=rows, error=error)
+
+
+def product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The ends of matrix @ [low, high].
+
+    Args:
+        matrix: (m, n).
+        low: of the intervals, (n,).
+        high: of the intervals, (n,).
+    """
+    plus, minus = np.maximum(matrix, 0.0), np.minimum(matrix, 0.0)
+    return plus @ low + minus @ high, plus @ high + minus @ low
+
+
+def _sum_of_others(parts: Array) -> Array:
+    """For each part the sum of all others, some of which may be infinite."""
+    infinite = ~np.isfinite(parts)
+    if not infinite.any():
+        return np.asarray(parts.sum() - parts)
+    sign = parts[infinite][0]
+    finite = np.where(infinite, 0.0, parts)
+    alone = infinite.sum() - infinite
+    return np.where(alone > 0, sign, finite.sum() - finite)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticParts:
+    """The intervals of the elastic parts.
+
+    Attributes:
+        middle: their middles, (n,).
+        rows: half of what each force adds to the length of each interval, with its sign, (n, n).
+        error: by how much G is off, rounding included, (n,).
+    """
+
+    middle: Array
+    rows: Array
+    error: Array
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """The ends of the intervals, (n,) each."""
+        reach = np.abs(self.rows).sum(axis=1) + self.error
+        return self.middle - reach, self.middle + reach
+
+    def differences(self, chosen: Integers) -> Array:
+        """The most by which one part is above another, (k, k): that of the row above that of the column.
+
+        Args:
+            chosen: the parts, (k,).
+        """
+        middle, rows, error = self.middle[chosen], self.rows[chosen], self.error[chosen]
+        reach = cdist(rows, rows, "cityblock") + error[:, None] + error
+        return np.asarray(middle[:, None] - middle + reach)

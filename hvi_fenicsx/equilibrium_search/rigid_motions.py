@@ -1,0 +1,98 @@
+"""Rigid motions of the unknowns, and a stiffness that resists them as little as elasticity does: not at all.
+
+A few unknowns, pivots, fix the motion: x = T x_p with T = I at the pivots. Eigenvectors only tell how many there are;
+the rest of T makes no force on the other unknowns, and is off by rounding alone. The condensed S resists T by what
+rounding left in it. So a body far away would be held where a load is above its limit by little. The blocks of S at the
+pivots are therefore made from the block of the other unknowns, such that S T = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+
+from ..typing import Array, Integers
+from .thresholds import CellThresholds
+
+EPSILON = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidMotions:
+    """The motions T x_p, to which S is no resistance but for rounding.
+
+    Attributes:
+        pivots: unknowns that fix the motion, (k,).
+        others: all other unknowns, (n - k,).
+        shapes: T, (n, k).
+    """
+
+    pivots: Integers
+    others: Integers
+    shapes: Array
+
+    @classmethod
+    def of(cls, stiffness: Array, limits: CellThresholds) -> RigidMotions:
+        """The motions of a stiffness.
+
+        Args:
+            stiffness: S, (n, n).
+            limits: what is rigid, and what is zero or one.
+        """
+        values, vectors = np.linalg.eigh(stiffness)
+        rigid = vectors[:, values <= limits.rigid * np.max(values, initial=0.0)]
+        n, k = rigid.shape
+        pivots = np.asarray(qr(rigid.T, pivoting=True, mode="r")[1][:k], dtype=np.int64)
+        others = np.setdiff1d(np.arange(n), pivots)
+        shapes = np.zeros((n, k))
+        shapes[pivots] = np.eye(k)
+        shapes[others] = -np.linalg.solve(stiffness[np.ix_(others, others)], stiffness[np.ix_(others, pivots)])
+        return cls(pivots=pivots, others=others, shapes=shapes)
+
+    def rounded(self, near: float) -> RigidMotions:
+        """The motions whose shares that are next to 0, 1 or -1 are these numbers.
+
+        Args:
+            near: how near.
+        """
+        whole = np.round(self.shapes)
+        shapes = np.where(np.abs(self.shapes - whole) < near, whole, self.shapes)
+        return RigidMotions(pivots=self.pivots, others=self.others, shapes=shapes)
+
+    def resistance(self, stiffness: Array) -> tuple[Array, Array]:
+        """How much a stiffness resists the motions, and the size of its rounding, (n, k) each.
+
+        Args:
+            stiffness: S, (n, n).
+        """
+        size = np.abs(stiffness) @ np.abs(self.shapes)
+        return np.abs(stiffness @ self.shapes), len(stiffness) * EPSILON * size
+
+
+def with_motions(stiffness: Array, limits: CellThresholds) -> tuple[Array, RigidMotions]:
+    """A stiffness that does not resist its rigid motions, and these; the given one where they may be deformations.
+
+    Args:
+        stiffness: S, symmetric, (n, n).
+        limits: what is rigid, and by how much S may be changed.
+    """
+    motions = RigidMotions.of(stiffness, limits)
+    resistance, rounding = motions.resistance(stiffness)
+    if np.any(resistance > limits.roundings * rounding):
+        return stiffness, motions
+    rounded = motions.rounded(limits.same_share)
+    changed, scale = _changed(stiffness, rounded), np.sqrt(np.diag(stiffness))
+    near = np.all(np.abs(changed - stiffness) <= limits.rigid * np.outer(scale, scale))
+    return (changed, rounded) if near else (stiffness, motions)
+
+
+def _changed(stiffness: Array, motions: RigidMotions) -> Array:
+    others, pivots = motions.others, motions.pivots
+    result, shapes = stiffness.copy(), motions.shapes[others]
+    between = -stiffness[np.ix_(others, others)] @ shapes
+    result[np.ix_(others, pivots)], result[np.ix_(pivots, others)] = between, between.T
+    own = -shapes.T @ between
+    result[np.ix_(pivots, pivots)] = 0.5 * (own + own.T)
+    return result

@@ -1,0 +1,99 @@
+"""Equilibria of curved laws by the systematic search: against a scan of one unknown, and on whole bodies."""
+
+from __future__ import annotations
+
+import condensed
+import numpy as np
+import pytest
+from scenes import model, quadratic_linear
+from scipy.optimize import brentq
+
+import hvi_fenicsx as hvi
+from hvi_fenicsx import laws
+from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
+from hvi_fenicsx.equilibrium_search.curved_laws import CurvedLaws
+from hvi_fenicsx.equilibrium_search.law_graphs import law_graph
+from hvi_fenicsx.equilibrium_search.stationarity import Kind
+from hvi_fenicsx.equilibrium_search.systematic import near_stationary
+from hvi_fenicsx.laws.smoothing import registered
+from hvi_fenicsx.typing import Array
+
+MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
+CHKS = registered()["chks"]().relative(MODEL, 0.05)
+TEETH = registered()["log_exp"]().relative(laws.Sawtooth(3.0, 1.0, 0.5, 3), 0.02)
+PAPER = registered()["paper"]().relative(MODEL, 0.1)
+SPRING = 0.8
+
+
+def two_bonds(law: laws.Superpotential, pull: Array) -> CurvedLaws:
+    """Two bonds, each of which carries a load, with a spring between them, and another spring to the ground."""
+    stiffness = SPRING * np.array([[1.0, -1.0], [-1.0, 1.0]]) + 0.1 * np.eye(2)
+    problem = condensed.problem(stiffness, pull, condensed.bonds(law, [0, 1]))
+    return CurvedLaws(near=scalar_problem(problem), problem=problem)
+
+
+def scanned(law: laws.Superpotential, pull: Array) -> Array:
+    """All equilibria: the balance of the first bond gives the second's displacement, the second's is scanned."""
+
+    def second(x: Array) -> Array:
+        return x + (0.1 * x + law.right(x) - pull[0]) / SPRING
+
+    def rest(x: Array) -> Array:
+        y = second(x)
+        return np.asarray(0.1 * y + SPRING * (y - x) + law.right(y) - pull[1])
+
+    x = np.linspace(-5.0, 60.0, 400_001)
+    at = np.flatnonzero(np.diff(np.sign(rest(x))))
+    ends = [(x[i], x[i + 1]) for i in at]
+    first = np.array([brentq(lambda one: rest(np.array([one]))[0], *pair, xtol=1e-14) for pair in ends])
+    return np.column_stack([first, second(first)])
+
+
+@pytest.mark.parametrize(
+    ("law", "share", "count"),
+    [(CHKS, 0.9, 5), (PAPER, 0.9, 5), (TEETH, 0.9, 9), pytest.param(TEETH, 0.5, 17, marks=pytest.mark.long)],
+)
+def test_minimisers_and_saddles_of_two_bonds_are_those_of_a_scan(
+    law: laws.Superpotential, share: float, count: int
+) -> None:
+    pull = share * float(law.right(np.linspace(0.0, 5.0, 5001)).max()) * np.array([1.05, 0.95])
+    both, wanted = two_bonds(law, pull), scanned(law, pull)
+    found = near_stationary(both.near, [], lambda: False, both.point)
+    assert len(found) == len(wanted) == count
+    for point in found:
+        assert np.min(np.abs(wanted - point.x).max(axis=1)) < 1e-8
+        turning = both.near.stiffness + np.diag(law.convex.second(point.x) - law.concave.second(point.x))
+        assert (point.kind == Kind.MINIMISER) == bool(np.linalg.eigvalsh(turning)[0] > 0.0)
+
+
+def test_a_point_that_newton_does_not_reach_is_none() -> None:
+    both = two_bonds(CHKS, np.array([1.0, 1.0]))
+    assert both.point(np.array([40.0, -40.0])) is None
+
+
+def test_an_unknown_in_stick_stays_there() -> None:
+    law = laws.Exponential(2.0, 0.5, 1.0)
+    problem = condensed.problem([[1.0]], [1.0], condensed.bonds(law, [0]))
+    curved = CurvedLaws(near=scalar_problem(problem), problem=problem)
+    found = near_stationary(curved.near, [], lambda: False, curved.point)
+    assert [tuple(p.x) for p in found] == [(0.0,)]
+    assert found[0].kind == Kind.MINIMISER
+
+
+def test_all_saddles_of_a_curved_scene_are_certified() -> None:
+    """No solver makes a saddle exact; each is certified as it was found. A small ε leaves their number as it is."""
+    plain = hvi.equilibria(hvi.Scene.model_validate(model(2, 6e6, 1e6, quadratic_linear(3e6))))
+    smooth = {"smoothing": "chks", "epsilon": 1e-4}
+    found = hvi.equilibria(hvi.Scene.model_validate(model(2, 6e6, 1e6, quadratic_linear(3e6), **smooth)))
+    assert all(s.converged for s in found.solutions)
+    assert sorted(found.kinds) == sorted(plain.kinds)
+    assert [s.energy for s in found.solutions] == pytest.approx([s.energy for s in plain.solutions], rel=1e-3)
+
+
+def test_places_of_a_law_that_only_rounding_tells_apart_are_one() -> None:
+    """Breaks of the smoothing at 0.04 and 0.16 meet doubled distances that differ in the last digit."""
+    law = registered()["log_exp"]().smooth(laws.QuadraticLinearLiteral(0.1, 0.05, np.nextafter(0.2, 1.0)), 1e-3)
+    graph = law_graph(law, 1e6, 1e-4 * law.energy_scale)
+    assert np.isfinite(graph.error)
+    x = np.linspace(-1.0, 1.0, 20_001)
+    np.testing.assert_allclose(graph.graph.traction(x, "right"), law.right(x), atol=0.02 * law.traction_scale)

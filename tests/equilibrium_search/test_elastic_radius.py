@@ -1,0 +1,85 @@
+"""Elastic parts near those of a point, where rigid motions are free: against brute force, and reasoning by hand."""
+
+from __future__ import annotations
+
+import condensed
+import numpy as np
+import pytest
+from array_enumeration import stationary
+from scenes import block
+
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.equilibrium_search.boxes import fresh_box
+from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
+from hvi_fenicsx.equilibrium_search.elastic_radius import ElasticRadius
+from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
+from hvi_fenicsx.equilibrium_search.rigid_balance import RigidBalance
+from hvi_fenicsx.equilibrium_search.scalar_problem import ScalarProblem
+from hvi_fenicsx.reduced.condensation import Condensation
+from hvi_fenicsx.typing import Array
+
+BOND = condensed.graph([[0.0, 0.0], [0.1, 1.0], [0.1, 0.3]])
+
+
+def free_chain(seed: int) -> ScalarProblem:
+    """Three points in a row that only bonds hold, the last one above a floor or not, near their peak."""
+    random = np.random.default_rng(seed)
+    stiffness = condensed.chain(3, random.choice([0.05, 1.0, 20.0]))
+    lower, floor = np.full(3, -np.inf), random.uniform() < 0.3
+    if floor:  # a point that touches, beside the row
+        stiffness = np.block([[stiffness, np.zeros((3, 1))], [np.zeros((1, 3)), np.zeros((1, 1))]])
+        spring = 0.3 * np.array([1.0, -1.0, 0.0, 0.0]) + np.array([0.0, 0.0, 0.0, 1.0])
+        stiffness, lower = stiffness + np.outer(spring, spring), np.r_[lower, -0.05]
+    force = np.zeros(len(lower))
+    force[:3] = random.normal(size=3) * random.choice([0.1, 1.0])
+    force[:3] += random.uniform(-0.95, 0.95) - force[:3].mean()
+    return scalar_problem(condensed.problem(stiffness, force, condensed.bonds(BOND, [0, 1, 2]), lower=lower))
+
+
+def all_of(problem: ScalarProblem) -> Enumeration:
+    search = Enumeration(problem=problem)
+    search.start()
+    assert search.run(lambda: search.cells > 2000, lambda _: None)
+    return search
+
+
+def near(x: Array, others: list[Array]) -> bool:
+    return any(np.max(np.abs(x - y)) < 1e-7 for y in others)
+
+
+QUICK = [0, 1, 2, 3]
+MANY = [pytest.param(seed, marks=pytest.mark.long) for seed in range(60) if seed not in QUICK]
+
+
+@pytest.mark.parametrize("seed", [*QUICK, *MANY])
+def test_all_points_of_a_row_that_only_bonds_hold_are_those_of_brute_force(seed: int) -> None:
+    problem = free_chain(seed)
+    wanted, listed = stationary(problem), [p.x for p in all_of(problem).points]
+    assert all(near(x, listed) for x in wanted)
+    assert all(near(x, wanted) for x in listed)
+
+
+@pytest.mark.parametrize("seed", [*QUICK, *MANY])
+def test_smaller_cells_keep_all_points_whatever_the_other_point_is(seed: int) -> None:
+    problem, random = free_chain(seed), np.random.default_rng(seed)
+    test = ElasticRadius(problem, RigidBalance(problem))
+    for x in stationary(problem):
+        for reach in (1e-2, 1.0, 1e3, 1e6):
+            ends = [x + sign * reach * random.uniform(0.01, 1.0, problem.size) for sign in (-1.0, 1.0)]
+            low, high = np.maximum(problem.lower, ends[0]), np.minimum(problem.upper, ends[1])
+            smaller = test.tightened(fresh_box(low, high, random.uniform(low, high)))
+            assert smaller is not None
+            assert np.all((x >= smaller.low) & (x <= smaller.high))
+
+
+def test_a_block_whose_floor_stretches_farther_than_its_bonds_slide_has_no_equilibrium() -> None:
+    """Pressed, it grows by 0.65 along the floor, bonds break at 0.04: an eighth is whole; 0.4 of the peak is left."""
+    slip, peak, cells = 0.02e6 / 2.15e11, 1e3, 24
+    points = [[0.0, 0.0], [slip, 0.5 * peak], [slip, peak], [2.0 * slip, peak], [2.0 * slip, 0.3 * peak]]
+    table = block(cells, 0.0, 1e6, {"law": "graph", "points": points})
+    table["domain"] |= {"size": [1.0, 0.1], "cells": [cells, 4]}
+    table["material"] |= {"model": "plane_strain", "youngs_modulus": 2.15e11, "poisson_ratio": 0.45}
+    table["boundary"]["pull"]["traction"] = [f"{9.0 * peak!r}*(4 - 6*y/0.1)", 0.0]
+    search = all_of(scalar_problem(Condensation(prepare(Scene.model_validate(table)).system).problem))
+    assert not len(search.points)
+    assert search.cells <= 20
