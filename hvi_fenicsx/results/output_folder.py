@@ -21,8 +21,7 @@ from ..errors import InputError, NotWrittenError
 from ..runtime import manifest, processes, writing
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.processes import SIGNALS
-from .folder_lock import FolderLock
-from .moving import discard, is_folder, move_in
+from .moving import FolderLock, discard, is_folder, move_in
 
 Existing = Literal["refuse", "replace", "resume"]
 _WAYS = {

@@ -14,7 +14,7 @@ import pytest
 from runs import LONG_RANKS, contact, run_all
 from scenes import STEEL
 
-from hvi_fenicsx.results.arc_length import along
+from hvi_fenicsx.results.contact_parts import along
 
 Array = npt.NDArray[Any]
 R, H = 0.5, 0.1
