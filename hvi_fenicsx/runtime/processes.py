@@ -29,7 +29,6 @@ STOP = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SIGNALS = (*STOP, signal.SIGUSR1)
 """Those and what mpirun passes on to its ranks, and what a batch system may send before a job's end."""
 _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
-_SIZE = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 """What mpirun tells each process, before MPI is started."""
 _NICENESS = 10
 """The niceness of a process that stands back: it gets a tenth of the time of one that does not."""
@@ -64,11 +63,6 @@ def is_under_mpirun() -> bool:
 def is_first_rank() -> bool:
     """Whether this is rank 0, or no rank."""
     return next((os.environ[name] for name in _RANK if name in os.environ), "0") == "0"
-
-
-def ranks() -> int:
-    """The number of ranks; 1 where it is not known."""
-    return next((int(os.environ[name]) for name in _SIZE if name in os.environ), 1)
 
 
 def start_petsc() -> None:
