@@ -81,8 +81,8 @@ class MeshFile(FixedMesh):
     shape: Literal["file"] = "file"
     """the mesh comes from a gmsh file"""
     file: ExistingFile
-    """the gmsh file, relative to the scene file: .msh, or .geo, which gmsh meshes first; a .geo that runs programs or
-    writes files is refused"""
+    """the gmsh file, relative to the scene file: .msh, or .geo, which gmsh meshes first; a .geo can start no
+    program and write no file"""
     scale: Positive = 1.0
     """length in m of one unit of the coordinates in the file: 1e-3 for a mesh in mm"""
     refinements: Refinements = 0
