@@ -24,9 +24,8 @@ from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
 from ..scene import Scene
-from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
-from ..solvers.nested_iteration import refined_levels
+from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.levels import Level, Levels
 from ..typing import Array, Entities
 from ..workflow import DEFAULT, Preparation, Solution, Thresholds, find_solution, prepare

@@ -21,9 +21,9 @@ from ..typing import Array
 from . import kink_bounds
 from .context import SolveContext
 from .convergence import Outcome
-from .fallbacks import Attempt, first_success
 from .law_models import Cells, VertexModel
 from .method import Counts
+from .projected_newton import Attempt, first_success
 from .thresholds import ENERGY, EXACT, FULL_STEPS
 
 UNBOUNDED = "the body slides away on what is left of its bonds"

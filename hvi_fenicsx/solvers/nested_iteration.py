@@ -21,8 +21,8 @@ from ..runtime.log import logger
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
 from ..system.linear_settings import LinearSettings
 from ..system.system import System, assemble
-from . import coarse_start, registry
-from .coarse_start import CoarseStart
+from ..typing import Integers
+from . import registry
 from .context import RunControl, SolveContext, SolverOptions
 from .method import Counts, Method, SolveResult
 from .quadratic import LinearSolve
@@ -116,7 +116,7 @@ def solve_from_coarser(
         return _stopped(system, start, options.thresholds)
     kind, found = registry.choose(options, system), start.result
     takes = found.converged and kind.takes_start
-    first = coarse_start.prolonged(start, system, options.thresholds) if takes else None
+    first = prolonged(start, system, options.thresholds) if takes else None
     context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
     _log_level(system, kind)
     result = kind(context).solve() if first is None else kind(context).solve(first)
@@ -134,7 +134,7 @@ def solve_from_coarser(
 
 def _stopped(system: System, start: CoarseStart, thresholds: Thresholds) -> LevelSolution:
     """What was found on the coarser mesh: where the solve is to stop, nothing is set up for it any more. Collective."""
-    u = system.displacement(coarse_start.prolonged(start, system, thresholds))
+    u = system.displacement(prolonged(start, system, thresholds))
     result = replace(
         start.result,
         u=u,
@@ -174,7 +174,7 @@ def solve_from_displacement(
     levels = coarser_levels(model, system, options, control)
     first = system.unknowns(u)
     first.scale(1.0 / system.problem.scales.displacement)
-    coarse_start.make_admissible(first, system, options.thresholds)
+    make_admissible(first, system, options.thresholds)
     _log_level(system, kind)
     context = SolveContext.create(system, levels, solvability, options, control)
     result = kind(context).solve(first)
@@ -283,3 +283,84 @@ def refined_levels(
 def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:
     """The options with the tolerance of a coarser level."""
     return replace(options, tolerance=max(options.thresholds.coarse_tolerance, options.tolerance))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoarseStart:
+    """A solution on a coarser mesh, as the start on a finer one.
+
+    Attributes:
+        system: the system on the coarser mesh.
+        result: what was found there.
+        prolongation: from the coarser system's unknowns to the finer one's.
+        levels: the coarser levels of the finer system.
+        way: by which a force has moved an obstacle, m; None: no force presses one.
+    """
+
+    system: System
+    result: SolveResult
+    prolongation: PETSc.Mat
+    levels: Levels
+    way: float | None = None
+
+
+def prolonged(start: CoarseStart, system: System, thresholds: Thresholds) -> PETSc.Vec:
+    """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective.
+
+    Args:
+        start: the coarse solution, and the way from there.
+        system: on the finer mesh.
+        thresholds: what counts as on a bound.
+    """
+    coarse = start.system
+    x, known = system.load.duplicate(), coarse.unknowns(start.result.u)
+    start.prolongation.mult(known, x)
+    _interpolate_relative(x, known, start, system)
+    x.scale(coarse.problem.scales.displacement / system.problem.scales.displacement)
+    make_admissible(x, system, thresholds)
+    return x
+
+
+def _interpolate_relative(x: PETSc.Vec, known: PETSc.Vec, start: CoarseStart, system: System) -> None:
+    """Interpolate relative displacements on interfaces themselves: what is closed, or sticks, stays so. Collective.
+
+    Interpolated displacements of both sides have others between the coarse vertices, since their meshes do not match.
+
+    Args:
+        x: the displacement on the finer mesh; its relative displacements are overwritten.
+        known: the one on the coarser mesh.
+        start: the way from there.
+        system: on the finer mesh.
+    """
+    if not system.problem.interfaces:
+        return
+    own, shares, values = x.duplicate(), x.duplicate(), known.duplicate()
+    at = _relative_dofs(start.system)
+    values.array[at] = 1.0
+    start.prolongation.mult(values, shares)
+    values.array[at] = known.array_r[at]
+    start.prolongation.mult(values, own)
+    fine = _relative_dofs(system)
+    fine = fine[shares.array_r[fine] > system.thresholds.whole_weight]
+    x.array[fine] = own.array_r[fine]
+
+
+def _relative_dofs(system: System) -> Integers:
+    """The unknowns (local, owned) that are relative displacements."""
+    return np.concatenate([one.surface.dofs.ravel() for one in system.problem.interfaces])
+
+
+def make_admissible(x: PETSc.Vec, system: System, thresholds: Thresholds) -> None:
+    """Move unknowns within their bounds, onto a bound that only rounding keeps them from, and to prescribed values.
+
+    Args:
+        x: the unknowns, changed in place.
+        system: with bounds and prescribed values.
+        thresholds: what counts as on a bound.
+    """
+    at, d = system.jacobian.rows.dofs, system.problem.scales.dimension
+    near = thresholds.near * system.references.at(at // d)
+    values, lower, upper = (vector.array_r[at] for vector in (x, system.lower, system.upper))
+    values = np.where(values <= lower + near, lower, np.where(values >= upper - near, upper, values))
+    x.array[at] = values
+    system.prescribe(x)

@@ -20,11 +20,10 @@ from ..rigid import Solvability
 from ..runtime.log import logger
 from ..system.system import System
 from ..typing import Array
-from . import coarse_start, nested_iteration, registry
-from .coarse_start import CoarseStart
+from . import nested_iteration, registry
 from .context import RunControl, SolveContext, SolverOptions
 from .method import Counts
-from .nested_iteration import LevelSolution
+from .nested_iteration import CoarseStart, LevelSolution
 
 _LOG = logger("solvers")
 _MOST = 60
@@ -193,7 +192,7 @@ class ObstacleForceSolve:
         if not kind.takes_start:
             return self._anew(way, None)
         first = system.unknowns(before.result.u)
-        coarse_start.make_admissible(first, system, self._options.thresholds)
+        nested_iteration.make_admissible(first, system, self._options.thresholds)
         context = SolveContext.create(system, before.levels, self._solvability, self._options, self._control)
         result = kind(context).solve(first)
         self._counts.add(result.counts)

@@ -13,9 +13,9 @@ from petsc4py import PETSc
 
 from ..system.system import System
 from .convergence import Outcome
-from .fallbacks import Attempt, first_success
 from .law_models import VertexModel
 from .method import Counts, Method, SolveResult
+from .projected_newton import Attempt, first_success
 from .resting_start import at_rest, resting_start
 from .thresholds import ENERGY, EXACT, FULL_STEPS
 

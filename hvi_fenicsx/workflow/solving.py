@@ -17,10 +17,9 @@ from ..runtime.log import logger, newton_step, warn
 from ..runtime.timing import Timer
 from ..scene import Scene
 from ..solvers import frozen_mixity, nested_iteration, obstacle_force, refinement
-from ..solvers.coarse_start import CoarseStart
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.method import SolveResult
-from ..solvers.nested_iteration import LevelSolution
+from ..solvers.nested_iteration import CoarseStart, LevelSolution
 from ..solvers.obstacle_force import ObstacleBalance
 from ..system import free_motions
 from ..system.levels import Levels

@@ -27,9 +27,8 @@ from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.scene_model import model_of, options_of
-from hvi_fenicsx.solvers.coarse_start import CoarseStart
 from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.solvers.nested_iteration import solve_from_coarser
+from hvi_fenicsx.solvers.nested_iteration import CoarseStart, solve_from_coarser
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import levels
 from hvi_fenicsx.system.system import System, assemble
