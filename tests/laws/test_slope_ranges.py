@@ -47,15 +47,6 @@ def test_no_slope_is_outside_its_range(law: laws.Superpotential) -> None:
     assert np.mean(most - least <= 4.0 * np.ptp(found, axis=1) + 1e-9) > 0.5  # the range is not idle
 
 
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_the_range_shrinks_to_the_slope(law: laws.Superpotential) -> None:
-    x = np.random.default_rng(2).uniform(-4.0, 4.0, 400)
-    x = x[np.abs(x[:, None] - law.breaks).min(axis=1) > 1e-6]
-    least, most = law.slope_range(x - 1e-9, x + 1e-9)
-    np.testing.assert_allclose(least, slopes(law, x), atol=1e-5 * np.abs(slopes(law, x)).max())
-    np.testing.assert_allclose(most, slopes(law, x), atol=1e-5 * np.abs(slopes(law, x)).max())
-
-
 def test_of_a_shape_that_is_not_known_to_be_concave_no_range_is_known() -> None:
     @dataclass(frozen=True)
     class Wavy(WeakeningLaw, register=False):

@@ -97,19 +97,6 @@ def test_kappa_is_attained_at_the_kink(plus: PlusFunction) -> None:
     assert plus.derivative(np.zeros(1), 3.0)[0] == 0.5
 
 
-@each_law
-@each_plus
-@each_epsilon
-def test_error_bound(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
-    smooth = plus.relative(law, epsilon)
-    for width in (1e-3, epsilon):
-        x = around(law, width)
-        error = np.abs(smooth.value(x) - law.value(x))
-        assert np.all(error <= smooth.bound * (1 + 1e-12) + 1e-15 * np.abs(law.value(x)))
-    if law.kinks.size:
-        assert smooth.bound >= plus.kappa * epsilon * law.energy_scale * (1 - 1e-12)
-
-
 @given(
     st.sampled_from(list(LAWS.values())),
     st.sampled_from(list(PLUS_FUNCTIONS.values())),
@@ -156,33 +143,6 @@ def test_split_of_the_smoothed_law(law: Superpotential, plus: PlusFunction, epsi
 
 @each_law
 @each_plus
-def test_second_derivative_of_the_smoothed_parts(law: Superpotential, plus: PlusFunction) -> None:
-    smooth = plus.relative(law, 0.5)
-    h = 1e-6 * law.length_scale
-    x = np.random.default_rng(3).uniform(-8, 8, 200) * law.length_scale
-    for part in (smooth.convex, smooth.concave):
-        quotient = (part.right(x + h) - part.right(x - h)) / (2 * h)
-        off = np.abs(part.second(x) - quotient) > 1e-3 * law.traction_scale / law.length_scale
-        # the quadratic plus function and the law's own breaks have jumps of the curvature
-        assert off.sum() <= 2
-
-
-@each_law
-@each_plus
-def test_both_derivatives_at_once_are_those_of_the_parts(law: Superpotential, plus: PlusFunction) -> None:
-    smooth = plus.relative(law, 0.1)
-    x = np.random.default_rng(4).uniform(-8, 8, 200) * law.length_scale
-    for some in (law, smooth):
-        traction, slope = some.derivatives(x)
-        size = max(law.traction_scale, float(np.max(np.abs(traction))))
-        assert traction == pytest.approx(some.right(x), rel=1e-12, abs=1e-12 * size)
-        wanted = some.convex.second(x) - some.concave.second(x)
-        parts = max(float(np.max(np.abs(part.second(x)))) for part in (some.convex, some.concave))
-        assert slope == pytest.approx(wanted, rel=1e-12, abs=1e-12 * parts)
-
-
-@each_law
-@each_plus
 def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: PlusFunction) -> None:
     """Near a kink, where x moves with ε, into the kink's interval; elsewhere to the derivative."""
     for place in law.kinks:
@@ -200,42 +160,12 @@ def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: Plus
     assert law.distance(x, smooth.right(x)).max() <= 1e-6 * law.traction_scale
 
 
-@each_law
-@each_plus
-@each_epsilon
-def test_untouched_at_zero_slip(law: Superpotential, plus: PlusFunction, epsilon: float) -> None:
-    smooth = plus.relative(law, epsilon)
-    assert smooth.even == law.even
-    if not law.even:
-        return
-    assert smooth.right(np.zeros(1))[0] == 0.0
-    assert smooth.convex.right(np.zeros(1))[0] == smooth.concave.right(np.zeros(1))[0] == 0.0
-    x = around(law)
-    np.testing.assert_array_equal(smooth.value(x), smooth.value(-x))
-    np.testing.assert_array_equal(smooth.right(x), -smooth.right(-x))
-
-
 def test_the_quadratic_smoothing_leaves_the_law_alone_away_from_the_drop() -> None:
     smooth = QUADRATIC.relative(MODEL, 0.01)
     reach = 0.5 * smooth.epsilon_absolute / (GAMMA1 - GAMMA2)
     x = np.concatenate([np.linspace(0, DELTA - reach, 50), np.linspace(DELTA + reach * 1.001, 5 * DELTA, 50)])
     np.testing.assert_array_equal(smooth.value(x), MODEL.value(x))
     np.testing.assert_array_equal(smooth.right(x[:-50]), MODEL.right(x[:-50]))
-
-
-@each_law
-@each_plus
-@pytest.mark.parametrize("absolute", [1e-300, 1e-12, 1.0, 1e3, 1e300])
-def test_no_overflow(law: Superpotential, plus: PlusFunction, absolute: float) -> None:
-    smooth = PlusSmoothedLaw(law, absolute, plus)
-    x = np.concatenate([[0.0], law.kinks, np.geomspace(1e-300, 1e300, 200), -np.geomspace(1e-300, 1e300, 200)])
-    if isinstance(law, ScaledLaw):
-        x = x[np.abs(x) < 1e290]
-    with np.errstate(over="raise", invalid="raise", divide="raise"):
-        results = [smooth.right(x), smooth.convex.second(x), smooth.concave.second(x), smooth.distance(x, x)]
-        value = smooth.value(x)
-    assert all(np.all(np.isfinite(r)) for r in results if law is not LAWS["spring"])
-    assert not np.any(np.isnan(value))
 
 
 @each_law
@@ -258,21 +188,6 @@ def test_an_opposing_traction_never_appears_by_smoothing_the_model() -> None:
     for plus in PLUS_FUNCTIONS.values():
         assert plus.relative(MODEL, 0.1).c4 == 0.0
     assert QUADRATIC.relative(LAWS["literal"], 1e-6).c4 == pytest.approx(GAMMA2, rel=1e-5)
-
-
-@each_law
-@each_plus
-def test_scaled_smoothing(law: Superpotential, plus: PlusFunction) -> None:
-    smooth, length, traction = plus.relative(law, 0.3), 2.5e-6, 17.0
-    scaled = smooth.scaled(length, traction)
-    assert isinstance(scaled, PlusSmoothedLaw)
-    assert scaled.epsilon == pytest.approx(0.3)
-    x = np.random.default_rng(4).uniform(-8, 8, 300) * law.length_scale
-    np.testing.assert_allclose(scaled.value(x / length) * length * traction, smooth.value(x), rtol=1e-9)
-    np.testing.assert_allclose(
-        scaled.right(x / length) * traction, smooth.right(x), rtol=1e-7, atol=1e-9 * law.traction_scale
-    )
-    np.testing.assert_array_equal(smooth.branch(x), law.branch(x))
 
 
 def papers_s(x: float, epsilon: float) -> float:
@@ -343,35 +258,6 @@ def test_papers_split(epsilon: float) -> None:
         atol=2e-2 * law.energy_scale,
         rtol=0.2,
     )
-
-
-def test_papers_smoothing_integrates_its_second_derivative() -> None:
-    """G and G' in closed form against quadrature of G''."""
-    for epsilon in (1e-3, 4e-3, 0.1):
-        g = PaperSmoothedLaw(MODEL, epsilon).concave
-        x = np.linspace(0, 30e-6, 600_001)
-        rate = np.concatenate([[0], np.cumsum(0.5 * (g.second(x[1:]) + g.second(x[:-1])) * np.diff(x))])
-        np.testing.assert_allclose(g.right(x), rate, atol=1e-4 * GAMMA1)
-        value = np.concatenate([[0], np.cumsum(0.5 * (g.right(x[1:]) + g.right(x[:-1])) * np.diff(x))])
-        np.testing.assert_allclose(g.value(x), value, atol=1e-8 * GAMMA1 * DELTA)
-
-
-def test_papers_smoothing_far_out_and_scaled() -> None:
-    law = PaperSmoothedLaw(MODEL, 0.1)
-    x = np.concatenate([[0.0], np.geomspace(1e-300, 1e300, 100)])
-    with np.errstate(over="raise", invalid="raise", divide="raise"):
-        for y in (x, -x):
-            for part in (law.convex, law.concave):
-                assert np.all(np.isfinite(part.right(y)))
-                assert np.all(np.isfinite(part.second(y)))
-            assert np.all(np.isfinite(law.value(y)))
-            np.testing.assert_allclose(np.abs(law.right(y)[-1]), GAMMA2)
-    scaled = law.scaled(2e-6, 30.0)
-    x = np.linspace(-3e-5, 3e-5, 101)
-    np.testing.assert_allclose(scaled.right(x / 2e-6) * 30.0, law.right(x), rtol=1e-9)
-    assert law.growth == MODEL.growth
-    assert law.peak.plus > GAMMA1
-    assert law.right(np.linspace(0, 1e-4, 100_001)).max() == pytest.approx(law.peak.plus, rel=1e-3)
 
 
 def test_create() -> None:

@@ -146,16 +146,6 @@ def test_the_strength_under_an_inclined_pull_is_that_of_an_ellipse(beta: float) 
         assert found.lambda_held == pytest.approx(0.4 * found.lambda_peak, rel=1e-9)
 
 
-def test_a_wide_block_takes_all_of_its_strength() -> None:
-    """With contact under it and a moment that vanishes, nothing turns: the translation decides."""
-    floor = {"contact": {"gap": 0.0}, "cohesion": law(BRITTLE, beta=0.5)}
-    table = square(floor, {"traction": [0.3 * PEAK, 0.4 * PEAK]}, 4)
-    table["domain"]["size"] = [40.0, 1.0]
-    found = workflow.prepare(Scene.model_validate(table)).solvability
-    assert found.lambda_peak == pytest.approx(1.0 / np.hypot(0.4, 0.6), rel=2e-3)
-    assert found.state == "metastable"
-
-
 def work(delta: Array) -> Array:
     """∫ of the graph of BOND up to lengths, written down once more."""
     rising, left = np.minimum(delta, FIRST), np.maximum(LAST - delta, 0.0)

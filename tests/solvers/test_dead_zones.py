@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import meshes
 import pytest
 from enumeration import Floor, polyline
-from scenes import NESTED, STEEL, Table, block, displacement, energy, far, points, solved
+from scenes import STEEL, Table, block, displacement, energy, far, points, solved
 
 PRESS = {"on": "top", "traction": [0.0, -1e6]}
 PUSH = {"on": "left", "traction": [3e5, 0.0]}
@@ -149,20 +147,6 @@ def test_the_error_of_a_body_that_may_move_in_a_dead_zone_is_that_on_weak_spring
     assert free.relative > 0.01
 
 
-def test_two_bodies_each_beyond_its_own_dead_zone(tmp_path: Path) -> None:
-    path = meshes.make(tmp_path / "two.msh", meshes.BLOCKS.format(size=0.5, dimension=2, named=False))
-    table = square(
-        press={"on": ["top_a", "top_b"], "traction": [0.0, -1e6]},
-        push_a={"on": "left_a", "traction": [3e5, 0.0]},
-        push_b={"on": "right_b", "traction": [-2e5, 0.0]},
-        floor_a={"on": "bottom_a", "contact": {"gap": 0.0}, "friction": DEAD},
-        floor_b={"on": "bottom_b", "support": SUPPORT, "friction": graph((0, 0), (4e-5, 0), (4e-5, 1e6))},
-    )
-    found = solved(table | {"domain": {"shape": "file", "file": str(path)}})
-    assert found.solvability.state == "held"
-    assert found.exit_code == 0, found.reason
-
-
 @pytest.mark.parametrize(
     "law", [[(0, 0), (1e-5, 0), (2e-5, 1e6)], [(0, 0), (1e-5, 0), (1e-5, 1e6)]], ids=["rise", "jump"]
 )
@@ -175,16 +159,3 @@ def test_the_solution_is_the_only_stationary_point_there_is(law: list[tuple[floa
     order = points(found)[:, [0, 1]]
     rows = (2 * order[:, 1] * 3 + 2 * order[:, 0]).round().astype(int)
     assert far(displacement(found), wanted[0].u[rows]) < 1e-7
-
-
-@pytest.mark.parametrize("push", [0.0, 2e5], ids=["free play", "lifting"])
-def test_multigrid_passes_over_motions_that_nothing_holds_for_a_while(push: float) -> None:
-    """The tangent is singular in free play, and where the active set leaves a vertex or two."""
-    table = SCENES["foundation that tilts"]
-    if push:
-        press = {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}
-        table = square(left={"on": "left", "traction": [push, 0.0]}, top=press, floor=floor(DEAD))
-    found = solved(table | {"domain": table["domain"] | {"cells": [32, 32]}}, NESTED)
-    assert found.exit_code == 0, found.reason
-    assert found.solve_result is not None
-    assert found.solve_result.counts.newton < 20

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +9,9 @@ import pytest
 from runs import hvi, summary, write_scene
 from scenes import DELTA, STEEL, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, rigid, solve, workflow
-from hvi_fenicsx.cli import main
+from hvi_fenicsx import Scene, solve, workflow
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.system import boundedness, existence
+from hvi_fenicsx.system import boundedness
 from hvi_fenicsx.workflow import Thresholds
 
 GAMMA = 1.0e6
@@ -66,15 +63,6 @@ def test_a_block_on_friction_alone_cannot_stand_upright() -> None:
     table["boundary"]["pull"]["traction"] = [0.0, 0.0]
     still = solved(table)
     assert (still.exit_code, still.solvability.state) == (0, "borderline")
-
-
-def test_a_wall_that_holds_everything_needs_no_floor() -> None:
-    table = model(4, friction=LAW)
-    table["boundary"]["wall"]["displacement"] = [0.0, 0.0]
-    table["boundary"]["press"]["traction"] = [0.0, 3 * Q]
-    found = solved(table)
-    assert (found.exit_code, found.solvability.state) == (0, "held")
-    assert found.solvability.kernel == ()
 
 
 @pytest.mark.parametrize(
@@ -142,32 +130,6 @@ def test_in_space_too_a_support_does_not_show_in_the_friction() -> None:
     assert np.allclose(state.friction[held], wanted, rtol=1e-9, atol=1e-12)
 
 
-def cube(push: float) -> Table:
-    """A free cube on a floor, pushed at its right side: :func:`scenes.block` in space."""
-    table = block(2, push, 4 * Q, LAW)
-    table["domain"] = {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]}
-    table["material"] |= {"model": "three_dimensional"}
-    table["boundary"]["pull"]["traction"] = [push, 0.0, 0.0]
-    table["boundary"]["press"]["traction"] = [0.0, 0.0, -4 * Q]
-    return table
-
-
-@pytest.mark.parametrize("body", [lambda push: block(3, push, 4 * Q, LAW), cube])
-@pytest.mark.parametrize(
-    ("share", "broken", "expected"),
-    [(0.499, True, False), (0.501, True, True), (0.6, False, False), (0.999, False, False), (1.001, False, True)],
-)
-def test_a_convex_step_has_a_solution_as_long_as_its_branch_bears_the_push(
-    body: Callable[[float], Table], share: float, broken: bool, expected: bool
-) -> None:
-    """Unbroken bonds bear γ1 L, broken ones γ2 L = γ1 L/2; in the plane and in space, where the law is one of |u_t|."""
-    prepared = workflow.prepare(Scene.model_validate(body(share * GAMMA)))
-    (term,) = prepared.problem.terms
-    slip = np.full(len(term.surface.weights), 10 * term.law.length_scale if broken else 0.0)
-    xi = [term.law.concave.right(slip)]
-    assert boundedness.is_unbounded(prepared.problem, prepared.system.forces, [term.law], xi) == expected
-
-
 def test_the_search_for_an_equilibrium_that_need_not_exist_ends() -> None:
     brief = Thresholds(solvers=SolverThresholds(search_steps=3))
     found = solved(block(3, 0.97 * GAMMA, Q, LAW), brief)
@@ -189,46 +151,6 @@ def test_an_obstacle_that_presses_a_free_body_up_moves_it_rigidly(gap: float | s
     assert u[:, 1] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
     turn = 0.0 if gap == -1e-3 else 1e-3
     assert u[:, 0] == pytest.approx(-turn * (x[:, 1] - 0.5), rel=1e-9, abs=1e-12)
-
-
-def test_supports_that_agree_where_they_meet_are_fine() -> None:
-    table = model(5)
-    table["boundary"]["press"] = {"on": "top", "displacement": ["1e-5*x", "free"]}
-    table["boundary"]["context"] = {"on": "bottom", "displacement": ["free", "0*x"]}
-    del table["boundary"]["floor"]
-    found = solved(table)
-    assert found.exit_code == 0
-    top = points(found)[:, 1] == 1.0
-    np.testing.assert_allclose(displacement(found)[top, 0], 1e-5 * points(found)[top, 0], atol=1e-18)
-
-
-def test_supports_that_move_a_body_rigidly_meet_no_force() -> None:
-    table = model(5)
-    table["boundary"] = {"wall": {"on": "left", "displacement": [2e-3, -1e-3]}}
-    found = solved(table)
-    assert found.exit_code == 0
-    np.testing.assert_allclose(displacement(found), [[2e-3, -1e-3]] * len(points(found)), rtol=1e-9)
-
-
-@pytest.mark.parametrize(("push", "code"), [(0.2e6, 0), (2.0e6, 4)])
-def test_where_existence_cannot_be_decided_a_run_goes_on(
-    push: float, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A certificate needs no verdict; without one the result says what is not known, and is written all the same."""
-    hasty = rigid.RigidThresholds(max_rounds=0)
-    monkeypatch.setattr(existence, "analyse", functools.partial(rigid.analyse, thresholds=hasty))
-    monkeypatch.setattr(rigid, "load_factors", functools.partial(rigid.load_factors, thresholds=hasty))
-    scene = write_scene(tmp_path / "s.toml", block(3, push, 4 * Q, LAW))
-    assert main(["check", str(scene)]) == 4
-    assert "existence: undecided (rigid motions: " in capsys.readouterr().out
-    assert main(["run", str(scene), "--out", str(tmp_path / "r"), "--no-pictures"]) == code
-    found = summary(tmp_path / "r")
-    assert found["solvability"]["state"] == "undecided"
-    assert found["solvability"]["lambda_held"] is None
-    assert found["solvability"]["paper"]["satisfied"] is None
-    assert len(found["solvability"]["kernel"]) == 3
-    assert ("could not be decided" in found["reason"]) == (code == 4)
-    assert "Undecided: " in (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
 
 
 def test_in_space_a_law_that_has_fallen_below_zero_resists_nothing() -> None:

@@ -11,9 +11,7 @@ from scenes import Table, solved
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.state import PathOptions
-from hvi_fenicsx.paths.substitutions import without_fixed
 from hvi_fenicsx.reduced.condensation import Condensation
-from hvi_fenicsx.solvers import load_path_start
 
 MOST_STEPS = 65
 """Newton steps where a load path ends: those before it, and three further starts of at most 15."""
@@ -136,11 +134,6 @@ def test_a_peeled_strip_is_the_same_as_by_the_branch_iteration_in_few_newton_ste
     assert path.solve_result.counts.newton < 20 < branch.solve_result.counts.newton
 
 
-def test_the_end_of_a_path_is_no_answer_for_a_body_that_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(load_path_start, "follow", lambda *_: load_path_start.PathStart(x=None, reason="it ends"))
-    assert solved(strip()).converged
-
-
 def test_a_path_that_bears_no_load_does_not_say_that_the_whole_load_is_not_borne() -> None:
     """Where slips are negative the law pushes on: no small load is borne, but the whole one is."""
     law = {"law": "quadratic_linear_literal", "gamma1": 1e6, "gamma2": 5e5, "delta": 9.302325581395349e-07}
@@ -176,43 +169,6 @@ def test_an_equilibrium_to_which_loading_leads_by_a_jump_only_is_found_and_told(
     assert found.converged
     assert "loading leads to it by a jump, if at all: at the factor 0.703226" in found.reason
     assert found.examination.energy == pytest.approx(resting.examination.energy, rel=1e-10)
-
-
-def test_a_path_beyond_the_whole_load_is_lost_and_says_nothing() -> None:
-    """A scene of the attack (20261123 #118): rounding took the path to 6.6 times the load."""
-    law = [[0, 0], [4.5842e-5, 1013.7], [5.8694e-4, -45.84], [5.8694e-4, 187.99]]
-    found = solved(
-        {
-            "domain": {"shape": "half_disk", "mesh_size": 0.496, "radius": 0.5},
-            "material": {"model": "plane_stress", "youngs_modulus": 2.52e7, "poisson_ratio": 0.29},
-            "boundary": {
-                "floor": {
-                    "on": "arc",
-                    "contact": {"obstacle": {"point": [0.0, 0.0], "normal": [-3e-5, 1.0]}},
-                    "friction": {"law": "graph", "points": law, "one_sided": True},
-                },
-                "press": {"on": "top", "traction": [0.0, -976.853]},
-            },
-        }
-    )
-    assert found.converged or found.solve_result.borne is None
-
-
-@pytest.mark.parametrize("gap", [0.0, 1e-6])
-def test_a_problem_without_fixed_unknowns_has_the_same_energy_and_work(gap: float) -> None:
-    table = bar(STRENGTH, 6)
-    table["boundary"]["glue"]["contact"] = {"lower": gap, "upper": gap}
-    table["boundary"]["glue"]["adhesion"] = {"law": "linear_spring", "stiffness": 1e12}
-    whole = Condensation(prepare(Scene.model_validate(table)).system).problem
-    fewer, kept = without_fixed(whole)
-    assert fewer.size == 7 < whole.size
-    rng = np.random.default_rng(1)
-    for factor in (0.0, 0.7):
-        x = np.where(whole.lower == whole.upper, whole.lower, rng.normal(0.0, 1.0, whole.size))
-        assert fewer.energy(x[kept], factor) == pytest.approx(whole.energy(x, factor), rel=1e-12)
-        assert fewer.potential(x[kept], factor) == pytest.approx(whole.potential(x, factor), rel=1e-12)
-        slope = whole.stiffness @ x - whole.load(factor)
-        assert fewer.stiffness @ x[kept] - fewer.load(factor) == pytest.approx(slope[kept], rel=1e-10)
 
 
 def test_an_edge_that_has_no_path_is_no_bad_input() -> None:

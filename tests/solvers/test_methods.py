@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import itertools
 import logging
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from petsc4py import PETSc
 from scenes import P, Table, block, displacement, energy, far, model, quadratic_linear, solved
 
 from hvi_fenicsx import NewtonStep, Scene, Solution, prepare
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.solvers.condensed import fischer_burmeister
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.workflow import Thresholds, finish
 
@@ -80,20 +75,6 @@ def test_without_friction_they_solve_the_convex_programme(method: str) -> None:
     assert energy(found) == pytest.approx(-6.0, rel=1e-9)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_bounds_on_both_sides_and_an_upper_one_alone(method: str) -> None:
-    """-1e-7 ≤ -u·n ≤ 2e-7: the first bound carries the body, as a gap of 1e-7 does. On top, u2 is bounded above."""
-    both = strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)
-    both["boundary"]["floor"]["contact"] = {"lower": -1.0e-7, "upper": 2.0e-7}
-    single = strong(8, 3 * P, 1.0e6, epsilon=0.1)
-    single["boundary"]["floor"]["contact"] = {"gap": 1.0e-7}
-    turned = strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)
-    turned["boundary"]["floor"]["on"], turned["boundary"]["press"]["on"] = "top", "bottom"
-    turned["boundary"]["press"]["traction"] = [0.0, P]
-    assert_alike(solved(both), solved(single))
-    assert solved(turned).exit_code == 0
-
-
 CASES = [(6.0e6, 3.0e6, 0.1), (6.0e6, 3.0e6, 1.0e-3), (1.0e7, 8.0e6, 1.0e-2), (4.0e6, 3.0e6, 1.0e-4)]
 
 
@@ -117,29 +98,6 @@ def test_the_papers_procedure_gets_stuck_where_the_law_is_strong() -> None:
     found = solved(strong(16, 6 * P, 3.0e6, epsilon=0.1, method="condensed"))
     assert found.exit_code == 4
     assert "merit" in found.reason
-
-
-@contextlib.contextmanager
-def petsc_options(**options: Any) -> Iterator[None]:
-    """As a user gives them by --petsc."""
-    database = PETSc.Options("hvi_")
-    for name, value in options.items():
-        database[name] = value
-    try:
-        yield
-    finally:
-        for name in options:
-            database.delValue(name)
-
-
-def test_petscs_own_convergence_test_of_vinewtonssls_is_not_believed() -> None:
-    """A user may bring it back; where it ends with CONVERGED_... too early the method does not pass that on."""
-    with petsc_options(snes_convergence_test="default", snes_rtol=1e-2):
-        found = solved(strong(16, 6 * P, 3.0e6, epsilon=1.0, method="ssls"))
-    assert found.exit_code == 4
-    assert found.solve_result is not None
-    assert not found.solve_result.converged
-    assert "CONVERGED_FNORM" in found.solve_result.reason
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -181,20 +139,6 @@ def test_an_interrupt_on_the_second_level_of_three_gives_what_was_found_there(ca
     assert np.linalg.norm(off) < 0.1 * np.linalg.norm(whole.u.x.array)
 
 
-@pytest.mark.parametrize("method", ["auto", "snes_vi", *METHODS])
-def test_what_has_converged_was_not_interrupted(method: str) -> None:
-    """Whenever the stop is asked for. One at the last Newton step gave a solution that counted as none."""
-    prepared = prepare(Scene.model_validate(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
-    questions = itertools.count()
-    finish(prepared, interrupted=lambda: next(questions) < 0)
-    for last in range(next(questions) + 1):
-        asked = itertools.count()
-        found = finish(prepared, interrupted=lambda asked=asked, last=last: next(asked) >= last)  # type: ignore[misc]
-        assert found.solve_result is not None
-        assert found.solve_result.converged is not found.solve_result.interrupted
-    assert found.solve_result.converged
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_is_told(method: str) -> None:
     steps: list[NewtonStep] = []
@@ -220,22 +164,6 @@ def test_laws_with_kinks_are_refused_with_the_mend(method: str, wanted: Table) -
 def test_the_papers_procedure_takes_the_papers_law(wanted: Table) -> None:
     """No vertex ends on a kink but the wall's corner, where the slip is prescribed."""
     assert_alike(solved(paper(method="condensed", **wanted)), solved(paper(**wanted)))
-
-
-def test_users_options_reach_tao() -> None:
-    with petsc_options(tao_type="bntr", tao_max_it=1):
-        found = solved(strong(16, 6 * P, 3.0e6, epsilon=1.0, method="tao"))
-    assert found.solve_result is not None
-    assert found.solve_result.counts.newton == 1
-
-
-def test_the_fischer_burmeister_function_is_zero_on_complementary_pairs_only() -> None:
-    a, b = np.array([0.0, 2.0, 0.0, -1.0, 3.0]), np.array([5.0, 0.0, 0.0, 1.0, 4.0])
-    value, by_a, by_b = fischer_burmeister(a, b)
-    assert value == pytest.approx([0.0, 0.0, 0.0, np.sqrt(2.0), -2.0])
-    assert by_a[4] == pytest.approx(3 / 5 - 1)
-    assert by_b[4] == pytest.approx(4 / 5 - 1)
-    assert np.all(np.isfinite(by_a + by_b))
 
 
 def test_the_condensed_problem_may_be_the_whole_one() -> None:

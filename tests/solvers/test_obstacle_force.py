@@ -14,9 +14,8 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx.accuracy import control
 from hvi_fenicsx.accuracy.adaptive import AdaptiveSolver
 from hvi_fenicsx.accuracy.goal import Goal
-from hvi_fenicsx.errors import ExitCode, SolverError
+from hvi_fenicsx.errors import ExitCode
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.solvers import obstacle_force
 
 E, AREA, HEIGHT, GAP = 1e9, 0.12, 0.5, 2e-4
 PLATE = {"point": [0.0, 0.0, HEIGHT + GAP], "normal": [0.0, 0.0, -1.0], "force": [0.0, 0.0, -3e4]}
@@ -223,17 +222,3 @@ def test_a_force_presses_one_obstacle_only() -> None:
 def test_other_commands_say_what_to_do(command: Any) -> None:
     with pytest.raises(hvi.InputError, match="give the obstacle the displacement"):
         command(hvi.Scene.model_validate(block(base=BASE)))
-
-
-def test_where_the_solver_breaks_down_nothing_is_borne(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The body at rest is in equilibrium where the obstacle is described, which is no answer."""
-
-    def broken(*_: object) -> None:
-        raise SolverError("broken down")
-
-    monkeypatch.setattr(obstacle_force.ObstacleForceSolve, "solve", broken)
-    found = hvi.solve(hvi.Scene.model_validate(block(base=BASE)))
-    assert found.exit_code == ExitCode.NOT_CONVERGED
-    assert "broken down" in found.reason
-    assert found.obstacle is not None
-    assert found.obstacle.difference == 1.0

@@ -10,15 +10,8 @@ import pytest
 from petsc4py import PETSc
 from scenes import P, model, quadratic_linear, solved
 
-from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.scene import Scene
-from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.law_models import VertexModel
-from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system.equations import Equations
-from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.petsc_options import raise_python_error
-from hvi_fenicsx.workflow import prepare
 
 
 def failing_at(number: int, function: Callable[..., object], raised: BaseException) -> Callable[..., object]:
@@ -58,15 +51,3 @@ def test_what_a_solve_itself_fails_by_is_no_error_of_a_function(raised: Exceptio
     with pytest.raises(PETSc.Error) as error:
         snes.solve(None, x)
     raise_python_error(error.value)
-
-
-def test_a_solve_that_petsc_gives_up_tells_its_linear_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One Newton step by a factorisation; the second finds no tangent."""
-    system = prepare(Scene.model_validate(model(4, 10 * P, friction=quadratic_linear(3e6), epsilon=0.01))).system
-    solver = ActiveSetSolver(system, (), LinearSettings("lu"), Timer())
-    x, _ = resting_start(solver, [term.law for term in system.terms])
-    monkeypatch.setattr(Equations, "tangents", failing_at(2, Equations.tangents, FloatingPointError()))
-    bounds = {"lower": system.lower, "upper": system.upper}
-    ended = solver.solve(x, [VertexModel(term.law) for term in system.terms], 1e-14, line_search="basic", **bounds)
-    assert (ended.converged, ended.newton, ended.linear) == (False, 1, 1)
-    assert ended.reason.startswith("PETSc error")

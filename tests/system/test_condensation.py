@@ -14,12 +14,9 @@ from runs import LONG_RANKS, on_ranks
 from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.errors import InputError, SolverError
+from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.paths.vertex_laws import is_straight
 from hvi_fenicsx.reduced.condensation import Condensation
-from hvi_fenicsx.system.factorisation import form_of
-from hvi_fenicsx.system.interior import Interior
-from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System
 
 Array = npt.NDArray[np.float64]
@@ -208,14 +205,6 @@ def test_energy_and_work_agree_along_a_path_of_displacements() -> None:
     assert rate == pytest.approx(power - loads, rel=1e-6)
 
 
-def test_constant_loads_are_apart_from_scaled_ones() -> None:
-    system, whole = condensed("wall")
-    part = Condensation(system, ["pull.traction"]).problem
-    assert np.allclose(part.load(1.0), whole.problem.load(1.0), rtol=0, atol=1e-12)
-    assert np.max(np.abs(whole.problem.force)) == 0.0
-    assert np.max(np.abs(part.force)) > 1e-3
-
-
 def test_a_name_that_is_no_load_is_refused() -> None:
     system, _ = condensed("wall")
     with pytest.raises(InputError, match=r"pull\.force.*pull\.traction"):
@@ -229,25 +218,3 @@ def test_all_ranks_hold_the_problem_of_one(ranks: int) -> None:
     assert together["equal"]
     for key in ("energies", "force", "whole"):
         assert together[key] == pytest.approx(alone[key], rel=1e-9)
-
-
-def test_a_factorisation_without_memory_is_not_called_a_body_that_is_not_held() -> None:
-    system = prepare(Scene.model_validate(model(8, friction=STRONG))).system
-    little = {**CHOLESKY, "mat_mumps_icntl_14": -95}
-    with pytest.raises(SolverError, match="no memory was left"):
-        Interior(form_of(system), np.empty(0, dtype=np.int32), little)
-
-
-def test_forces_are_condensed_by_one_solve_and_followed_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The body in balance with forces inside it: A times the change is these, off Γc."""
-    system, condensation = condensed("pulled")
-    solves, solve = [], Interior.solve
-    monkeypatch.setattr(Interior, "solve", lambda self, right: solves.append(1) or solve(self, right))
-    forces = np.random.default_rng(5).standard_normal(system.load.local_size)
-    found = condensation.forces.condensed(forces)
-    change, product = system.undisplaced(), system.load.duplicate()
-    change.array[:] = condensation.forces.change(np.ones_like(found.condensed), found)
-    system.jacobian.elastic_product(change, product)
-    inner = np.setdiff1d(np.arange(len(forces)), np.union1d(system.jacobian.rows.dofs, system.problem.fixed))
-    assert np.max(np.abs(product.array_r - forces)[inner]) < 1e-12 * np.max(np.abs(product.array_r))
-    assert len(solves) == 2

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 from factorisation_ranks import compared
 from mpi4py import MPI
-from runs import on_ranks
 from scenes import quadratic_linear, solved, two_blocks
-
-from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.system import factorisation
-from hvi_fenicsx.system.factorisation import FactorForm, Factorisation, form_of
-from hvi_fenicsx.system.petsc_options import CHOLESKY
 
 RUBBER = {"youngs_modulus": 1e6, "poisson_ratio": 0.4999}
 LAW = quadratic_linear(1e3)
@@ -59,24 +51,6 @@ def test_solutions_and_negative_eigenvalues_are_those_of_the_matrix_itself(table
     assert told["pressures"][0] > 0
     assert told["difference"] < 1e-7
     assert told["negative"][0] == told["negative"][1] > 0
-
-
-@pytest.mark.long
-def test_on_several_ranks_too() -> None:
-    told = on_ranks(3, str(Path(__file__).parent / "factorisation_ranks.py"), json.dumps(cube(4)))
-    assert min(told["pressures"]) > 0
-    assert told["difference"] < 1e-7
-    assert told["negative"][0] == told["negative"][1] > 0
-
-
-def test_they_have_fewer_numbers() -> None:
-    system = prepare(Scene.model_validate(cube(4)), MPI.COMM_SELF).system
-    entries = []
-    for form in (form_of(system), FactorForm(system)):
-        factors = Factorisation(form, form.matrix(), CHOLESKY)
-        factors.factorise(system.jacobian.rows.dofs)
-        entries.append(factorisation.entries(factors.pc))
-    assert entries[0] < entries[1] / 2.5
 
 
 def test_a_run_with_a_direct_solver_ends_where_one_with_multigrid_does() -> None:

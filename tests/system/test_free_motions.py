@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from mpi4py import MPI
-from petsc4py import PETSc
 from runs import LONG_RANKS, hvi, on_ranks, summary, write_scene
-from scenes import NU, E, P, Q, Table, block, quadratic_linear
+from scenes import NU, E, P, Q, Table
 
-from hvi_fenicsx import Scene, Solution, prepare, solve
+from hvi_fenicsx import Scene, Solution, solve
 
 Array = npt.NDArray[np.float64]
 SIDES = {"left": (0, -1), "right": (0, 1), "bottom": (-1, -1), "top": (-1, 1), "front": (1, -1), "back": (1, 1)}
@@ -141,18 +140,6 @@ def test_a_free_body_in_balance_is_solved_up_to_its_motions(name: str, answers: 
     state, code, free, wrong = answers[name]
     assert (state, code, free) == ("borderline", 0, CASES[name][2])
     assert wrong < (1e-7 if name.endswith("gamg") else 1e-11)
-
-
-def test_the_null_space_is_attached_to_the_matrix() -> None:
-    """PETSc's own test: the attached vectors are orthonormal and J takes them to zero."""
-    prepared = prepare(Scene.model_validate(stressed(2, 4, PLANE)))
-    system = prepared.system
-    assert isinstance(system.jacobian.matrix.getNullSpace(), PETSc.NullSpace)
-    assert system.jacobian.matrix.getNullSpace().test(system.jacobian.matrix)
-    assert len(system.jacobian.matrix.getNullSpace().getVecs()) == 3
-    held = prepare(Scene.model_validate(block(3, 0.2e6, Q, quadratic_linear(1e6))))
-    assert held.system.free_motions is None
-    assert held.system.jacobian.matrix.getNullSpace().handle == 0
 
 
 @pytest.mark.parametrize("method", ["auto", "branch", "snes_vi", "condensed"])

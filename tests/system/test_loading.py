@@ -56,10 +56,6 @@ def test_a_factor_multiplies_the_named_loads_and_displacements(names: list[str])
     np.testing.assert_allclose(constant + rate, system.load.array, rtol=0, atol=1e-13)
 
 
-def test_without_names_the_factor_multiplies_all() -> None:
-    assert not np.any(loading.make(prepare(Scene.model_validate(scene())).system, None).lifted[:, 0])
-
-
 def test_a_name_that_does_not_exist_is_refused_with_those_that_do() -> None:
     system = prepare(Scene.model_validate(scene())).system
     with pytest.raises(InputError, match=r"no load 'pull.traction'; there are: body.force, press.traction, wall.disp"):

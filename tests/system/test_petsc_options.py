@@ -57,13 +57,6 @@ def test_what_is_no_option_is_refused(options: Any, prefix: str, reason: str) ->
         pass
 
 
-@pytest.mark.parametrize("text", ["hvi_ksp_monitor", "-hvi_ksp_rtol -1e-3 3"])
-def test_a_word_without_dash_is_refused(text: str) -> None:
-    """PETSc would pass over it."""
-    with pytest.raises(InputError, match=r'"(hvi_ksp_monitor|3)" is no option'):
-        petsc_options.insert(text)
-
-
 def test_options_that_nothing_has_read_are_told_with_the_prefix() -> None:
     petsc_options.insert("-ksp_type cg -hvi_ksp_max_it 7")
     try:
@@ -83,11 +76,6 @@ def test_petscs_own_times_are_printed_where_they_are_asked_for() -> None:
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60)
     assert "PETSc Performance Summary" in done.stdout
     assert "ERROR" not in done.stderr
-
-
-def test_an_error_that_no_option_can_have_made_stays() -> None:
-    with pytest.raises(PETSc.Error), petsc_options.refusals_told():
-        PETSc.PC().create().setType("luu")
 
 
 def test_algebraic_multigrid_by_options_solves_a_system_of_few_unknowns(tmp_path: Path) -> None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 import pytest
 from mpi4py import MPI
-from runs import on_ranks
 from scenes import DELTA, displacement, model, quadratic_linear, solved
 from schur_ranks import SCENE
 
@@ -17,12 +14,10 @@ from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.system import direct, factorisation
-from hvi_fenicsx.system.direct import Direct
-from hvi_fenicsx.system.factorisation import FactorForm, form_of
+from hvi_fenicsx.system import direct
+from hvi_fenicsx.system.factorisation import form_of
 from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
 from hvi_fenicsx.system.linear_settings import LinearSettings
-from hvi_fenicsx.system.petsc_options import CHOLESKY
 from hvi_fenicsx.system.system import System
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 from hvi_fenicsx.workflow import Thresholds
@@ -56,22 +51,6 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
     assert found.norm() < 1e-10 * expected.norm()
 
 
-def test_condensed_on_several_ranks_it_solves_the_same() -> None:
-    told = on_ranks(3, str(Path(__file__).parent / "schur_ranks.py"))
-    assert sum(told["sizes"]) > max(told["sizes"]) > 0, "Γc is on one rank alone"
-    assert told["difference"] < 1e-10
-
-
-def test_what_mumps_counts_is_below_that_of_full_factors() -> None:
-    """Averaged pressures couple far vertices: full factors of n unknowns cost as much as n/6 solves, these nearly."""
-    table = SCENE | {"domain": SCENE["domain"] | {"cells": [5, 5, 5]}}
-    system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
-    copy = Direct(FactorForm(system), CHOLESKY)
-    copy.prepare(system.jacobian.rows.dofs[:0].astype(np.int32))
-    assert system.dofs**2 / 4 < factorisation.entries(copy.pc) < system.dofs**2 / 2
-    assert system.dofs / 12 < factorisation.solves_worth(copy.pc) < system.dofs / 6
-
-
 def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_solver() -> None:
     """Its setup took 0.6 s in each of 300 Newton steps on long cells, where factorising takes 0.05 s."""
     table = SCENE | {"material": SCENE["material"] | {"poisson_ratio": 0.3}}
@@ -87,23 +66,6 @@ def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_
         solver.solve(system.load.copy(), x, Goal(rtol=1e-2))
         kinds.append(solver.settings.kind)
     assert kinds == ["gamg"] * 3 + ["lu"] * 2
-
-
-def test_multigrid_that_does_not_converge_gives_way_soon() -> None:
-    """Algebraic multigrid of a nearly incompressible body took 2,000 iterations in vain before a direct solver did."""
-    table = SCENE | {"material": SCENE["material"] | {"poisson_ratio": 0.4999}, "solver": {"linear_solver": "gamg"}}
-    counts: list[int] = []
-    found: list[npt.NDArray[np.float64]] = []
-    for most in (2_000, 20):
-        thresholds = Thresholds(solvers=SolverThresholds(linear=LinearThresholds(replaced_iterations=most)))
-        run = solved(table, thresholds)
-        assert run.exit_code == 0
-        assert run.solve_result is not None
-        counts.append(run.solve_result.counts.linear)
-        found.append(displacement(run))
-    assert counts[0] > 50
-    assert 20 < counts[1] < 40
-    assert np.max(np.abs(found[1] - found[0])) < 1e-7 * np.max(np.abs(found[0]))
 
 
 def test_a_run_that_condenses_ends_where_one_that_does_not_ends(monkeypatch: pytest.MonkeyPatch) -> None:

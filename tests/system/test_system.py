@@ -164,18 +164,6 @@ def test_nodes_are_where_dolfinx_tabulates_them(degree: int) -> None:
         np.testing.assert_allclose(nodes.points(space), space.tabulate_dof_coordinates(), rtol=0, atol=1e-15)
 
 
-def test_the_sides_of_a_box_are_where_they_are_said_to_be() -> None:
-    body = blocks.block(MPI.COMM_SELF, [1.0, 2.0, 3.0], [1, 1, 1])
-    x = body.mesh.geometry.x
-    body.mesh.topology.create_connectivity(2, 0)
-    wanted = {"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 2), "bottom": (2, 0), "top": (2, 3)}
-    for name, (axis, value) in wanted.items():
-        facets = body.facets([name])
-        assert len(facets) == 2
-        corners = np.unique([body.mesh.topology.connectivity(2, 0).links(f) for f in facets])
-        assert np.all(x[corners][:, axis] == value)
-
-
 LAWS: dict[str, Table] = {
     "quadratic_linear": STRONG,
     "stronger": quadratic_linear(1e7),
@@ -194,12 +182,6 @@ def test_the_energy_falls_in_every_convex_step(law: str, pull: float, press: flo
     energies = np.array(found.solve_result.energies)
     assert len(energies) == found.solve_result.counts.branch >= 1
     assert np.all(np.diff(energies) <= 1e-10 * np.abs(energies[:-1]))
-
-
-def test_some_of_them_take_several_steps() -> None:
-    found = solved(model(12, 6e6, 1e6, STRONG))
-    assert found.solve_result is not None
-    assert found.solve_result.counts.branch > 1
 
 
 def by_ufl(u: fem.Function, pull: float, gamma1: float) -> float:
@@ -235,15 +217,3 @@ def test_a_free_block_has_all_rigid_motions_in_its_near_null_space() -> None:
     for vector in vectors:
         assert (system.jacobian.matrix * vector).norm() < 1e-12
         assert vector.norm() == pytest.approx(1.0)
-
-
-def test_a_slip_along_a_local_axis_is_that_component_to_the_last_digit() -> None:
-    """Bounds hold a slip on a kink of its law; a slip that is the kink but for rounding would never leave it."""
-    for slope in np.linspace(0.1, 0.9, 9):
-        table = block(2, friction={"law": "tresca", "yield_traction": 3e6})
-        table["boundary"]["floor"] |= {
-            "contact": {"obstacle": {"point": [0.0, 0.0], "normal": [slope, 1.0]}},
-            "support": {"law": "graph", "points": [[0, 0], [1e-6, 5e3], [1e-6, 3e4]]},
-        }
-        for term in prepare(Scene.model_validate(table)).system.terms:
-            assert np.array_equal(np.sort(np.abs(term.directions), axis=2), np.broadcast_to([0.0, 1.0], (3, 1, 2)))
