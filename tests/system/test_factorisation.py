@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from factorisation_ranks import compared
 from mpi4py import MPI
+from runs import on_ranks
 from scenes import quadratic_linear, solved, two_blocks
 
 RUBBER = {"youngs_modulus": 1e6, "poisson_ratio": 0.4999}
@@ -49,6 +52,14 @@ def disk() -> dict[str, Any]:
 def test_solutions_and_negative_eigenvalues_are_those_of_the_matrix_itself(table: dict[str, Any]) -> None:
     told = compared(table, MPI.COMM_SELF)
     assert told["pressures"][0] > 0
+    assert told["difference"] < 1e-7
+    assert told["negative"][0] == told["negative"][1] > 0
+
+
+@pytest.mark.long
+def test_on_several_ranks_too() -> None:
+    told = on_ranks(3, str(Path(__file__).parent / "factorisation_ranks.py"), json.dumps(cube(4)))
+    assert min(told["pressures"]) > 0
     assert told["difference"] < 1e-7
     assert told["negative"][0] == told["negative"][1] > 0
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 from mpi4py import MPI
+from runs import on_ranks
 from scenes import DELTA, displacement, model, quadratic_linear, solved
 from schur_ranks import SCENE
 
@@ -49,6 +52,12 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
     condensed.apply(load, found)
     found.axpy(-1.0, expected)
     assert found.norm() < 1e-10 * expected.norm()
+
+
+def test_condensed_on_several_ranks_it_solves_the_same() -> None:
+    told = on_ranks(3, str(Path(__file__).parent / "schur_ranks.py"))
+    assert sum(told["sizes"]) > max(told["sizes"]) > 0, "Γc is on one rank alone"
+    assert told["difference"] < 1e-10
 
 
 def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_solver() -> None:
