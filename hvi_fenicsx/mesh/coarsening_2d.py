@@ -99,30 +99,23 @@ def _draw(gmsh: Any, thinned: ThinnedOutline, sides: list[str], regions: list[st
     geo = gmsh.model.geo
     kept = sorted({v for chain in thinned.chains for v in chain.vertices})
     points = {v: geo.addPoint(*thinned.places[v], 0.0) for v in kept}
-    lines = [[geo.addLine(points[a], points[b]) for a, b in pairwise(c.vertices)] for c in thinned.chains]
+    edges = [(a, b, chain.side) for chain in thinned.chains for a, b in pairwise(chain.vertices)]
+    lines: dict[tuple[int, int], int] = {}
+    by_side: dict[int, list[int]] = {}
+    for a, b, side in edges:
+        line = geo.addLine(points[a], points[b])
+        lines |= {(a, b): line, (b, a): -line}
+        by_side.setdefault(side, []).append(line)
+    by_side.pop(NONE, None)
     surfaces: dict[int, list[int]] = {}
     for face in thinned.faces:
-        loops = [geo.addCurveLoop(_curves(lines, loop)) for loop in face.loops]
+        loops = [geo.addCurveLoop([lines[pair] for pair in pairwise([*ring, ring[0]])]) for ring in face.rings]
         surfaces.setdefault(face.region, []).append(geo.addPlaneSurface(loops))
     geo.synchronize()
-    for line in (line for found in lines for line in found):
-        gmsh.model.mesh.setTransfiniteCurve(line, 2)
+    for a, b, _ in edges:
+        gmsh.model.mesh.setTransfiniteCurve(lines[a, b], 2)
     add = gmsh.model.addPhysicalGroup
     return {
-        1: {sides[number]: add(1, found) for number, found in _lines_by_side(thinned, lines).items()},
+        1: {sides[number]: add(1, found) for number, found in by_side.items()},
         2: {regions[number]: add(2, found) for number, found in surfaces.items()},
     }
-
-
-def _lines_by_side(thinned: ThinnedOutline, lines: Sequence[Sequence[int]]) -> dict[int, list[int]]:
-    """Gmsh lines by the number of their side."""
-    found: dict[int, list[int]] = {}
-    for chain, own in zip(thinned.chains, lines, strict=True):
-        found.setdefault(chain.side, []).extend(own)
-    found.pop(NONE, None)
-    return found
-
-
-def _curves(lines: Sequence[Sequence[int]], loop: Sequence[tuple[int, bool]]) -> list[int]:
-    """Signed gmsh lines along a loop."""
-    return [line if forward else -line for number, forward in loop for line in lines[number][:: 1 if forward else -1]]

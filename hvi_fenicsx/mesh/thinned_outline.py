@@ -7,14 +7,14 @@ is kept, so that where the mesh is finer, the outline stays finer.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import shapely
 
 from ..typing import Array, Integers
-from . import polygons
 from .thresholds import DEFAULT, Thresholds
 
 NONE = -1
@@ -76,21 +76,19 @@ class Chain:
     right: int | None
 
 
-Loop = tuple[int, list[tuple[int, bool]]]
-"""A region to the left of a closed path, and the path's chains, each with whether it runs forward."""
-
-
 @dataclass(frozen=True)
 class Face:
     """A piece of a region.
 
     Attributes:
         region: number of the region, or NONE.
-        loops: (chain, whether it runs forward) along its boundary, then along each of its holes.
+        rings: the vertices along its boundary, then along each of its holes, each once.
+        area: within.
     """
 
     region: int
-    loops: list[list[tuple[int, bool]]]
+    rings: list[list[int]]
+    area: float
 
 
 @dataclass(frozen=True)
@@ -122,22 +120,44 @@ def trace(edges: HalfEdges, factor: float, thresholds: Thresholds = DEFAULT) -> 
     """
     places = dict(zip(edges.ends.ravel().tolist(), edges.points.reshape(-1, 2), strict=True))
     chains = _chains(edges, places, thresholds)
-    loops = _loops(chains)
-    if loops is None:
+    thinned = [_thinned(c, places, factor, thresholds) for c in chains]
+    if _ends_or_meets_itself(chains) or _touches_itself(thinned, places):
         return None
-    faces, thinned = _faces(chains, loops, places), [_thinned(c, places, factor, thresholds) for c in chains]
-    if faces is None or _touches_itself(thinned, places, thresholds):
+    before, after = _faces(chains, places), _faces(thinned, places)
+    whole = sum(face.area for face in before)
+    if abs(sum(face.area for face in after) - whole) >= thresholds.outline_area * whole:
         return None
-    before, after = (sum(polygons.area(p) for p in _polygons(c, loops, places)) for c in (chains, thinned))
-    if abs(after / before - 1.0) >= thresholds.outline_area:
-        return None
-    return ThinnedOutline(thinned, faces, places)
+    return ThinnedOutline(thinned, after, places)
 
 
-def _touches_itself(chains: Sequence[Chain], places: Mapping[int, Array], thresholds: Thresholds) -> bool:
-    pairs = np.array([pair for c in chains for pair in pairwise(c.vertices)])
-    segments = np.array([[places[a], places[b]] for a, b in pairs])
-    return polygons.edges_touch(pairs, segments, thresholds.outline_parallel)
+def _ends_or_meets_itself(chains: Sequence[Chain]) -> bool:
+    """Whether a side ends inside of a body, or the boundary of a region comes to a vertex twice."""
+    ends = [(region, c.vertices[0 if way else -1]) for c in chains for region, way in ((c.left, 1), (c.right, 0))]
+    starts = [end for end in ends if end[0] is not None]
+    return any(c.left == c.right for c in chains) or len(set(starts)) < len(starts)
+
+
+def _touches_itself(chains: Sequence[Chain], places: Mapping[int, Array]) -> bool:
+    """Whether two edges meet elsewhere than in a vertex of both."""
+    segments = [[places[a], places[b]] for c in chains for a, b in pairwise(c.vertices)]
+    return not shapely.MultiLineString(segments).is_simple
+
+
+def _faces(chains: Sequence[Chain], places: Mapping[int, Array]) -> list[Face]:
+    """What the chains enclose, where there are cells."""
+    number = {tuple(place): vertex for vertex, place in places.items()}
+    regions: dict[tuple[int, int], int | None] = {}
+    for chain in chains:
+        for a, b in pairwise(chain.vertices):
+            regions |= {(a, b): chain.left, (b, a): chain.right}
+    lines = [shapely.LineString([places[v] for v in chain.vertices]) for chain in chains]
+    found = []
+    for polygon in map(shapely.geometry.polygon.orient, shapely.polygonize(lines).geoms):
+        rings = [[number[xy] for xy in ring.coords[:-1]] for ring in (polygon.exterior, *polygon.interiors)]
+        region = regions[rings[0][0], rings[0][1]]  # counterclockwise: the face lies to the left
+        if region is not None:
+            found.append(Face(region, rings, polygon.area))
+    return found
 
 
 Label = tuple[int, int | None, int | None]
@@ -202,52 +222,3 @@ def _thinned(chain: Chain, places: Mapping[int, Array], factor: float, threshold
     pieces = max(least, round((len(path) - 1) / factor), int(np.ceil(turning / thresholds.outline_turn)))
     kept = np.unique(np.rint(np.linspace(0, len(path) - 1, pieces + 1)).astype(int))
     return Chain([path[i] for i in kept], chain.side, chain.left, chain.right)
-
-
-def _loops(chains: Sequence[Chain]) -> list[Loop] | None:
-    """Closed loops of chains by region, which lies on their left; None where one does not close."""
-    leaving: dict[tuple[int, int], list[tuple[int, bool]]] = defaultdict(list)
-    for number, chain in enumerate(chains):
-        if chain.left == chain.right:
-            return None
-        for region, forward in ((chain.left, True), (chain.right, False)):
-            if region is not None:
-                leaving[region, chain.vertices[0 if forward else -1]].append((number, forward))
-    if any(len(found) > 1 for found in leaving.values()):
-        return None
-    found = []
-    while leaving:
-        (region, at), _ = next(iter(leaving.items()))
-        loop: list[tuple[int, bool]] = []
-        while (region, at) in leaving:
-            loop += leaving.pop((region, at))
-            at = chains[loop[-1][0]].vertices[-1 if loop[-1][1] else 0]
-        if at != chains[loop[0][0]].vertices[0 if loop[0][1] else -1]:
-            return None
-        found.append((region, loop))
-    return found
-
-
-def _faces(chains: Sequence[Chain], loops: Sequence[Loop], places: Mapping[int, Array]) -> list[Face] | None:
-    """Loops that run counterclockwise, each with the clockwise ones of its region that lie inside of it."""
-    corners = _polygons(chains, loops, places)
-    areas = [polygons.area(p) for p in corners]
-    faces = {i: Face(loops[i][0], [loops[i][1]]) for i, area in enumerate(areas) if area > 0}
-    for i in (i for i, area in enumerate(areas) if area <= 0):
-        around = [j for j in faces if loops[j][0] == loops[i][0] and polygons.holds(corners[j], corners[i][0])]
-        if not around:
-            return None
-        faces[min(around, key=lambda j: areas[j])].loops.append(loops[i][1])
-    return list(faces.values())
-
-
-def _polygons(chains: Sequence[Chain], loops: Sequence[Loop], places: Mapping[int, Array]) -> list[Array]:
-    """The corners of each loop, (n, 2)."""
-    return [np.array([places[v] for v in _vertices(chains, loop)]) for _, loop in loops]
-
-
-def _vertices(chains: Sequence[Chain], loop: Sequence[tuple[int, bool]]) -> Iterator[int]:
-    """The vertices along a loop, each once."""
-    for number, forward in loop:
-        path = chains[number].vertices
-        yield from (path if forward else path[::-1])[:-1]

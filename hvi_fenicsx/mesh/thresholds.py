@@ -24,7 +24,6 @@ class Thresholds:
         outline_corner: angle (radian) by which an outline turns at a vertex that is kept in any case.
         outline_turn: angle (radian) by which an outline turns at most between two vertices that are kept: a coarse
             chord must stay near its curve.
-        outline_parallel: angle (radian) between two edges up to which they run along each other.
         outline_area: part of a plane body's area by which that within the thinned outline may differ.
         sampled_cells: cells, about, by which sizes, regions and ranks of a body in space are known.
         remeshed_size: part by which a remeshed body's volume, or the area of a side, may differ.
@@ -45,7 +44,6 @@ class Thresholds:
     coarsest: int = 2_500
     outline_corner: float = math.radians(20.0)
     outline_turn: float = math.radians(30.0)
-    outline_parallel: float = 1e-9
     outline_area: float = 0.1
     sampled_cells: int = 20_000
     remeshed_size: float = 0.25
