@@ -51,7 +51,7 @@ def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> PartVertices:
     local[order] = np.arange(len(order), dtype=np.int32)
     owned = int(np.count_nonzero(own))
     first = np.concatenate([[0], np.cumsum(comm.allgather(owned))])
-    places, others = _places(parts[comm.rank])[order], owner[order[owned:]].astype(np.int32)
+    places, others = _vertex_places(parts[comm.rank])[order], owner[order[owned:]].astype(np.int32)
     ghosts = np.empty(len(others), dtype=np.int64)
     for rank in np.unique(others):
         at = others == rank
@@ -65,7 +65,7 @@ def _counts(part: Box) -> Integers:
     return np.where(np.all(extent > 0), extent + 1, 0)
 
 
-def _places(part: Box) -> Integers:
+def _vertex_places(part: Box) -> Integers:
     """The integer coordinates of a part's vertices, x running fastest, (n, d)."""
     counts = _counts(part)
     ways = np.unravel_index(np.arange(int(np.prod(counts))), counts, order="F")

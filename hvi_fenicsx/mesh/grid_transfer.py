@@ -15,6 +15,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from ..typing import Array
+from .blocks import _flat
 from .transfer import Numbers, Rows, Transfer, mean_rows, weighted_rows
 
 
@@ -38,7 +39,7 @@ class NestedGridTransfer(Transfer):
         """
         near, far = points
         cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
-        place = np.rint(_places(near, self.size, 2 * cells)).astype(PETSc.IntType)
+        place = np.rint(_grid_places(near, self.size, 2 * cells)).astype(PETSc.IntType)
         parents = np.stack([_flat(end, cells) for end in (place // 2, (place + 1) // 2)], axis=1)
         pairs = _numbered(parents, coarse, far, self.size, cells)
         return mean_rows(pairs, fine.dofmap.index_map_bs)
@@ -60,7 +61,7 @@ class GridTransfer(Transfer):
         """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
         near, far = points
         cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
-        place = _places(near, self.size, cells)
+        place = _grid_places(near, self.size, cells)
         corner = np.clip(np.floor(place), 0, cells - 1).astype(PETSc.IntType)
         within = np.clip(place - corner, 0.0, 1.0)
         order = np.argsort(-within, axis=1)  # the path to the highest corner takes the largest coordinate first
@@ -73,7 +74,7 @@ class GridTransfer(Transfer):
         return weighted_rows(_numbered(numbers, coarse, far, self.size, cells), weights, fine.dofmap.index_map_bs)
 
 
-def _places(points: Array, size: Sequence[float], cells: Numbers) -> Array:
+def _grid_places(points: Array, size: Sequence[float], cells: Numbers) -> Array:
     """Grid coordinates of points, (n, d)."""
     return np.asarray(points[:, : len(size)] * (cells / np.array(size)))
 
@@ -81,14 +82,8 @@ def _places(points: Array, size: Sequence[float], cells: Numbers) -> Array:
 def _numbered(flat: Numbers, space: fem.FunctionSpace, points: Array, size: Sequence[float], cells: Numbers) -> Numbers:
     """PETSc's (block) numbers of grid vertices, which any rank may have. Collective."""
     start, end = space.dofmap.index_map.local_range
-    own = np.rint(_places(points[: end - start], size, cells)).astype(PETSc.IntType)
+    own = np.rint(_grid_places(points[: end - start], size, cells)).astype(PETSc.IntType)
     found = PETSc.AO().createMemoryScalable(
-        _flat(own, cells), np.arange(start, end, dtype=PETSc.IntType), comm=space.mesh.comm
+        _flat(own, cells).astype(PETSc.IntType), np.arange(start, end, dtype=PETSc.IntType), comm=space.mesh.comm
     )
-    return np.asarray(found.app2petsc(flat.ravel()).reshape(flat.shape))
-
-
-def _flat(place: Numbers, cells: Numbers) -> Numbers:
-    """Numbers of grid vertices by their integer coordinates (n, d), x running fastest."""
-    strides = np.concatenate([[1], np.cumprod(cells[:-1] + 1)]).astype(PETSc.IntType)
-    return sum((place[:, i] * step for i, step in enumerate(strides)), start=np.zeros(len(place), PETSc.IntType))
+    return np.asarray(found.app2petsc(flat.ravel().astype(PETSc.IntType)).reshape(flat.shape))

@@ -68,7 +68,7 @@ def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
         bodies: at least one, all of one dimension.
     """
     numbers = [_numbers(comm, bodies, i) for i in range(len(bodies))]
-    mesh, cells = joined_meshes.joined(comm, [_placed(body) for body in bodies], numbers)
+    mesh, cells = joined_meshes.common_mesh(comm, [_placed(body) for body in bodies], numbers)
     pairs = list(zip(bodies, cells, strict=True))
     sides = _united(found for body, at in pairs for found in _sides(mesh, body, at))
     regions = _united(found for body, at in pairs for found in _regions(body, at))

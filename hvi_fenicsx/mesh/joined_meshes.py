@@ -37,7 +37,7 @@ class PlacedMesh:
         return np.asarray(compat.geometry_dofmap(self.mesh)[: topology.index_map(topology.dim).size_local])
 
 
-def joined(
+def common_mesh(
     comm: MPI.Comm, parts: Sequence[PlacedMesh], numbers: Sequence[Integers]
 ) -> tuple[dmesh.Mesh, list[Entities]]:
     """The common mesh, and the local number in it of each part's local cells. Collective.

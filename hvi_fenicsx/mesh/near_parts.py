@@ -40,13 +40,13 @@ def _reflected(comm: MPI.Comm, body: PlacedBody, others: Sequence[PlacedBody]) -
         return body
     d = domain.dimension
     ways = [axes for count in range(d + 1) for axes in itertools.combinations(range(d), count)]
-    boxes = [_box(other) for other in others]
-    met = comm.allreduce(np.array([sum(_met(_box(body, axes), box) for box in boxes) for axes in ways]))
+    boxes = [_part_box(other) for other in others]
+    met = comm.allreduce(np.array([sum(_met(_part_box(body, axes), box) for box in boxes) for axes in ways]))
     best = ways[int(np.argmax(met >= (1.0 - _NEAR) * np.max(met)))]
     return replace(body, domain=domain.reflected(best)) if best else body
 
 
-def _box(body: PlacedBody, reflected: Sequence[int] = ()) -> Array:
+def _part_box(body: PlacedBody, reflected: Sequence[int] = ()) -> Array:
     """The box around this rank's part in its place, (2, d), along the axes of the coordinates; (0, d): no part."""
     domain = body.domain
     points = domain.mesh.geometry.x[:, : domain.dimension]

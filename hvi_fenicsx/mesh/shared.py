@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from ..runtime.mpi import agree
 
-T = TypeVar("T")
+Kept = TypeVar("Kept")
 
 
 class Shared:
@@ -18,7 +18,7 @@ class Shared:
     def __init__(self) -> None:
         self._kept: dict[str, tuple[Any, Any]] = {}
 
-    def get(self, comm: MPI.Comm, name: str, origin: Any, make: Callable[[], T]) -> T:
+    def get(self, comm: MPI.Comm, name: str, origin: Any, make: Callable[[], Kept]) -> Kept:
         """The object that was made from an equal origin, else a new one. Collective.
 
         Args:
@@ -31,5 +31,5 @@ class Shared:
         if not all(agree(comm, known)):
             self._kept.pop(name, None)  # first, so that there are never two of them
             self._kept[name] = (origin, make())
-        found: T = self._kept[name][1]
+        found: Kept = self._kept[name][1]
         return found
