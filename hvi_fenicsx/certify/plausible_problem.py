@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from petsc4py import PETSc
 
-from ..mesh import facet_sizes, nodes
-from ..mesh.curved_cells import CurvedMesh
+from ..mesh import facets, nodes
+from ..mesh.curved import CurvedMesh
 from ..problem import thresholds as composition
 from ..problem.contact_normals import largest_turn
 from ..problem.law_term import LawTerm
@@ -92,7 +92,7 @@ def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[
         return
     known = np.concatenate([np.empty(0, np.int32), *(domain.sides[name] for name in domain.curves)])
     for surface in (bounds.surface for bounds in problem.bounds):
-        turns = facet_sizes.turns(domain.mesh, np.setdiff1d(surface.facets, known).astype(np.int32))
+        turns = facets.turns(domain.mesh, np.setdiff1d(surface.facets, known).astype(np.int32))
         bent = turns[(turns > thresholds.straight) & (turns < thresholds.corner)]
         if total(comm, len(bent)) > thresholds.mostly_bent * total(comm, len(turns)):
             most = np.degrees(largest(comm, float(np.max(bent, initial=0.0))))

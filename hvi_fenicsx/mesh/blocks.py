@@ -12,18 +12,19 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from .. import compat
-from ..typing import Array, Entities, Integers
-from . import grid_facets, grid_parts
+from ..typing import Array, Entities, Integers, Mask
 from .domain import Domain
-from .grid_transfer import GridTransfer, NestedGridTransfer
 from .thresholds import DEFAULT, Thresholds
-from .transfer import Transfer
+from .transfer import Numbers, Rows, Transfer, mean_rows, weighted_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -110,7 +111,7 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], reflected:
         return compat.simplex_mesh(comm, simplices, _points(comm, size, cells), kind)
     parts = [part_of_rank(cells, comm.size, rank, reflected) for rank in range(comm.size)]
     lower, upper = parts[comm.rank]
-    own, counts = grid_parts.vertices(comm, parts), upper - lower
+    own, counts = vertices(comm, parts), upper - lower
     numbers = _simplices(np.zeros_like(counts), counts, counts)
     lines = [np.linspace(0.0, s, n + 1)[at] for s, n, at in zip(size, cells, own.places.T, strict=True)]
     whole = comm.size == 1  # dolfinx alone can say which facets ranks share
@@ -120,7 +121,7 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], reflected:
         own.local[numbers],
         index_map=(own.owned, own.ghosts, own.owners),
         inputs=_flat(own.places, cells),
-        facets=grid_facets.facets(numbers, _steps(counts), len(own.local)) if whole else None,
+        facets=facets(numbers, _steps(counts), len(own.local)) if whole else None,
     )
 
 
@@ -192,3 +193,178 @@ def _sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:
         middles = dmesh.compute_midpoints(mesh, d - 1, facets)
     ends = {n: (axis % d, end) for n, (axis, end) in _AXIS_OF_SIDE.items() if d == 3 or n not in ("front", "back")}
     return {name: facets[np.abs(middles[:, i] - end * size[i]) < 1e-9 * size[i]] for name, (i, end) in ends.items()}
+
+
+def facets(simplices: Integers, steps: Sequence[int], vertices: int) -> tuple[Entities, Entities]:
+    """The facets of a grid's simplices.
+
+    Args:
+        simplices: by their vertices, (c, d+1), ascending; the paths of one cell follow each other, in the order of the
+            permutations of the steps.
+        steps: from a vertex to the next one along each axis, (d,).
+        vertices: number of vertices.
+
+    Returns:
+        The vertices of each facet, (f, d), ascending; the facets of each simplex, (c, d+1), facet i being opposite to
+        vertex i.
+    """
+    d, paths = len(steps), [np.cumsum([0, *path]) for path in itertools.permutations(steps)]
+    shortened = [[tuple(np.delete(path - path[int(i == 0)], i)) for i in range(d + 1)] for path in paths]
+    kinds = {kind: number for number, kind in enumerate(dict.fromkeys(itertools.chain(*shortened)))}
+    own = np.array([[kinds[kind] for kind in row] for row in shortened], dtype=np.int32)
+    first = simplices[:, [1, *[0] * d]].reshape(-1, len(paths), d + 1)
+    keys = (first + own * vertices).reshape(-1, d + 1)
+    there = np.zeros(len(kinds) * vertices, dtype=np.bool_)
+    there[keys] = True
+    found, numbered = np.flatnonzero(there), np.cumsum(there, dtype=np.int32) - 1
+    ways = np.array(list(kinds), dtype=np.int64)
+    corners = found[:, None] % vertices + ways[found // vertices]
+    return corners.astype(np.int32), numbered[keys].astype(np.int32)
+
+
+Box = tuple[Integers, Integers]
+"""The first cell of a part, and the one after the last, (d,) both."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartVertices:
+    """The vertices of one rank's part.
+
+    Attributes:
+        places: their integer coordinates in the grid, those that the rank owns first, (n, d).
+        local: the local number of each vertex of the part's own grid, x running fastest, (n,).
+        owned: how many the rank owns.
+        ghosts: the global numbers of the others, (g,).
+        owners: the ranks that own these, (g,).
+    """
+
+    places: Integers
+    local: Entities
+    owned: int
+    ghosts: Integers
+    owners: Entities
+
+
+def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> PartVertices:
+    """The vertices of this rank's part. Collective.
+
+    Args:
+        comm: the ranks.
+        parts: of all ranks; those without cells have no vertices.
+    """
+    owner = _owners(parts, comm.rank)
+    own = owner == comm.rank
+    order = np.concatenate([np.flatnonzero(own), np.flatnonzero(~own)])
+    local = np.empty(len(order), dtype=np.int32)
+    local[order] = np.arange(len(order), dtype=np.int32)
+    owned = int(np.count_nonzero(own))
+    first = np.concatenate([[0], np.cumsum(comm.allgather(owned))])
+    places, others = _vertex_places(parts[comm.rank])[order], owner[order[owned:]].astype(np.int32)
+    ghosts = np.empty(len(others), dtype=np.int64)
+    for rank in np.unique(others):
+        at = others == rank
+        ghosts[at] = first[rank] + _numbers_of_owner(parts, int(rank), places[owned:][at])
+    return PartVertices(places=places, local=local, owned=owned, ghosts=ghosts, owners=others)
+
+
+def _counts(part: Box) -> Integers:
+    """Vertices each way; none where the part has no cells."""
+    extent = part[1] - part[0]
+    return np.where(np.all(extent > 0), extent + 1, 0)
+
+
+def _vertex_places(part: Box) -> Integers:
+    """The integer coordinates of a part's vertices, x running fastest, (n, d)."""
+    counts = _counts(part)
+    ways = np.unravel_index(np.arange(int(np.prod(counts))), counts, order="F")
+    return np.stack(ways, axis=1) + part[0]
+
+
+def _owners(parts: Sequence[Box], rank: int) -> Integers:
+    """The rank that owns each vertex of a part, x running fastest, (n,)."""
+    lower, upper = parts[rank]
+    owner = np.full(_counts(parts[rank]), rank, dtype=np.int64)
+    for other, (begin, end) in enumerate(parts[:rank]):
+        low, high = np.maximum(begin, lower), np.minimum(end, upper)
+        if owner.size and np.all(end > begin) and np.all(high >= low):
+            shared = tuple(slice(a, b + 1) for a, b in zip(low - lower, high - lower, strict=True))
+            owner[shared] = np.minimum(owner[shared], other)
+    return owner.ravel(order="F")
+
+
+def _numbers_of_owner(parts: Sequence[Box], rank: int, places: Integers) -> Integers:
+    """The numbers that a rank gives to vertices which it owns, counted from 0, (g,)."""
+    own: Mask = _owners(parts, rank) == rank
+    counts = _counts(parts[rank])
+    at = np.ravel_multi_index(tuple((places - parts[rank][0]).T), tuple(counts), order="F")
+    return np.asarray((np.cumsum(own) - 1)[at])
+
+
+@dataclass(frozen=True)
+class NestedGridTransfer(Transfer):
+    """From a block of half the cells each way to a block.
+
+    Attributes:
+        size: lengths of the block's edges, m, (d,).
+        coarser_cells: cells each way of the coarser block, (d,).
+    """
+
+    size: Sequence[float]
+    coarser_cells: Sequence[int]
+
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+        """Each fine vertex is the mean of the two ends of a coarse edge. Collective.
+
+        Odd coordinates run along a coarse edge from its lower to its upper end: an axis, or the diagonal of a face or
+        of a cell.
+        """
+        near, far = points
+        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
+        place = np.rint(_grid_places(near, self.size, 2 * cells)).astype(PETSc.IntType)
+        parents = np.stack([_flat(end, cells) for end in (place // 2, (place + 1) // 2)], axis=1)
+        pairs = _numbered(parents, coarse, far, self.size, cells)
+        return mean_rows(pairs, fine.dofmap.index_map_bs)
+
+
+@dataclass(frozen=True)
+class GridTransfer(Transfer):
+    """From a block to one of any other numbers of cells: linear interpolation.
+
+    Attributes:
+        size: lengths of the block's edges, m, (d,).
+        coarser_cells: cells each way of the coarser block, (d,).
+    """
+
+    size: Sequence[float]
+    coarser_cells: Sequence[int]
+
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+        """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
+        near, far = points
+        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
+        place = _grid_places(near, self.size, cells)
+        corner = np.clip(np.floor(place), 0, cells - 1).astype(PETSc.IntType)
+        within = np.clip(place - corner, 0.0, 1.0)
+        order = np.argsort(-within, axis=1)  # the path to the highest corner takes the largest coordinate first
+        falling = np.take_along_axis(within, order, axis=1)
+        ends = np.ones((len(place), 1)), np.zeros((len(place), 1))
+        weights = -np.diff(np.hstack([ends[0], falling, ends[1]]), axis=1)
+        ways = np.cumsum(np.eye(len(cells), dtype=PETSc.IntType)[order], axis=1, dtype=PETSc.IntType)
+        corners = np.concatenate([corner[:, None], corner[:, None] + ways], axis=1)
+        numbers = _flat(corners.reshape(-1, len(cells)), cells).reshape(weights.shape)
+        return weighted_rows(_numbered(numbers, coarse, far, self.size, cells), weights, fine.dofmap.index_map_bs)
+
+
+def _grid_places(points: Array, size: Sequence[float], cells: Numbers) -> Array:
+    """Grid coordinates of points, (n, d)."""
+    return np.asarray(points[:, : len(size)] * (cells / np.array(size)))
+
+
+def _numbered(flat: Numbers, space: fem.FunctionSpace, points: Array, size: Sequence[float], cells: Numbers) -> Numbers:
+    """PETSc's (block) numbers of grid vertices, which any rank may have. Collective."""
+    start, end = space.dofmap.index_map.local_range
+    own = np.rint(_grid_places(points[: end - start], size, cells)).astype(PETSc.IntType)
+    found = PETSc.AO().createMemoryScalable(
+        _flat(own, cells).astype(PETSc.IntType), np.arange(start, end, dtype=PETSc.IntType), comm=space.mesh.comm
+    )
+    return np.asarray(found.app2petsc(flat.ravel().astype(PETSc.IntType)).reshape(flat.shape))

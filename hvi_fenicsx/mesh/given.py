@@ -14,8 +14,8 @@ from ..errors import InputError
 from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Entities
-from . import folds, nodes, second_order
-from .curved_facets import CurvedFacets
+from . import cell_checks, nodes
+from .curved import CurvedFacets
 from .domain import Domain
 
 _SIMPLICES = ("triangle", "tetrahedron")
@@ -65,10 +65,10 @@ def _curves(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> dict[str, Curved
     points = nodes.points(space)[:, : mesh.geometry.dim]
     for name, facets in sides.items():
         curve = np.concatenate(agree(mesh.comm, points[nodes.facet_nodes(space, facets)]))
-        if len(turning := second_order.turning_back(curve)):
+        if len(turning := cell_checks.turning_back(curve)):
             place = spot(curve[turning[0]].mean(axis=0))
-            raise InputError(f"body: the side {name!r} has at {place} a {second_order.TURNING_BACK}")
-        if second_order.is_curved(curve):
+            raise InputError(f"body: the side {name!r} has at {place} a {cell_checks.TURNING_BACK}")
+        if cell_checks.is_curved(curve):
             found[name] = CurvedFacets(curve)
     return found
 
@@ -121,7 +121,7 @@ def _check_cells(mesh: dmesh.Mesh) -> None:
 
 def _check_folds(mesh: dmesh.Mesh) -> None:
     points, cells = mesh.geometry.x[:, : mesh.geometry.dim], compat.geometry_dofmap(mesh).astype(np.int64)
-    folded = folds.folded_cells(points, cells)
+    folded = cell_checks.folded_cells(points, cells)
     middles = [spot(points[cells[k]].mean(axis=0)) for k in folded[:1]]
     found = [middle for rank in agree(mesh.comm, middles) for middle in rank]
     if found:

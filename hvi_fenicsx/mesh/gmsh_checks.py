@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..geometry import spot
 from ..typing import Integers
-from . import folds, gmsh_arrays
+from . import cell_checks, gmsh_model
 
 _SIMPLEX = {1: 1, 2: 2, 3: 4}
 """Gmsh's element type of the linear simplex, by dimension."""
@@ -117,8 +117,8 @@ def _check_connections(gmsh: Any, path: Path, dimension: int) -> None:
 
 def _check_folds(gmsh: Any, path: Path, dimension: int) -> None:
     """Refuse cells that lie over each other."""
-    found = gmsh_arrays.extract(gmsh, dimension)
-    folded = folds.folded_cells(found.points[:, :dimension], found.cells)
+    found = gmsh_model.extract(gmsh, dimension)
+    folded = cell_checks.folded_cells(found.points[:, :dimension], found.cells)
     if len(folded):
         nodes = found.cells[folded[0]]
         where = spot(found.points[nodes].mean(axis=0)[:dimension])
@@ -128,12 +128,12 @@ def _check_folds(gmsh: Any, path: Path, dimension: int) -> None:
 
 def _elements(gmsh: Any, dimension: int) -> Integers:
     """Node tags of the simplices in groups, shape (n, dimension + 1), sorted in each row."""
-    return np.sort(gmsh_arrays.grouped(gmsh, dimension)[0] + 1, axis=1)
+    return np.sort(gmsh_model.grouped(gmsh, dimension)[0] + 1, axis=1)
 
 
 def _refuse_two_groups(gmsh: Any, path: Path, dimension: int) -> None:
     """Refuse elements that are listed twice; where they are in two groups, with the names of both."""
-    nodes, groups = gmsh_arrays.grouped(gmsh, dimension)
+    nodes, groups = gmsh_model.grouped(gmsh, dimension)
     rows = np.sort(nodes + 1, axis=1)
     distinct, counts = _counted(rows)
     if not np.any(counts > 1):

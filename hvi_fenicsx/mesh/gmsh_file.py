@@ -17,9 +17,9 @@ from ..runtime import helper_process, memory
 from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
 from . import gmsh_checks, gmsh_model
-from .curved_facets import CurvedFacets
+from .curved import CurvedFacets
 from .domain import Domain, check_affordable
-from .gmsh_arrays import MeshArrays
+from .gmsh_model import MeshArrays
 from .gmsh_reader import Request
 from .thresholds import DEFAULT, Thresholds
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,11 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from .. import compat
-from ..typing import Entities
-from . import gmsh_arrays
-from .gmsh_arrays import MeshArrays
+from ..errors import InputError
+from ..geometry import Outline
+from ..runtime.mpi import on_root
+from ..typing import Array, Entities, Integers
+from .domain import Domain
 
 
 @contextmanager
@@ -24,7 +27,7 @@ def session(comm: MPI.Comm) -> Iterator[Any]:
         return
     import gmsh
 
-    gmsh_arrays.start(gmsh)
+    start(gmsh)
     try:
         yield gmsh
     finally:
@@ -57,3 +60,147 @@ def distribute(
 def _by_name(entities: Entities, tags: Entities, names: Mapping[str, int]) -> dict[str, Entities]:
     """Local entities by the names of their tags."""
     return {name: np.unique(entities[tags == tag]) for name, tag in names.items()}
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    """A mesh of simplices with the tags of its physical groups.
+
+    Attributes:
+        points: coordinates of the nodes, (n, 3).
+        cells: nodes of the cells, counted from 0, (c, d+1).
+        cell_tags: physical group of each cell, (c,).
+        facets: nodes of the facets in physical groups, (f, d).
+        facet_tags: physical group of each facet, (f,).
+        curved: the nodes of facets of second order, corners first, then midpoints of edges in the order of basix; of
+            groups some of whose facets are curved, (k, n, 3).
+        curved_tags: physical group of each of these, (k,).
+    """
+
+    points: Array
+    cells: Integers
+    cell_tags: Entities
+    facets: Integers
+    facet_tags: Entities
+    curved: Array
+    curved_tags: Entities
+
+    @classmethod
+    def empty(cls, dimension: int) -> MeshArrays:
+        """What the ranks have that gmsh does not run on."""
+        return cls(np.empty((0, 3)), *_joined([], dimension), *_joined([], dimension - 1), *no_curves(dimension))
+
+
+def start(gmsh: Any) -> None:
+    """Start gmsh without the user's settings, and without its own messages."""
+    gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+
+
+def close_gaps(gmsh: Any) -> None:
+    """Number the nodes without gaps."""
+    tags = gmsh.model.mesh.getNodes()[0]
+    if len(tags) and np.max(tags) != len(tags):
+        gmsh.model.mesh.renumberNodes()
+
+
+def no_curves(dimension: int) -> tuple[Array, Entities]:
+    """The curved facets and their groups of a mesh that has none.
+
+    Args:
+        dimension: of the cells.
+    """
+    return np.empty((0, {2: 3, 3: 6}[dimension], 3)), np.empty(0, dtype=np.int32)
+
+
+def extract(gmsh: Any, dimension: int, curves: tuple[Array, Entities] | None = None) -> MeshArrays:
+    """The mesh that is open in gmsh; its nodes are numbered without gaps.
+
+    Args:
+        gmsh: the module.
+        dimension: of the cells.
+        curves: curved facets and their groups, if there are any.
+    """
+    tags, points, _ = gmsh.model.mesh.getNodes()
+    ordered = points.reshape(-1, 3)[np.argsort(tags)]
+    groups = *grouped(gmsh, dimension), *grouped(gmsh, dimension - 1)
+    return MeshArrays(ordered, *groups, *(curves or no_curves(dimension)))
+
+
+def grouped(gmsh: Any, dimension: int) -> tuple[Integers, Entities]:
+    """The simplices in physical groups.
+
+    Args:
+        gmsh: the module.
+        dimension: of the simplices.
+
+    Returns:
+        Their nodes, counted from 0, shape (n, dimension + 1), and their groups, shape (n,).
+    """
+    found: list[tuple[Integers, int]] = []
+    for _, group in gmsh.model.getPhysicalGroups(dimension):
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
+            for nodes in gmsh.model.mesh.getElements(dimension, entity)[2]:
+                found.append((np.asarray(nodes, dtype=np.int64).reshape(-1, dimension + 1) - 1, group))
+    return _joined(found, dimension)
+
+
+def _joined(found: list[tuple[Integers, int]], dimension: int) -> tuple[Integers, Entities]:
+    nodes = [np.empty((0, dimension + 1), dtype=np.int64), *(rows for rows, _ in found)]
+    tags = [np.empty(0, dtype=np.int32), *(np.full(len(rows), group, dtype=np.int32) for rows, group in found)]
+    return np.concatenate(nodes), np.concatenate(tags)
+
+
+_BODY = "body"
+_EXTENT = 1.6
+"""The extent at which gmsh meshes each outline."""
+_DIGITS = 13
+"""Decimals of the lengths that gmsh is given; what is rounding in them depends on the units."""
+
+
+def build(comm: MPI.Comm, outline: Outline, size: float) -> Domain:
+    """The body within an outline; its sides have the outline's names and curves. Collective.
+
+    Args:
+        comm: the ranks that share the mesh.
+        outline: its boundary, with the size of cells at its corners.
+        size: the size of cells elsewhere, m.
+
+    Raises:
+        InputError: on all ranks alike, when gmsh cannot mesh the shape.
+    """
+    unit = outline.extent / _EXTENT
+    with session(comm) as gmsh:
+        names = on_root(comm, lambda: _meshed(gmsh, outline.in_units(unit, _DIGITS), round(size / unit, _DIGITS)))
+        mesh, sides, _ = distribute(comm, gmsh and extract(gmsh, 2), 2, names)
+    mesh.geometry.x[:] *= unit
+    return Domain.from_mesh(mesh, sides, curves=outline.arcs(), one_piece=True)
+
+
+def _meshed(gmsh: Any, outline: Outline, size: float) -> dict[int, dict[str, int]]:
+    """Mesh the outline in gmsh; its physical groups by dimension and name. Rank 0 only."""
+    geo = gmsh.model.geo
+    corners = [geo.addPoint(x, y, 0.0, h) for (x, y), h in zip(outline.points, outline.sizes, strict=True)]
+    centres = {c: geo.addPoint(*c, 0.0, size) for _, c in outline.sides if c is not None}
+    edges: dict[str, list[int]] = {}
+    for i, (name, centre) in enumerate(outline.sides):
+        ends = corners[i], corners[(i + 1) % len(corners)]
+        edge = geo.addLine(*ends) if centre is None else geo.addCircleArc(ends[0], centres[centre], ends[1])
+        edges.setdefault(name, []).append(edge)
+    loop = geo.addCurveLoop([edge for found in edges.values() for edge in found], reorient=True)
+    surface = geo.addPlaneSurface([loop])
+    geo.synchronize()
+    groups = {name: gmsh.model.addPhysicalGroup(1, found, name=name) for name, found in edges.items()}
+    body = gmsh.model.addPhysicalGroup(2, [surface], name=_BODY)
+    _generate(gmsh)
+    return {1: groups, 2: {_BODY: body}}
+
+
+def _generate(gmsh: Any) -> None:
+    # Along an edge and inward the size is interpolated between the corners, so a fine corner stays local.
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
+    try:
+        gmsh.model.mesh.generate(2)
+    except Exception as error:
+        # gmsh raises bare Exceptions, whatever went wrong
+        raise InputError(f"domain: gmsh cannot mesh the shape: {error}; change mesh_size") from None

@@ -23,7 +23,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime import helper_process, processes
-from . import gmsh_arrays, gmsh_checks, gmsh_curves
+from ..typing import Array, Entities, Integers
+from . import cell_checks, gmsh_checks, gmsh_model
 
 _LINKED = "mesh.msh"
 
@@ -84,7 +85,7 @@ def _read(request: Request) -> dict[str, Any]:
     """
     import gmsh
 
-    gmsh_arrays.start(gmsh)
+    gmsh_model.start(gmsh)
     path, dimension = Path(request.path), request.dimension
     opened = path if request.is_script else _linked(path)
     if not helper_process.confine(request.memory) and request.is_script:
@@ -100,10 +101,10 @@ def _read(request: Request) -> dict[str, Any]:
         if "Out of memory" in reason:
             reason = f"it wants more than the {request.memory / 1024:.2g} GB that it may use; make it smaller"
         raise InputError(f"mesh file {path}: gmsh cannot read it: {reason}") from None
-    curves = gmsh_curves.straightened(gmsh, path, dimension)
+    curves = straightened(gmsh, path, dimension)
     gmsh_checks.check(gmsh, path, dimension, request.thresholds)
     names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
-    found = gmsh_arrays.extract(gmsh, dimension, curves)
+    found = gmsh_model.extract(gmsh, dimension, curves)
     return {**{name: getattr(found, name) for name in found.__annotations__}, "names": np.array(json.dumps(names))}
 
 
@@ -119,7 +120,7 @@ def _open(gmsh: Any, path: Path, dimension: int) -> None:
         gmsh.model.mesh.generate(dimension)
     if gmsh.model.getNumberOfPartitions():
         gmsh.model.mesh.unpartition()  # the ranks are shared out anew
-    gmsh_arrays.close_gaps(gmsh)  # a file may have lost some nodes with their cells
+    gmsh_model.close_gaps(gmsh)  # a file may have lost some nodes with their cells
 
 
 def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:
@@ -147,3 +148,55 @@ def _name(gmsh: Any, path: Path, dimension: int, tag: int) -> str:
 
 if __name__ == "__main__":
     main()
+
+
+_QUADRATIC = {1: 8, 2: 9, 3: 11}
+"""Gmsh's element type of the simplex of second order, by dimension."""
+_ORDER = {1: [0, 1, 2], 2: [0, 1, 2, 4, 5, 3]}
+"""Where basix has the nodes of a facet, by its dimension."""
+
+
+def straightened(gmsh: Any, path: Path, dimension: int) -> tuple[Array, Entities]:
+    """Make a mesh of second order one of first order; its curved facets (k, n, 3), and their groups (k,).
+
+    Facets of a group all of whose midpoints are in the middle of their edges are left out.
+
+    Args:
+        gmsh: the module, the file being open in it.
+        path: of the file, for messages.
+        dimension: of the cells, 2 or 3.
+
+    Raises:
+        InputError: a midpoint is so far from the middle of its edge that the curve turns back.
+    """
+    cells = set(gmsh.model.mesh.getElements(dimension)[0]) if gmsh.model.getDimension() == dimension else set()
+    if cells != {_QUADRATIC[dimension]}:
+        return gmsh_model.no_curves(dimension)
+    found = [_facets(gmsh, path, dimension - 1, group) for _, group in gmsh.model.getPhysicalGroups(dimension - 1)]
+    gmsh.model.mesh.setOrder(1)
+    gmsh_model.close_gaps(gmsh)
+    points, groups = zip(gmsh_model.no_curves(dimension), *found, strict=True)
+    return np.concatenate(points), np.concatenate(groups)
+
+
+def _facets(gmsh: Any, path: Path, dimension: int, group: int) -> tuple[Array, Entities]:
+    """The facets of a group and the group of each; none where they are straight.
+
+    Raises:
+        InputError: a midpoint is too far from the middle of its edge.
+    """
+    tags, points, _ = gmsh.model.mesh.getNodes()
+    place = dict(zip(tags.tolist(), points.reshape(-1, 3), strict=True))
+    rows: list[Integers] = [np.empty((0, len(_ORDER[dimension])), dtype=np.int64)]
+    for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
+        for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
+            if kind == _QUADRATIC[dimension]:
+                rows.append(np.asarray(nodes, dtype=np.int64).reshape(-1, len(_ORDER[dimension])))
+    nodes = np.concatenate(rows)[:, _ORDER[dimension]]
+    found = np.array([[place[node] for node in facet] for facet in nodes.tolist()]).reshape(*nodes.shape, 3)
+    if len(bad := cell_checks.turning_back(found)):
+        names = ", ".join(map(str, nodes[bad[0]]))
+        raise InputError(f"mesh file {path}: the boundary element of nodes {names} has a {cell_checks.TURNING_BACK}")
+    if not cell_checks.is_curved(found):
+        found = found[:0]
+    return found, np.full(len(found), group, dtype=np.int32)

@@ -10,13 +10,20 @@ A mesh in several pieces, such as a joint in one file, has the hierarchy of each
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from dolfinx import la
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
 
-from . import coarsening_2d, coarsening_3d, connected_pieces, refinement
-from .connected_pieces import Piece
+from .. import compat
+from ..runtime.mpi import agree, total
+from ..typing import Entities, Integers, Mask
+from . import coarsening_2d, coarsening_3d, refinement
+from . import facets as cell_facets
 from .domain import Domain
 from .joined import PlacedBody, coarsening
 from .thresholds import DEFAULT, Thresholds
@@ -33,7 +40,7 @@ def with_hierarchy(domain: Domain, thresholds: Thresholds = DEFAULT) -> Domain:
     d, unknowns = domain.dimension, _unknowns(domain)
     if domain.coarsening is not None or unknowns < thresholds.hierarchy_from:
         return domain
-    if len(found := connected_pieces.pieces(domain)) > 1:
+    if len(found := pieces(domain)) > 1:
         return _in_pieces(domain, found, thresholds)
     domain = replace(domain, one_piece=True)  # known from now on
     factor = 2.0 ** max(1, round(np.log2(unknowns / thresholds.coarsest) / d))
@@ -73,3 +80,145 @@ def _in_pieces(domain: Domain, pieces: Sequence[Piece], thresholds: Thresholds) 
     domains = with_hierarchies([piece.domain for piece in pieces], thresholds)
     bodies = [PlacedBody(name="", domain=one, origin=np.zeros(d), rotation=np.eye(d)) for one in domains]
     return replace(domain, coarsening=coarsening(domain.mesh, bodies, [piece.numbers for piece in pieces]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Piece:
+    """A piece of a mesh as a mesh of its own, whose cells are on the same ranks.
+
+    Attributes:
+        domain: the piece, with those sides and regions of the whole that it has a part of.
+        numbers: of its local vertices among the input's of the whole mesh.
+    """
+
+    domain: Domain
+    numbers: Integers
+
+
+def labels(domain: Domain) -> tuple[Integers, int]:
+    """The piece of each local cell, and how many there are in all. Collective.
+
+    Args:
+        domain: on any mesh.
+    """
+    mesh, d, comm = domain.mesh, domain.dimension, domain.mesh.comm
+    cells = mesh.topology.index_map(d)
+    if domain.one_piece:
+        return np.zeros(cells.size_local + cells.num_ghosts, np.int64), 1
+    mesh.topology.create_connectivity(d - 1, d)
+    facets = mesh.topology.connectivity(d - 1, d)
+    first = facets.array[facets.offsets[:-1]]
+    twice = np.flatnonzero(np.diff(facets.offsets) == 2)
+    pairs = np.column_stack([first[twice], facets.array[facets.offsets[twice] + 1]])
+    count, local = _joined(pairs, cells.size_local + cells.num_ghosts)
+    counts = agree(comm, count)
+    local = local + sum(counts[: comm.rank])
+    mine = local[first]
+    theirs = of_owners(mesh.topology.index_map(d - 1), mine)
+    apart = mine != theirs
+    shared = np.unique(np.column_stack([mine[apart], theirs[apart]]), axis=0)
+    whole, merged = _joined(np.vstack(agree(comm, shared)), sum(counts))
+    return merged[local], whole
+
+
+def _joined(pairs: Integers, size: int) -> tuple[int, Integers]:
+    """How many pieces so many nodes with these connections (k, 2) have, and the piece of each node."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(size, size))
+    count, found = connected_components(graph, directed=False)
+    return int(count), np.asarray(found, np.int64)
+
+
+def of_owners(index_map: Any, values: Integers) -> Integers:
+    """What the owners of shared entities hold. Collective.
+
+    Args:
+        index_map: of the entities.
+        values: at the local entities, owned and ghost, (n,).
+    """
+    vector = la.vector(index_map, 1, dtype=np.int64)
+    vector.array[:] = values
+    vector.scatter_forward()
+    return np.array(vector.array)
+
+
+def pieces(domain: Domain) -> list[Piece]:
+    """The pieces of a domain; the domain itself where it is in one piece. Collective.
+
+    Pieces that share a vertex (a hinge) each have it.
+
+    Args:
+        domain: on any mesh.
+    """
+    found, count = labels(domain)
+    if count == 1:
+        return [Piece(domain=domain, numbers=np.asarray(domain.mesh.geometry.input_global_indices, dtype=np.int64))]
+    return [_piece(domain, found == number) for number in range(count)]
+
+
+def _piece(domain: Domain, within: Mask) -> Piece:
+    """The piece of some local cells. Collective."""
+    whole = domain.mesh
+    cells = np.flatnonzero(within[: whole.topology.index_map(whole.topology.dim).size_local])
+    corners = compat.geometry_dofmap(whole)[cells]
+    numbers, points = _numbered(whole, corners)
+    kind = whole.topology.cell_name()
+    mesh = compat.simplex_mesh(whole.comm, numbers[corners], whole.geometry.x[points, : domain.dimension], kind)
+    offset = whole.comm.exscan(len(cells)) or 0
+    order = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)[: len(cells)] - offset
+    parents = cells[order].astype(np.int32)
+    own = np.empty(len(mesh.geometry.x), dtype=np.int64)
+    own[compat.geometry_dofmap(mesh)] = compat.geometry_dofmap(whole)[parents]
+    return Piece(
+        domain=Domain.from_mesh(
+            mesh, _sides(domain, parents, mesh), _regions(domain, parents), domain.curves, one_piece=True
+        ),
+        numbers=np.asarray(whole.geometry.input_global_indices, dtype=np.int64)[own],
+    )
+
+
+def _numbered(mesh: dmesh.Mesh, corners: Entities) -> tuple[Integers, Entities]:
+    """Vertices of some cells of all ranks counted through the ranks. Collective.
+
+    Args:
+        mesh: the whole mesh.
+        corners: this rank's cells by local vertices, (c, d+1).
+
+    Returns:
+        The number of each local vertex, right where it is a corner; and the local vertices that this rank counts.
+    """
+    index_map = mesh.geometry.index_map()
+    used = la.vector(index_map, 1, dtype=np.int64)
+    used.array[:] = 0
+    used.array[corners] = 1
+    used.scatter_reverse(la.InsertMode.add)
+    points = np.flatnonzero(used.array[: index_map.size_local])
+    numbers = np.zeros(len(used.array), dtype=np.int64)
+    numbers[points] = np.arange(len(points)) + (mesh.comm.exscan(len(points)) or 0)
+    return of_owners(index_map, numbers), points.astype(np.int32)
+
+
+def _sides(domain: Domain, parents: Entities, mesh: dmesh.Mesh) -> dict[str, Entities]:
+    """The facets of a piece on each side that it has a part of. Collective.
+
+    Args:
+        domain: the whole.
+        parents: the cell of the whole that each cell of the piece is, (c,).
+        mesh: of the piece.
+    """
+    own = np.arange(len(parents), dtype=np.int32)
+    sides = {n: cell_facets.in_copies(side, domain.mesh, parents, mesh, own) for n, side in domain.sides.items()}
+    return _present(mesh.comm, sides)
+
+
+def _regions(domain: Domain, parents: Entities) -> dict[str, Entities]:
+    """The cells of a piece in each region that it has a part of. Collective."""
+    found = {n: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for n, cells in domain.regions.items()}
+    return _present(domain.mesh.comm, found)
+
+
+def _present(comm: MPI.Comm, found: Mapping[str, Entities]) -> dict[str, Entities]:
+    """Those that some rank has. Collective."""
+    return {name: found[name] for name in sorted(found) if total(comm, len(found[name])) > 0}

@@ -16,9 +16,9 @@ from dolfinx import mesh as dmesh
 from .. import compat
 from ..geometry import Curve
 from ..typing import Array, Entities
-from . import curved_cells
-from .cell_facets import cell_facets
+from . import curved
 from .domain import Domain, check_affordable
+from .facets import cell_facets
 from .thresholds import DEFAULT, Thresholds
 from .transfer import Halves, ParentCellTransfer, Transfer
 
@@ -156,4 +156,4 @@ def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Entities], curves: Mapping[str, 
         on[name] = np.empty(0, dtype=np.int32)
         if len(sides[name]):  # dolfinx divides by their number
             on[name] = np.unique(dmesh.entities_to_geometry(mesh, mesh.topology.dim - 1, sides[name]))
-    mesh.geometry.x[:, :d] = curved_cells.onto_curves(mesh.geometry.index_map(), mesh.geometry.x[:, :d], on, curves)
+    mesh.geometry.x[:, :d] = curved.onto_curves(mesh.geometry.index_map(), mesh.geometry.x[:, :d], on, curves)

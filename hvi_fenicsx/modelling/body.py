@@ -18,9 +18,8 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..mesh import given
 from ..mesh.boundary_part import BoundaryPart, Inequalities
-from ..mesh.domain import Domain
+from ..mesh.domain import Domain, Shared
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
-from ..mesh.shared import Shared
 from ..mesh.thresholds import DEFAULT
 from ..mesh.transfer import Transfer
 from ..problem.interface_sides import Sides

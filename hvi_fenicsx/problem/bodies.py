@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..geometry import spot
-from ..mesh import connected_pieces
+from ..mesh import hierarchy
 from ..mesh.domain import Domain
 from ..rigid import AnyBody, JoinedBodies, Mode, RigidBody, rigid_fields
 from ..runtime.mpi import agree
@@ -99,7 +99,7 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array, meetings: Sequ
         InputError: on all ranks alike: two bodies meet at a vertex (in 3D perhaps along an edge) only, a hinge.
     """
     one = whole(domain)
-    cells, count = connected_pieces.labels(domain)
+    cells, count = hierarchy.labels(domain)
     if count == 1:
         return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
     labels = _vertices(domain, space, cells, points)
@@ -144,7 +144,7 @@ def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Integers, points:
     corners = space.dofmap.list
     labels[corners] = cells[: len(corners), None]
     hinges = corners[labels[corners] != cells[: len(corners), None]]
-    apart = np.flatnonzero(labels != connected_pieces.of_owners(space.dofmap.index_map, labels))
+    apart = np.flatnonzero(labels != hierarchy.of_owners(space.dofmap.index_map, labels))
     first = points[np.concatenate([hinges, apart])[:1]]
     found = [p for rank in agree(domain.mesh.comm, first.tolist()) for p in rank]
     if found:

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from ..effects import Averaged, Contribution, Effect, Place
 from ..mesh import nodes
-from ..mesh.shared import Shared
+from ..mesh.domain import Shared
 from ..runtime import forms
 from ..typing import Array
 from . import chosen_cells, nodal_averaging

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from ..effects import Place, SideMoments
 from ..formula import SpatialValue
-from ..mesh import curved_cells, nodes
+from ..mesh import curved, nodes
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
@@ -122,7 +122,7 @@ def _space(domain: Domain, degree: int) -> fem.FunctionSpace:
     return domain.once(
         f"space of degree {degree}",
         None,
-        lambda: displacement_space(curved_cells.mesh_of(domain, degree), degree),
+        lambda: displacement_space(curved.mesh_of(domain, degree), degree),
     )
 
 

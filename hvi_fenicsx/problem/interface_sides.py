@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..mesh import nodes, second_order
-from ..mesh.cell_facets import cell_facets
+from ..mesh import cell_checks, nodes
+from ..mesh.facets import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
 from . import curved_overlaps, curved_polygons, facet_overlaps, facet_polygons, spaces
@@ -88,7 +88,7 @@ def pair(context: DomainForms, name: str, sides: Sides) -> Pair:
         if not len(facets.nodes):
             raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
         found.append(facets)
-    curved = is_curved(context.space) and any(second_order.is_curved(facets.points) for facets in found)
+    curved = is_curved(context.space) and any(cell_checks.is_curved(facets.points) for facets in found)
     return Pair(name=name, sides=sides, first=found[0], second=found[1], curved=curved)
 
 

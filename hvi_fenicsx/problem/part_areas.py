@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from dolfinx import fem, la
 
-from ..mesh import facet_sizes, nodes
+from ..mesh import facets as facet_sizes
+from ..mesh import nodes
 from ..typing import Array, Entities
 from . import facet_integrals, spaces
 from .problem import Problem

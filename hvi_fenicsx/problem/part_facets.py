@@ -9,7 +9,7 @@ import numpy as np
 
 from ..effects import Place
 from ..errors import InputError
-from ..mesh import facet_sizes
+from ..mesh import facets as facet_sizes
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree

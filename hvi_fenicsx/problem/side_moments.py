@@ -8,7 +8,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..effects import SideMoments
-from ..mesh import facet_sizes
+from ..mesh import facets as facet_sizes
 from ..typing import Array, Entities
 from . import facet_integrals
 

@@ -16,7 +16,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .. import compat
-from ..mesh import nodes, point_location
+from ..mesh import nodes, transfer
 from ..report.contact_part import ContactPart
 from ..report.solution_arrays import SolutionArrays
 from ..typing import Array, Integers
@@ -75,7 +75,7 @@ class Targets:
                 _Mesh(arrays.points, beyond).containing(arrays.points[vertices]), : self.middles.shape[1] + 1
             ]
             corners = arrays.points[holding]
-            weights = point_location.clipped(point_location.barycentric_weights(corners, arrays.points[vertices]))
+            weights = transfer.clipped(transfer.barycentric_weights(corners, arrays.points[vertices]))
             self.others[name] = np.arange(len(self.points), len(self.points) + len(vertices))
             self.points = np.vstack([self.points, np.einsum("mc,mcd->md", weights, corners)])
             self.bodies = np.append(self.bodies, own[holding[:, 0]])
@@ -135,7 +135,7 @@ class _Mesh:
 
     def local(self, points: Array) -> Integers:
         """The number in the mesh of the cell that holds each point, or of the nearest one."""
-        return point_location.containing_cells(self._mesh, _in_space(points))
+        return transfer.containing_cells(self._mesh, _in_space(points))
 
     def at(self, values: Array, points: Array, cells: Integers) -> Array:
         """Vectors (m, d) at points in cells, from those at all nodes."""
@@ -175,7 +175,7 @@ def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.
     middles = geometry.create_midpoint_tree(line, d - 1, np.arange(len(part.facets), dtype=np.int32))
     nearest = geometry.compute_closest_entity(tree, middles, line, _in_space(points))
     corners = part.facets[line.topology.original_cell_index[nearest]]
-    weights = point_location.clipped(point_location.barycentric_weights(source.points[corners], points))
+    weights = transfer.clipped(transfer.barycentric_weights(source.points[corners], points))
     starts = np.arange(0, corners.size + 1, d)
     return sparse.csr_array(
         (weights.ravel(), rows_of(source, part)[corners].ravel(), starts), (len(points), len(part.vertices))

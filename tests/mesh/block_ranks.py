@@ -10,7 +10,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from hvi_fenicsx.mesh import blocks
-from hvi_fenicsx.mesh.grid_transfer import NestedGridTransfer
+from hvi_fenicsx.mesh.blocks import NestedGridTransfer
 
 
 def main() -> None:

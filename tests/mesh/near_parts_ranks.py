@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.joined import PlacedBody
-from hvi_fenicsx.mesh.near_parts import near_parts
+from hvi_fenicsx.mesh.placement import near_parts
 
 COMM = MPI.COMM_WORLD
 

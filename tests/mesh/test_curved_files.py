@@ -15,8 +15,9 @@ from mpi4py import MPI
 from runs import hvi, summary
 
 from hvi_fenicsx import InputError, Scene, prepare, read_scene
-from hvi_fenicsx.mesh import facet_sizes, gmsh_file, refinement
-from hvi_fenicsx.mesh.curved_facets import CurvedFacets
+from hvi_fenicsx.mesh import facets as facet_sizes
+from hvi_fenicsx.mesh import gmsh_file, refinement
+from hvi_fenicsx.mesh.curved import CurvedFacets
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.modelling import solve
 

@@ -14,7 +14,7 @@ from runs import hvi, write_scene
 from scenes import model
 
 from hvi_fenicsx import Body, InputError, compat
-from hvi_fenicsx.mesh.folds import folded_cells
+from hvi_fenicsx.mesh.cell_checks import folded_cells
 from hvi_fenicsx.typing import Array, Integers
 
 

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hvi_fenicsx.mesh import blocks, grid_parts
+from hvi_fenicsx.mesh import blocks
 
 
 def found_by_ranks(parts, counts):
     """What each rank finds when the ranks own so many vertices."""
     comms = [SimpleNamespace(rank=rank, size=len(parts), allgather=lambda _: counts) for rank in range(len(parts))]
-    return [grid_parts.vertices(comm, parts) for comm in comms]
+    return [blocks.vertices(comm, parts) for comm in comms]
 
 
 @pytest.mark.parametrize("reflected", [(), (0,)])

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from scenes import Table, model, quadratic_linear, two_blocks
 
 from hvi_fenicsx import Scene, Solution, prepare
-from hvi_fenicsx.mesh.grid_transfer import NestedGridTransfer
+from hvi_fenicsx.mesh.blocks import NestedGridTransfer
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.report.solution_arrays import SolutionArrays
 from hvi_fenicsx.results import gathering

@@ -23,7 +23,7 @@ from scipy.spatial import KDTree
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.mesh import gmsh_file, nodes, refinement
-from hvi_fenicsx.mesh.curved_cells import mesh_of
+from hvi_fenicsx.mesh.curved import mesh_of
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.report.solution_arrays import SolutionArrays
 from hvi_fenicsx.study.transfer import BodyTransfer, Targets

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
-from ...mesh import facet_sizes, nodes
+from ...mesh import facets, nodes
 from ...problem import spaces
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
@@ -66,7 +66,7 @@ def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) 
     table = np.array(_numbers_in_cell(degree, topology.cell_name()), dtype=np.int32)
     found = np.take_along_axis(space.dofmap.list[cells], table[number], axis=1)
     points = np.asarray(problem.points[on[:, :d]] / problem.scales.length)
-    return ContactFacets(degree, on, found, facet_sizes.areas(points), cells)
+    return ContactFacets(degree, on, found, facets.areas(points), cells)
 
 
 def _numbers_in_cell(degree: int, cell: str) -> list[list[int]]:

@@ -14,7 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 from dolfinx import fem, la
 
-from ...mesh import facet_sizes, nodes
+from ...mesh import facets as facet_sizes
+from ...mesh import nodes
 from ...problem import part_areas, spaces
 from ...problem.problem import Problem
 from ...typing import Array, Entities, Mask

@@ -4,11 +4,13 @@
 from ...class_registry import load_modules
 from .base import DomainShape, Thresholds
 from .block import Box, Rectangle
-from .l_shape import LShape
-from .disk import Disk, HalfDisk
-from .notched_strip import NotchedStrip
+from .plane import LShape
+from .plane import Disk
+from .plane import HalfDisk
+from .plane import NotchedStrip
 from .fixed_mesh import FixedMesh, MeshFile, Refinements
-from .given_mesh import GivenMesh, OnlyMesh
+from .fixed_mesh import GivenMesh
+from .fixed_mesh import OnlyMesh
 from .plane import PlaneShape
 from .several import PlacedShape, SeveralBodies
 # isort: on

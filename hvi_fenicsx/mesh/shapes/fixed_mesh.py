@@ -18,6 +18,16 @@ if TYPE_CHECKING:
 
     from ..domain import Domain
     from ..thresholds import Thresholds as MeshThresholds
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ConfigDict
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..domain import Domain
+    from ..thresholds import Thresholds as MeshThresholds
+
 
 MOST_REFINEMENTS = 10
 """A million cells or more from each of the mesh's own."""
@@ -106,3 +116,54 @@ class MeshFile(FixedMesh):
     def files(self) -> tuple[Path, ...]:
         """The mesh file."""
         return (self.file,)
+
+
+class GivenMesh(FixedMesh):
+    """A mesh that exists already. It is not registered: ``shape`` is "given mesh"."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    dimension: ClassVar[None] = None
+    normals: ClassVar[None] = None
+    regions: ClassVar[None] = None
+
+    given: Any = Field(exclude=True)
+    """the domain, unrefined"""
+    refinements: Refinements = 0
+    """number of uniform refinements"""
+
+    def space_dimension(self) -> int:
+        """The mesh's."""
+        return int(self.given.dimension)
+
+    def build(self, comm: MPI.Comm, dimension: int) -> Domain:
+        """The mesh as it was given."""
+        domain: Domain = self.given
+        return domain
+
+    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+        """How many the mesh has."""
+        vertices = self.given.mesh.topology.index_map(0).size_global
+        return float(dimension * vertices * 2 ** (dimension * self.refinements))
+
+
+class OnlyMesh(GivenMesh):
+    """A mesh that exists already and cannot be another, since a model has data on it."""
+
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+        """The mesh with the coarser ones that it has."""
+        return self.build(comm, dimension)
+
+    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+        """None: there is no other mesh."""
+        return self if factor == 1 else None
+
+    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+        """Refused."""
+        raise InputError(
+            "the model has data on its mesh (UFL, a fem.Function, an energy with such data), so it has no other mesh; "
+            "give loads, gaps and displacements as formulas or Python functions, energies without such data"
+        )
+
+    def mesh_text(self, length: Callable[[float], str]) -> str:
+        """There is one."""
+        return "the body's mesh"

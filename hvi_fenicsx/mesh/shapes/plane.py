@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from ...schema import Length, vector
 
 _MOST_CELLS = 2e8
 """Beyond this gmsh, which meshes on one rank, needs more memory than machines have."""
@@ -58,10 +62,10 @@ class PlaneShape(DomainShape):
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh that gmsh makes on rank 0. Collective."""
-        from .. import domain, gmsh_shapes
+        from .. import domain, gmsh_model
 
         domain.check_affordable(comm, self.unknowns(2), 2, "domain.mesh_size", "make it larger")
-        return gmsh_shapes.build(comm, self.outline(), self.mesh_size)
+        return gmsh_model.build(comm, self.outline(), self.mesh_size)
 
     def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
         """The shape with its mesh size doubled as long as the cells stay small beside its extent."""
@@ -113,3 +117,134 @@ def vertices(area: float, coarse: float, fine: float) -> float:
         return area / (_AREA_OF_VERTEX * coarse**2)
     whole = (math.log(coarse / fine) + fine / coarse - 1.0) / growth**2
     return math.pi * whole / _AREA_OF_VERTEX
+
+
+class Round(PlaneShape):
+    """A disk or a part of it that touches y = 0 at the origin, where its mesh may be finer.
+
+    Class attributes:
+        part: of the disk.
+    """
+
+    mesh_sizes: ClassVar[tuple[str, ...]] = ("mesh_size", "mesh_size_below")
+    part: ClassVar[float]
+
+    if TYPE_CHECKING:
+        radius: float
+        mesh_size_below: float | None
+
+    @property
+    def finest(self) -> float:
+        """The mesh size at the lowest point, m."""
+        return self.mesh_size_below or self.mesh_size
+
+    def box_area(self) -> float:
+        """Area of the square around the whole disk, m²."""
+        return 4.0 * self.radius**2
+
+    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+        """About how many unknowns the mesh has."""
+        return 2.0 * vertices(math.pi * self.radius**2 * self.part, self.mesh_size, self.finest)
+
+
+class Disk(Round):
+    """A disk whose lowest point is the origin."""
+
+    part: ClassVar[float] = 1.0
+    normals: ClassVar[Mapping[str, int | None]] = {"lower_arc": None, "upper_arc": None}
+
+    shape: Literal["disk"] = "disk"
+    """the centre is (0, radius); sides lower_arc, upper_arc"""
+    radius: Length
+    """radius of the disk, m"""
+    mesh_size: Length
+    """edge length of the triangles, m"""
+    mesh_size_below: Length | None = None
+    """edge length at the lowest point, m; it grows with the distance from there; by default `mesh_size`"""
+
+    def outline(self) -> Outline:
+        """Four arcs, the lowest point being a corner."""
+        r, coarse = self.radius, self.mesh_size
+        sides = [("lower_arc", (0.0, r))] * 2 + [("upper_arc", (0.0, r))] * 2
+        return Outline([(-r, r), (0.0, 0.0), (r, r), (0.0, 2 * r)], sides, [coarse, self.finest, coarse, coarse])
+
+
+class HalfDisk(Round):
+    """The lower half of a disk whose lowest point is the origin."""
+
+    part: ClassVar[float] = 0.5
+    normals: ClassVar[Mapping[str, int | None]] = {"arc": None, "top": 1}
+
+    shape: Literal["half_disk"] = "half_disk"
+    """the centre is (0, radius); sides arc, top (the flat side)"""
+    radius: Length
+    """radius of the disk, m"""
+    mesh_size: Length
+    """edge length of the triangles, m"""
+    mesh_size_below: Length | None = None
+    """edge length at the lowest point, m; it grows with the distance from there; by default `mesh_size`"""
+
+    def outline(self) -> Outline:
+        """Two arcs, the lowest point being a corner, and the flat top."""
+        r, coarse = self.radius, self.mesh_size
+        sides = [("arc", (0.0, r)), ("arc", (0.0, r)), ("top", None)]
+        return Outline([(-r, r), (0.0, 0.0), (r, r)], sides, [coarse, self.finest, coarse])
+
+
+class LShape(PlaneShape):
+    """An L: a rectangle without a smaller rectangle at its upper right corner."""
+
+    normals: ClassVar[Mapping[str, int | None]] = {
+        **{"left": 0, "right": 0, "bottom": 1, "top": 1},
+        **{"inner_right": 0, "inner_top": 1},
+    }
+
+    shape: Literal["l_shape"] = "l_shape"
+    """sides left, right, bottom, top, and inner_right, inner_top, which meet at the re-entrant corner"""
+    size: Annotated[tuple[Length, Length], vector(2)]
+    """width and height, m, a list of 2; the lower left corner is the origin"""
+    cut: Annotated[tuple[Length, Length], vector(2)]
+    """width and height of the smaller rectangle, m, a list of 2"""
+    mesh_size: Length
+    """edge length of the triangles, m"""
+
+    @model_validator(mode="after")
+    def _leaves_an_l(self) -> Self:
+        if self.cut[0] >= self.size[0] or self.cut[1] >= self.size[1]:
+            raise validation_error([Mistake(("cut",), "must be smaller than size in both directions")])
+        return self
+
+    def outline(self) -> Outline:
+        """The six sides."""
+        (w, h), (a, b) = self.size, self.cut
+        points = [(0.0, 0.0), (w, 0.0), (w, h - b), (w - a, h - b), (w - a, h), (0.0, h)]
+        return Outline.polygon(points, ["bottom", "right", "inner_top", "inner_right", "top", "left"], self.mesh_size)
+
+
+class NotchedStrip(PlaneShape):
+    """A rectangle with a V-shaped notch in the middle of its top side."""
+
+    normals: ClassVar[Mapping[str, int | None]] = {"left": 0, "right": 0, "bottom": 1, "top": 1, "notch": None}
+
+    shape: Literal["notched_strip"] = "notched_strip"
+    """sides left, right, bottom, top (both pieces), notch (both flanks)"""
+    size: Annotated[tuple[Length, Length], vector(2)]
+    """width and height, m, a list of 2; the lower left corner is the origin"""
+    notch: Annotated[tuple[Length, Length], vector(2)]
+    """width and depth of the notch, m, a list of 2"""
+    mesh_size: Length
+    """edge length of the triangles, m"""
+
+    @model_validator(mode="after")
+    def _leaves_a_strip(self) -> Self:
+        if self.notch[0] >= self.size[0] or self.notch[1] >= self.size[1]:
+            raise validation_error([Mistake(("notch",), "must be smaller than size in both directions")])
+        return self
+
+    def outline(self) -> Outline:
+        """The seven sides, two of which are the notch and two the top."""
+        (w, h), (a, b) = self.size, self.notch
+        notch = [((w + a) / 2, h), (w / 2, h - b), ((w - a) / 2, h)]
+        points = [(0.0, 0.0), (w, 0.0), (w, h), *notch, (0.0, h)]
+        names = ["bottom", "right", "top", "notch", "notch", "top", "left"]
+        return Outline.polygon(points, names, self.mesh_size)

@@ -194,13 +194,13 @@ class SeveralBodies(DomainShape):
         return self._joined(comm, with_hierarchies(domains, thresholds))
 
     def _joined(self, comm: MPI.Comm, domains: Sequence[Domain]) -> Domain:
-        from .. import body_overlaps
+        from .. import placement
         from ..joined import joined
-        from ..near_parts import near_parts
+        from ..placement import near_parts
 
         found = zip(self.bodies.items(), domains, strict=True)
         placed = [body.placed(name, domain) for (name, body), domain in found]
-        body_overlaps.check(comm, placed)
+        placement.check(comm, placed)
         return joined(comm, near_parts(comm, placed))
 
     def _with_forms(self, forms: Mapping[str, DomainShape]) -> Self:
