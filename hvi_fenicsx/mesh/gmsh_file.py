@@ -19,7 +19,7 @@ from ..schema import LONGEST, SHORTEST
 from . import gmsh_checks, gmsh_model
 from .curved import CurvedFacets
 from .domain import Domain, check_affordable
-from .gmsh_model import MeshArrays
+from .gmsh_checks import MeshArrays
 from .gmsh_reader import Request
 from .thresholds import DEFAULT, Thresholds
 

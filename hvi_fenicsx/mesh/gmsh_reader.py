@@ -24,7 +24,7 @@ import numpy as np
 from ..errors import InputError
 from ..runtime import helper_process, processes
 from ..typing import Array, Entities, Integers
-from . import cell_checks, gmsh_checks, gmsh_model
+from . import cell_checks, gmsh_checks
 
 _LINKED = "mesh.msh"
 
@@ -85,7 +85,7 @@ def _read(request: Request) -> dict[str, Any]:
     """
     import gmsh
 
-    gmsh_model.start(gmsh)
+    gmsh_checks.start(gmsh)
     path, dimension = Path(request.path), request.dimension
     opened = path if request.is_script else _linked(path)
     if not helper_process.confine(request.memory) and request.is_script:
@@ -104,7 +104,7 @@ def _read(request: Request) -> dict[str, Any]:
     curves = straightened(gmsh, path, dimension)
     gmsh_checks.check(gmsh, path, dimension, request.thresholds)
     names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
-    found = gmsh_model.extract(gmsh, dimension, curves)
+    found = gmsh_checks.extract(gmsh, dimension, curves)
     return {**{name: getattr(found, name) for name in found.__annotations__}, "names": np.array(json.dumps(names))}
 
 
@@ -120,7 +120,7 @@ def _open(gmsh: Any, path: Path, dimension: int) -> None:
         gmsh.model.mesh.generate(dimension)
     if gmsh.model.getNumberOfPartitions():
         gmsh.model.mesh.unpartition()  # the ranks are shared out anew
-    gmsh_model.close_gaps(gmsh)  # a file may have lost some nodes with their cells
+    gmsh_checks.close_gaps(gmsh)  # a file may have lost some nodes with their cells
 
 
 def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:
@@ -171,11 +171,11 @@ def straightened(gmsh: Any, path: Path, dimension: int) -> tuple[Array, Entities
     """
     cells = set(gmsh.model.mesh.getElements(dimension)[0]) if gmsh.model.getDimension() == dimension else set()
     if cells != {_QUADRATIC[dimension]}:
-        return gmsh_model.no_curves(dimension)
+        return gmsh_checks.no_curves(dimension)
     found = [_facets(gmsh, path, dimension - 1, group) for _, group in gmsh.model.getPhysicalGroups(dimension - 1)]
     gmsh.model.mesh.setOrder(1)
-    gmsh_model.close_gaps(gmsh)
-    points, groups = zip(gmsh_model.no_curves(dimension), *found, strict=True)
+    gmsh_checks.close_gaps(gmsh)
+    points, groups = zip(gmsh_checks.no_curves(dimension), *found, strict=True)
     return np.concatenate(points), np.concatenate(groups)
 
 
