@@ -12,7 +12,7 @@ import numpy as np
 from .. import compat
 from ..runtime.mpi import on_root
 from ..typing import Entities, Integers
-from . import gmsh_checks, gmsh_model, thinned_outline
+from . import gmsh_arrays, gmsh_model, thinned_outline
 from .domain import Domain
 from .facets import cell_facets
 from .thinned_outline import NONE, HalfEdges, ThinnedOutline
@@ -38,7 +38,7 @@ def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> 
         names = on_root(comm, lambda: _mesh(gmsh, _thinned(parts, factor, thresholds), sides, regions))
         if names is None:
             return None
-        mesh, found, within = gmsh_model.distribute(comm, gmsh and gmsh_checks.extract(gmsh, 2), 2, names)
+        mesh, found, within = gmsh_model.distribute(comm, gmsh and gmsh_arrays.extract(gmsh, 2), 2, names)
     mesh.geometry.x[:] *= domain.length
     return replace(domain, mesh=mesh, sides=found, regions={name: within[name] for name in regions}, shared=None)
 

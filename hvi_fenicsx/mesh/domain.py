@@ -32,7 +32,7 @@ class Domain:
         upper: upper corner, likewise.
         curves: the true curve of a side by its name, where it is known and not straight; the facets of all other
             sides are taken for the geometry itself.
-        one_piece: whether the mesh is known to be connected; else :mod:`.connected_pieces` finds out.
+        one_piece: whether the mesh is known to be connected; else :mod:`.hierarchy` finds out.
         bends: whether cells may have curved edges at degree 2; not where a program has data of the straight mesh.
         coarsening: makes the next coarser domain of the mesh hierarchy; None where there is none.
         shared: what several problems on this mesh have in common; None where one problem is all.

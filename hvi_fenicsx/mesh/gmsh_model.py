@@ -16,7 +16,7 @@ from ..geometry import Outline
 from ..runtime.mpi import on_root
 from ..typing import Entities
 from .domain import Domain
-from .gmsh_checks import MeshArrays, extract, start
+from .gmsh_arrays import MeshArrays, extract, start
 
 
 @contextmanager

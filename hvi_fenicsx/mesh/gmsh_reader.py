@@ -24,7 +24,7 @@ import numpy as np
 from ..errors import InputError
 from ..runtime import helper_process, processes
 from ..typing import Array, Entities, Integers
-from . import cell_checks, gmsh_checks
+from . import cell_checks, gmsh_arrays
 
 _LINKED = "mesh.msh"
 
@@ -45,7 +45,7 @@ class Request:
     is_script: bool
     dimension: int
     memory: float
-    thresholds: gmsh_checks.Thresholds
+    thresholds: gmsh_arrays.Thresholds
 
     def dumps(self) -> str:
         """As text."""
@@ -55,7 +55,7 @@ class Request:
     def loads(cls, text: str) -> Request:
         """From that text."""
         found = json.loads(text)
-        return cls(**{**found, "thresholds": gmsh_checks.Thresholds(**found["thresholds"])})
+        return cls(**{**found, "thresholds": gmsh_arrays.Thresholds(**found["thresholds"])})
 
 
 def main() -> None:
@@ -85,7 +85,7 @@ def _read(request: Request) -> dict[str, Any]:
     """
     import gmsh
 
-    gmsh_checks.start(gmsh)
+    gmsh_arrays.start(gmsh)
     path, dimension = Path(request.path), request.dimension
     opened = path if request.is_script else _linked(path)
     if not helper_process.confine(request.memory) and request.is_script:
@@ -102,9 +102,9 @@ def _read(request: Request) -> dict[str, Any]:
             reason = f"it wants more than the {request.memory / 1024:.2g} GB that it may use; make it smaller"
         raise InputError(f"mesh file {path}: gmsh cannot read it: {reason}") from None
     curves = straightened(gmsh, path, dimension)
-    gmsh_checks.check(gmsh, path, dimension, request.thresholds)
+    gmsh_arrays.check(gmsh, path, dimension, request.thresholds)
     names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
-    found = gmsh_checks.extract(gmsh, dimension, curves)
+    found = gmsh_arrays.extract(gmsh, dimension, curves)
     return {**{name: getattr(found, name) for name in found.__annotations__}, "names": np.array(json.dumps(names))}
 
 
@@ -120,7 +120,7 @@ def _open(gmsh: Any, path: Path, dimension: int) -> None:
         gmsh.model.mesh.generate(dimension)
     if gmsh.model.getNumberOfPartitions():
         gmsh.model.mesh.unpartition()  # the ranks are shared out anew
-    gmsh_checks.close_gaps(gmsh)  # a file may have lost some nodes with their cells
+    gmsh_arrays.close_gaps(gmsh)  # a file may have lost some nodes with their cells
 
 
 def _names(gmsh: Any, path: Path, dimension: int) -> dict[str, int]:
@@ -171,11 +171,11 @@ def straightened(gmsh: Any, path: Path, dimension: int) -> tuple[Array, Entities
     """
     cells = set(gmsh.model.mesh.getElements(dimension)[0]) if gmsh.model.getDimension() == dimension else set()
     if cells != {_QUADRATIC[dimension]}:
-        return gmsh_checks.no_curves(dimension)
+        return gmsh_arrays.no_curves(dimension)
     found = [_facets(gmsh, path, dimension - 1, group) for _, group in gmsh.model.getPhysicalGroups(dimension - 1)]
     gmsh.model.mesh.setOrder(1)
-    gmsh_checks.close_gaps(gmsh)
-    points, groups = zip(gmsh_checks.no_curves(dimension), *found, strict=True)
+    gmsh_arrays.close_gaps(gmsh)
+    points, groups = zip(gmsh_arrays.no_curves(dimension), *found, strict=True)
     return np.concatenate(points), np.concatenate(groups)
 
 

@@ -2,7 +2,7 @@
 
 Between a mesh and its refinement each vertex of the finer one is a vertex of the coarser one or the midpoint of an
 edge. Onto a mesh that is not nested the prolongation is linear interpolation. Blocks have transfers of their own
-(:mod:`.grid_transfer`).
+(:mod:`.blocks`).
 """
 
 from __future__ import annotations

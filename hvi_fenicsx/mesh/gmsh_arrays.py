@@ -1,4 +1,7 @@
-"""Whether a gmsh file makes a mesh at all: dolfinx takes that for granted, and else crashes or hangs."""
+"""What gmsh holds, as arrays, and whether it makes a mesh at all: dolfinx takes that for granted, or crashes.
+
+Light: gmsh's own process uses it.
+"""
 
 from __future__ import annotations
 

@@ -1,0 +1,94 @@
+"""The facets of cells and of their copies; corners, sizes and turns of those of a boundary part."""
+
+from __future__ import annotations
+
+import math
+
+import dolfinx
+import numpy as np
+from dolfinx import mesh as dmesh
+
+from ..typing import Array, Entities
+
+
+def cell_facets(mesh: dmesh.Mesh) -> Entities:
+    """Local facets of each local cell, shape (cells, d+1); the i-th lies opposite to the i-th vertex."""
+    d = mesh.topology.dim
+    mesh.topology.create_entities(d - 1)
+    mesh.topology.create_connectivity(d, d - 1)
+    mesh.topology.create_connectivity(d - 1, d)
+    return np.asarray(mesh.topology.connectivity(d, d - 1).array).reshape(-1, d + 1)
+
+
+def in_copies(facets: Entities, mesh: dmesh.Mesh, cells: Entities, other: dmesh.Mesh, copies: Entities) -> Entities:
+    """The facets of another mesh that are copies of some facets, sorted.
+
+    Args:
+        facets: local facets of a mesh; those of other cells than these are left out.
+        mesh: the mesh.
+        cells: local cells of it, (c,).
+        other: the other mesh.
+        copies: the local cell there that each is, its vertices in the same order, (c,).
+    """
+    of_cells = cell_facets(mesh)
+    on = np.zeros(of_cells.max(initial=-1) + 1, dtype=np.bool_)
+    on[facets] = True
+    return np.unique(cell_facets(other)[copies][on[of_cells[cells]]]).astype(np.int32)
+
+
+def owned(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Entities:
+    """Those of some local facets that this rank owns.
+
+    Args:
+        mesh: the mesh.
+        facets: local facets (owned and ghost).
+    """
+    return facets[facets < mesh.topology.index_map(mesh.topology.dim - 1).size_local]
+
+
+def corners(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
+    """The vertices of facets, m, (f, d, d): by facet, vertex and coordinate.
+
+    Args:
+        mesh: of simplices.
+        facets: local facets.
+    """
+    d = mesh.topology.dim
+    if not len(facets):  # dolfinx divides by their number
+        return np.empty((0, d, d))
+    found = dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets)
+    return np.asarray(mesh.geometry.x[found][:, :, :d])
+
+
+def areas(points: Array) -> Array:
+    """Lengths or areas of simplices by Gram's determinant, (f,).
+
+    Args:
+        points: their vertices, (f, d, d).
+    """
+    edges = points[:, 1:] - points[:, :1]
+    gram = np.einsum("fki,fli->fkl", edges, edges)
+    return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / math.factorial(edges.shape[1]))
+
+
+def turns(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
+    """The largest angle (rad, up to a right one) between a vertex's first facet and its others, by vertex.
+
+    Args:
+        mesh: of simplices.
+        facets: local facets.
+
+    Returns:
+        Of the vertices that have several of the facets, (n,).
+    """
+    points, d = corners(mesh, facets), mesh.topology.dim
+    edges = points[:, 1:] - points[:, :1]
+    normals = edges[:, 0, ::-1] * [1.0, -1.0] if d == 2 else np.cross(edges[:, 0], edges[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    nodes = dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets).ravel() if len(facets) else np.empty(0, np.int32)
+    _, first, vertex, count = np.unique(nodes, return_index=True, return_inverse=True, return_counts=True)
+    own = np.repeat(normals, d, axis=0)
+    along = np.abs(np.sum(own * own[first][vertex], axis=1))
+    least = np.ones(len(first))
+    np.minimum.at(least, vertex, along)
+    return np.asarray(np.arccos(np.minimum(least, 1.0))[count > 1])
