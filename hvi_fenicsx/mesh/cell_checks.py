@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from ..typing import Array, Integers, Mask
+from .thresholds import ROUNDING
 
 _ROUNDING = 1e-6
 """Part of the full angle that rounding may add."""
@@ -72,8 +73,6 @@ def _angles(points: Array, cells: Integers) -> Array:
 _EDGES = {2: [(0, 1)], 3: [(1, 2), (0, 2), (0, 1)]}
 """The edges of a facet by its corners, in the order of their midpoints, by the number of its corners."""
 _CORNERS = {3: 2, 6: 3}
-_STRAIGHT = 1e-9
-"""Distance of a midpoint from the middle of its edge over the edge's length that is rounding."""
 _FARTHEST = 0.25
 """The same along the edge: from there on the curve turns back."""
 TURNING_BACK = "midpoint that lies beyond the middle half of its edge, where a curve of second order turns back; remesh"
@@ -86,7 +85,7 @@ def is_curved(facets: Array) -> bool:
         facets: by their nodes, corners first, then midpoints in the order of basix, (k, n, d).
     """
     off, edge = _offsets(facets)
-    return bool(np.any(np.linalg.norm(off, axis=-1) > _STRAIGHT * np.linalg.norm(edge, axis=-1)))
+    return bool(np.any(np.linalg.norm(off, axis=-1) > ROUNDING * np.linalg.norm(edge, axis=-1)))
 
 
 def turning_back(facets: Array) -> Integers:

@@ -143,14 +143,10 @@ def _remeshed(
     if not _one_shell(triangles):
         return None
     try:
-        points, timeout = surface.corners.reshape(-1, 3)[first], _seconds_for_gmsh(thresholds, len(triangles))
-        return _run_gmsh(points, triangles, cells.midpoints, factor * cells.sizes, timeout)
+        points = surface.corners.reshape(-1, 3)[first]
+        return _run_gmsh(points, triangles, cells.midpoints, factor * cells.sizes, thresholds.gmsh_seconds)
     except (subprocess.SubprocessError, OSError):
         return None
-
-
-def _seconds_for_gmsh(thresholds: Thresholds, triangles: int) -> float:
-    return thresholds.gmsh_seconds + thresholds.gmsh_seconds_per_triangle * triangles
 
 
 def _run_gmsh(

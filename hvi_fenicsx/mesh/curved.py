@@ -21,7 +21,7 @@ from ..runtime.mpi import total
 from ..typing import Array, Entities, Integers
 from . import nodes, transfer
 from .domain import Domain
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, ROUNDING, Thresholds
 
 _MORE_SWEEPS = 2
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
@@ -130,8 +130,6 @@ def _jacobians(points: Array) -> Array:
     return np.asarray(signed * np.sign(straight)[:, None])
 
 
-_ROUNDING = 1e-12
-"""Distance from the middle of an edge, over the size of the side, that is rounding."""
 _STEPS = 12
 """Gauss-Newton steps from the projection onto the straight facet; the bend of a facet is a small part of its size."""
 
@@ -160,7 +158,7 @@ class CurvedFacets:
         result[point[order]] = found[order]
         straight, own = self._middles()
         away, number = KDTree(straight).query(x)
-        same = away <= _ROUNDING * np.linalg.norm(np.ptp(self.points, axis=(0, 1)))
+        same = away <= ROUNDING * np.linalg.norm(np.ptp(self.points, axis=(0, 1)))
         result[same] = own[number[same]]
         return result
 

@@ -16,45 +16,30 @@ from ..errors import InputError
 from ..geometry import spot
 from ..typing import Array, Entities, Integers
 from . import cell_checks
+from .thresholds import ROUNDING
 
 _SIMPLEX = {1: 1, 2: 2, 3: 4}
 """Gmsh's element type of the linear simplex, by dimension."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """What makes the mesh of a file unusable.
-
-    Attributes:
-        flat: ratio of a cell's inscribed to its circumscribed sphere (1 for an equilateral one), below which it has no
-            volume.
-        largest: coordinate, in the file's unit.
-        out_of_plane: height of a plane mesh, over its width.
-    """
-
-    flat: float = 1e-9
-    largest: float = 1e12
-    out_of_plane: float = 1e-12
+_LARGEST = 1e12
+"""The largest coordinate, in the file's unit."""
 
 
-DEFAULT = Thresholds()
-
-
-def check(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds = DEFAULT) -> None:
+def check(gmsh: Any, path: Path, dimension: int) -> None:
     """Refuse a mesh that dolfinx cannot take. Rank 0 only.
 
     Args:
         gmsh: the module, the file being open in it.
         path: of the file, for messages.
         dimension: of the cells, 2 or 3.
-        thresholds: what makes a mesh unusable.
 
     Raises:
         InputError: with the node or element tags of the first fault.
     """
     _check_cells(gmsh, path, dimension)
-    _check_points(gmsh, path, dimension, thresholds)
-    _check_quality(gmsh, path, dimension, thresholds)
+    _check_points(gmsh, path, dimension)
+    _check_quality(gmsh, path, dimension)
     _check_connections(gmsh, path, dimension)
     _check_folds(gmsh, path, dimension)
 
@@ -80,23 +65,22 @@ def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
         raise InputError(f"mesh file {path}: linear {shape} only, or those of order 2; remesh {way}")
 
 
-def _check_points(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds) -> None:
+def _check_points(gmsh: Any, path: Path, dimension: int) -> None:
     """Refuse coordinates that are not finite, too large, or not in the plane."""
     points = np.asarray(gmsh.model.mesh.getNodes()[1]).reshape(-1, 3)
     if not np.all(np.isfinite(points)):
         raise InputError(f"mesh file {path}: a node's coordinates are not finite numbers")
-    if np.max(np.abs(points)) > thresholds.largest:
-        largest = thresholds.largest
-        raise InputError(f"mesh file {path}: a node's coordinate is beyond ±{largest:g}; remesh near the origin")
-    if dimension == 2 and np.ptp(points[:, 2]) > thresholds.out_of_plane * np.ptp(points[:, :2]):
+    if np.max(np.abs(points)) > _LARGEST:
+        raise InputError(f"mesh file {path}: a node's coordinate is beyond ±{_LARGEST:g}; remesh near the origin")
+    if dimension == 2 and np.ptp(points[:, 2]) > ROUNDING * np.ptp(points[:, :2]):
         raise InputError(f"mesh file {path}: a 2D mesh must lie in a plane z = constant")
 
 
-def _check_quality(gmsh: Any, path: Path, dimension: int, thresholds: Thresholds) -> None:
+def _check_quality(gmsh: Any, path: Path, dimension: int) -> None:
     """Refuse cells without volume."""
     tags = gmsh.model.mesh.getElements(dimension)[1][0]
     quality = np.abs(gmsh.model.mesh.getElementQualities(tags, "gamma"))
-    if not np.all(quality > thresholds.flat):
+    if not np.all(quality > ROUNDING):
         raise InputError(f"mesh file {path}: cell {tags[int(np.argmin(quality))]} has no volume; remesh")
 
 

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..runtime import helper_process, memory
 from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
-from . import gmsh_arrays, gmsh_model
+from . import gmsh_model
 from .curved import CurvedFacets
 from .domain import Domain, check_affordable
 from .gmsh_arrays import MeshArrays
@@ -80,7 +80,6 @@ def _read(
         is_script=_is_script(path),
         dimension=dimension,
         memory=thresholds.gmsh_share * memory.free(),
-        thresholds=gmsh_arrays.DEFAULT,
     )
     try:
         done = helper_process.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], thresholds.gmsh_file_seconds)

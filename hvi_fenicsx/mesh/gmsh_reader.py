@@ -38,14 +38,12 @@ class Request:
         is_script: whether it is a script; else it is a mesh.
         dimension: of the cells, 2 or 3.
         memory: what may be used, MB.
-        thresholds: what makes a mesh unusable.
     """
 
     path: str
     is_script: bool
     dimension: int
     memory: float
-    thresholds: gmsh_arrays.Thresholds
 
     def dumps(self) -> str:
         """As text."""
@@ -55,7 +53,7 @@ class Request:
     def loads(cls, text: str) -> Request:
         """From that text."""
         found = json.loads(text)
-        return cls(**{**found, "thresholds": gmsh_arrays.Thresholds(**found["thresholds"])})
+        return cls(**found)
 
 
 def main() -> None:
@@ -102,7 +100,7 @@ def _read(request: Request) -> dict[str, Any]:
             reason = f"it wants more than the {request.memory / 1024:.2g} GB that it may use; make it smaller"
         raise InputError(f"mesh file {path}: gmsh cannot read it: {reason}") from None
     curves = straightened(gmsh, path, dimension)
-    gmsh_arrays.check(gmsh, path, dimension, request.thresholds)
+    gmsh_arrays.check(gmsh, path, dimension)
     names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
     found = gmsh_arrays.extract(gmsh, dimension, curves)
     return {**{name: getattr(found, name) for name in found.__annotations__}, "names": np.array(json.dumps(names))}

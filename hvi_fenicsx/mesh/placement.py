@@ -22,10 +22,8 @@ from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Array
 from .joined import PlacedBody
+from .thresholds import ROUNDING
 from .transfer import barycentric_weights
-
-_NEAR = 1e-6
-"""Parts this near meet, relative to the size of the larger one."""
 
 
 def near_parts(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> list[PlacedBody]:
@@ -50,7 +48,7 @@ def _reflected(comm: MPI.Comm, body: PlacedBody, others: Sequence[PlacedBody]) -
     ways = [axes for count in range(d + 1) for axes in itertools.combinations(range(d), count)]
     boxes = [_part_box(other) for other in others]
     met = comm.allreduce(np.array([sum(_met(_part_box(body, axes), box) for box in boxes) for axes in ways]))
-    best = ways[int(np.argmax(met >= (1.0 - _NEAR) * np.max(met)))]
+    best = ways[int(np.argmax(met >= (1.0 - ROUNDING) * np.max(met)))]
     return replace(body, domain=domain.reflected(best)) if best else body
 
 
@@ -71,7 +69,7 @@ def _met(one: Array, other: Array) -> float:
     """The area, in the plane the length, on which two boxes meet."""
     if not len(one) or not len(other):
         return 0.0
-    near = _NEAR * max(float(np.max(np.ptp(box, axis=0))) for box in (one, other))
+    near = ROUNDING * max(float(np.max(np.ptp(box, axis=0))) for box in (one, other))
     extents = np.sort(np.minimum(one[1], other[1]) - np.maximum(one[0], other[0]))
     return float(np.prod(extents[1:])) if extents[0] > -near and extents[1] > near else 0.0
 
@@ -107,7 +105,7 @@ def check(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> None:
     boxes = [_box(comm, corners) for corners in own]
     for i, j in permutations(range(len(bodies)), 2):
         low, high = np.maximum(boxes[i][0], boxes[j][0]), np.minimum(boxes[i][1], boxes[j][1])
-        if np.all(high - low > 1e-9 * np.max(boxes[i][1] - boxes[i][0])):
+        if np.all(high - low > ROUNDING * np.max(boxes[i][1] - boxes[i][0])):
             first, second = (_near(comm, own[k], low, high) for k in (i, j))
             at = _inside(first.middles, second)
             if len(at):

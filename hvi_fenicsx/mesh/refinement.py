@@ -84,7 +84,8 @@ def marked(domain: Domain, cells: Entities, thresholds: Thresholds = DEFAULT) ->
     topology.create_entities(1)
     topology.create_connectivity(domain.dimension, 1)
     lengths = _edge_lengths(domain.mesh, cells)
-    long = lengths >= thresholds.bisected_edges[domain.dimension] * lengths.max(axis=1, keepdims=True)
+    least = thresholds.bisected_edges if domain.dimension == 3 else 0.0
+    long = lengths >= least * lengths.max(axis=1, keepdims=True)
     edges = topology.connectivity(domain.dimension, 1).array.reshape(-1, lengths.shape[1])[cells]
     return _refined(domain, np.unique(edges[long]).astype(np.int32))
 

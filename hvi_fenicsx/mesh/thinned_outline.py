@@ -125,7 +125,7 @@ def trace(edges: HalfEdges, factor: float, thresholds: Thresholds = DEFAULT) -> 
         return None
     before, after = _faces(chains, places), _faces(thinned, places)
     whole = sum(face.area for face in before)
-    if abs(sum(face.area for face in after) - whole) >= thresholds.outline_area * whole:
+    if abs(sum(face.area for face in after) - whole) >= thresholds.remeshed_size * whole:
         return None
     return ThinnedOutline(thinned, after, places)
 
@@ -175,7 +175,7 @@ def _chains(edges: HalfEdges, places: Mapping[int, Array], thresholds: Threshold
         for v, around in neighbours.items()
         if len(around) != 2
         or labels[around[0], v] != labels[v, around[1]]
-        or _turn(places, around[0], v, around[1]) > thresholds.outline_corner
+        or _turn(places, around[0], v, around[1]) > thresholds.outline_turn
     }
     found: list[Chain] = []
     seen: set[tuple[int, int]] = set()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+
+ROUNDING = 1e-9
+"""Lengths so small beside the size of a cell, a facet or a body are rounding, and so are barycentric weights."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,43 +17,35 @@ class Thresholds:
         coarsest_block: cells each way of a block below which a coarser level does not help.
         uneven_half: part by which the cells of a coarser block may differ from half of an odd number.
         uneven_from: unknowns of a block whose cells cannot be halved from which a coarser one pays.
-        bisected_edges: length of the edges of a marked cell that are bisected, relative to its longest one, by
-            dimension. In space all six edges would make a step of 4 to 5 times the unknowns; the longest and, in a
-            sixth of a cube, the diagonals of its faces make it about 2.
+        bisected_edges: length of the edges of a marked tetrahedron that are bisected, relative to its longest one. All
+            six edges would make a step of 4 to 5 times the unknowns; the longest and, in a sixth of a cube, the
+            diagonals of its faces make it about 2.
         hierarchy_from: unknowns of a mesh file from which coarser meshes pay; with fewer, one factorisation takes less
             time than gmsh.
         coarsest: unknowns of the coarsest mesh of a mesh file, about.
-        outline_corner: angle (radian) by which an outline turns at a vertex that is kept in any case.
-        outline_turn: angle (radian) by which an outline turns at most between two vertices that are kept: a coarse
-            chord must stay near its curve.
-        outline_area: part of a plane body's area by which that within the thinned outline may differ.
+        outline_turn: angle (radian) by which an outline turns at a vertex that is kept in any case, and by which it
+            turns at most between two vertices that are kept: a coarse chord must stay near its curve.
         sampled_cells: cells, about, by which sizes, regions and ranks of a body in space are known.
-        remeshed_size: part by which a remeshed body's volume, or the area of a side, may differ.
+        remeshed_size: part by which a coarser mesh's volume, or the area of a side, may differ.
         gmsh_file_seconds: seconds that gmsh has to read a mesh file, and to mesh a script.
         gmsh_share: part of the memory that nothing uses which gmsh may take for a file.
-        gmsh_seconds: seconds that gmsh has in any case to remesh a body in space.
-        gmsh_seconds_per_triangle: seconds more for each triangle of its surface; it takes some 1e-4.
-        barycentric_rounding: a barycentric weight that is rounding: the point lies on the facet opposite to that
-            vertex.
+        gmsh_seconds: seconds that gmsh has to remesh a body in space: it takes some 1e-4 for each triangle of the
+            surface.
         least_jacobian: part of its straight size to which a curved cell may shrink anywhere.
     """
 
     coarsest_block: int = 4
     uneven_half: float = 0.07
     uneven_from: int = 5_000
-    bisected_edges: Mapping[int, float] = field(default_factory=lambda: {2: 0.0, 3: 0.76})
+    bisected_edges: float = 0.76
     hierarchy_from: int = 20_000
     coarsest: int = 2_500
-    outline_corner: float = math.radians(20.0)
-    outline_turn: float = math.radians(30.0)
-    outline_area: float = 0.1
+    outline_turn: float = math.radians(20.0)
     sampled_cells: int = 20_000
     remeshed_size: float = 0.25
     gmsh_file_seconds: float = 600.0
     gmsh_share: float = 0.8
-    gmsh_seconds: float = 5.0
-    gmsh_seconds_per_triangle: float = 1e-3
-    barycentric_rounding: float = 1e-9
+    gmsh_seconds: float = 60.0
     least_jacobian: float = 0.2
 
 

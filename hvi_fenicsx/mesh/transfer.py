@@ -21,14 +21,12 @@ from .. import compat
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from . import nodes
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import ROUNDING
 
 Numbers = npt.NDArray[np.integer]
 Halves = npt.NDArray[np.int8]
 Rows = tuple[Numbers, Numbers, Array]
 """Compressed rows of a sparse matrix: where each begins, columns, values."""
-_ROUNDING = 1e-14
-"""Weights up to this are zero."""
 
 
 class Transfer(ABC):
@@ -93,7 +91,7 @@ class ParentCellTransfer(Transfer):
         inside = 0.5 * np.einsum("nv,kvc->knc", places, kinds)[:, :, 1:]
         values = far.tabulate(0, inside.reshape(-1, inside.shape[2]))[0].reshape(*inside.shape[:2], -1)
         weights = np.linalg.solve(near.tabulate(0, places[:, 1:])[0], values)
-        weights[np.abs(weights) < _ROUNDING] = 0.0
+        weights[np.abs(weights) < ROUNDING] = 0.0
         own, owned = fine.dofmap.list[: len(self.parents)], fine.dofmap.index_map.size_local
         cell, number = np.empty(owned, dtype=np.int64), np.empty(owned, dtype=np.int64)
         for k, column in enumerate(own.T):
@@ -186,9 +184,7 @@ def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:
     return space.dofmap.index_map.size_local * d, space.dofmap.index_map.size_global * d
 
 
-def interpolation_weights(
-    points: Array, space: fem.FunctionSpace, vertices: Array, thresholds: Thresholds = DEFAULT
-) -> tuple[Integers, Array]:
+def interpolation_weights(points: Array, space: fem.FunctionSpace, vertices: Array) -> tuple[Integers, Array]:
     """The vertices of the cell that holds each point, and the point's weights of them. Collective.
 
     Each rank is sent the cells that may hold its points. A point outside of all cells is moved to the nearest one.
@@ -197,7 +193,6 @@ def interpolation_weights(
         points: this rank's points, m, (m, 3).
         space: P1 on the mesh in which they are located.
         vertices: local vertices of that mesh, m, (n, 3).
-        thresholds: which weight is rounding.
 
     Returns:
         Global numbers of vertices (blocks), and barycentric weights, (m, d+1) both.
@@ -212,9 +207,9 @@ def interpolation_weights(
     x[local] = corners
     kind = space.mesh.topology.cell_name()
     mesh = compat.simplex_mesh(MPI.COMM_SELF, local, x, kind)
-    found = mesh.topology.original_cell_index[containing_cells(mesh, points, thresholds)]
+    found = mesh.topology.original_cell_index[containing_cells(mesh, points)]
     weights = clipped(barycentric_weights(corners[found], points[:, :d]))
-    return numbers[found], clipped(np.where(weights < thresholds.barycentric_rounding, 0.0, weights))
+    return numbers[found], clipped(np.where(weights < ROUNDING, 0.0, weights))
 
 
 def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.FunctionSpace) -> tuple[Array, Integers]:
@@ -231,7 +226,7 @@ def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.Functio
     return np.concatenate([c for c, _ in found]), np.concatenate([n for _, n in found])
 
 
-def containing_cells(mesh: dolfinx.mesh.Mesh, points: Array, thresholds: Thresholds = DEFAULT) -> Integers:
+def containing_cells(mesh: dolfinx.mesh.Mesh, points: Array) -> Integers:
     """The cell that holds each point, or the one nearest to it.
 
     Among the cells whose boxes hold the point, it is the one whose smallest barycentric weight is largest: dolfinx's
@@ -240,7 +235,6 @@ def containing_cells(mesh: dolfinx.mesh.Mesh, points: Array, thresholds: Thresho
     Args:
         mesh: a mesh of this process alone.
         points: m, (m, 3).
-        thresholds: which weight is rounding.
     """
     d = mesh.topology.dim
     tree = geometry.bb_tree(mesh, d, padding=1e-12 * float(np.ptp(mesh.geometry.x)))
@@ -251,7 +245,7 @@ def containing_cells(mesh: dolfinx.mesh.Mesh, points: Array, thresholds: Thresho
     found, best = np.full(len(points), -1, dtype=np.int64), np.full(len(points), -np.inf)
     order = np.argsort(least)  # of several entries for one point, the last one stays
     found[point[order]], best[point[order]] = boxed.array[order], least[order]
-    outside = np.flatnonzero(best < -thresholds.barycentric_rounding)
+    outside = np.flatnonzero(best < -ROUNDING)
     if len(outside):
         everything = np.arange(mesh.topology.index_map(d).size_local, dtype=np.int32)
         middles = geometry.create_midpoint_tree(mesh, d, everything)

@@ -115,7 +115,7 @@ def test_outlines_that_cross_themselves_are_given_up() -> None:
 def test_a_coarse_mesh_of_another_area_is_given_up() -> None:
     body = HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2)
     assert coarsening_2d.coarsen(body, 4.0, COARSER) is not None
-    assert coarsening_2d.coarsen(body, 4.0, replace(COARSER, outline_area=1e-6)) is None
+    assert coarsening_2d.coarsen(body, 4.0, replace(COARSER, remeshed_size=1e-6)) is None
 
 
 @pytest.mark.parametrize("name", POLYGONS)

@@ -86,7 +86,7 @@ def test_what_is_solved_does_not_change(bored: Path) -> None:
 
 
 def test_a_mesher_that_takes_too_long_is_not_waited_for(bored: Path) -> None:
-    impatient = replace(COARSER, gmsh_seconds=0.01, gmsh_seconds_per_triangle=0.0)
+    impatient = replace(COARSER, gmsh_seconds=0.01)
     assert with_hierarchy(gmsh_file.read(COMM, bored, 3), impatient).coarser() is None
 
 

@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import InputError
 from hvi_fenicsx.errors import Interrupted
-from hvi_fenicsx.mesh import gmsh_arrays, gmsh_file
+from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.gmsh_reader import Request
 from hvi_fenicsx.mesh.thresholds import Thresholds
@@ -95,8 +95,8 @@ def test_a_script_can_do_no_harm(commands: str, tmp_path: Path) -> None:
 
 
 def test_a_script_is_not_opened_where_the_system_cannot_confine_it(tmp_path: Path) -> None:
-    file, thresholds = written(tmp_path / "m.geo", TRIANGLE), gmsh_arrays.DEFAULT
-    request = Request(path=str(file), is_script=True, dimension=2, memory=4e3, thresholds=thresholds)
+    file = written(tmp_path / "m.geo", TRIANGLE)
+    request = Request(path=str(file), is_script=True, dimension=2, memory=4e3)
     code = (
         "from hvi_fenicsx.mesh import gmsh_reader\n"
         "gmsh_reader.helper_process.confine = lambda memory: False\n"

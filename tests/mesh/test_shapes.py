@@ -28,7 +28,6 @@ from hvi_fenicsx.mesh.shapes import (
     PlaneShape,
     Rectangle,
     Refinements,
-    Thresholds,
 )
 from hvi_fenicsx.schema import Length
 
@@ -126,7 +125,6 @@ def file(tmp_path: Path) -> MeshFile:
 
 def test_the_coarsest_mesh_of_a_shape(file: MeshFile) -> None:
     assert SQUARE.coarsest().cells == (12, 4)
-    assert SQUARE.coarsest(Thresholds(fewest_adaptive=5)).cells == (24, 8)
     assert Box(size=(1.0, 1.0, 1.0), cells=(5, 20, 20)).coarsest().cells == (3, 10, 10)
     assert (ROUND.coarsest().mesh_size, ROUND.coarsest().mesh_size_below) == (0.2, 0.04)
     assert LShape(size=(1.0, 1.0), cut=(0.5, 0.5), mesh_size=0.2).coarsest().mesh_size == 0.2

@@ -2,7 +2,7 @@
 
 # isort: off
 from ...class_registry import load_modules
-from .base import DomainShape, Thresholds
+from .base import DomainShape
 from .block import Box, Rectangle
 from .plane import LShape
 from .plane import Disk
@@ -31,7 +31,6 @@ __all__ = [
     "Rectangle",
     "Refinements",
     "SeveralBodies",
-    "Thresholds",
 ]
 
 load_modules(__name__)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -24,24 +23,14 @@ if TYPE_CHECKING:
     from ..thresholds import Thresholds as MeshThresholds
 
 
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """How coarse a mesh may be, and how large one is taken to be before it is made.
-
-    Attributes:
-        fewest_adaptive: cells each way that the coarsest block of an adaptive solve has at least.
-        fewest_study: cells each way that a block of a study has at least.
-        largest_part: of the extent of a shape, that the cells of its coarsest mesh have at most.
-        unknowns_of_file: what a mesh file is taken to have, unrefined; it is not opened for that.
-    """
-
-    fewest_adaptive: int = 3
-    fewest_study: int = 2
-    largest_part: float = 1 / 6
-    unknowns_of_file: float = 5_000.0
-
-
-DEFAULT = Thresholds()
+FEWEST_ADAPTIVE = 3
+"""Cells each way that the coarsest block of an adaptive solve has at least."""
+FEWEST_STUDY = 2
+"""Cells each way that a block of a study has at least."""
+LARGEST_PART = 1 / 6
+"""Of the extent of a shape, that the cells of its coarsest mesh have at most."""
+UNKNOWNS_OF_FILE = 5_000
+"""What a mesh file is taken to have, unrefined; it is not opened for that."""
 LARGEST_BODY = 200.0
 """A longer body (m) may be one in mm."""
 
@@ -109,28 +98,26 @@ class DomainShape(Table):
         return with_hierarchy(self.build(comm, dimension), thresholds)
 
     @abstractmethod
-    def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
+    def coarsest(self) -> Self:
         """The shape with the mesh that an adaptive solve begins with."""
 
     @abstractmethod
-    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+    def refined(self, factor: Fraction) -> Self | None:
         """The shape with cells ``factor`` times finer each way; None where there is no such mesh.
 
         Args:
             factor: above 1 finer, below 1 coarser.
-            thresholds: how coarse a mesh may be.
 
         Raises:
             ValidationError: the mesh would be finer than the shape allows.
         """
 
     @abstractmethod
-    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+    def with_mesh(self, text: str) -> Self:
         """The shape with the mesh that a value of ``--axis mesh=`` names.
 
         Args:
             text: what the user wrote.
-            thresholds: how coarse a mesh may be.
 
         Raises:
             InputError: the text names no mesh of this shape; the message says what would.
@@ -150,12 +137,11 @@ class DomainShape(Table):
         return None
 
     @abstractmethod
-    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    def unknowns(self, dimension: int) -> float:
         """About how many unknowns the mesh has; it is not made for that.
 
         Args:
             dimension: of the scene, 2 or 3.
-            thresholds: what a mesh file is taken to have.
         """
 
     def implausible(self, length: float) -> tuple[str, ...]:

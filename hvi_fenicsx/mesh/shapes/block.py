@@ -12,7 +12,7 @@ from pydantic import model_validator
 
 from ...errors import InputError
 from ...schema import Count, Length, Mistake, validation_error, vector
-from .base import DEFAULT, DomainShape, Thresholds
+from .base import FEWEST_ADAPTIVE, FEWEST_STUDY, DomainShape
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -55,26 +55,26 @@ class Block(DomainShape):
         """The block, which has coarser ones of its own. Collective."""
         return self.build(comm, dimension)
 
-    def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
+    def coarsest(self) -> Self:
         """The block with its cells halved as long as enough are left each way."""
         cells = self.cells
-        while min(halved := tuple(math.ceil(n / 2) for n in cells)) >= thresholds.fewest_adaptive:
+        while min(halved := tuple(math.ceil(n / 2) for n in cells)) >= FEWEST_ADAPTIVE:
             cells = halved
         return self.changed(cells=cells)
 
-    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+    def refined(self, factor: Fraction) -> Self | None:
         """The block with ``factor`` times as many cells each way; None where they do not come out whole."""
         cells = [n * factor for n in self.cells]
-        if any(n.denominator != 1 or n < thresholds.fewest_study for n in cells):
+        if any(n.denominator != 1 or n < FEWEST_STUDY for n in cells):
             return None
         return self.changed(cells=tuple(map(int, cells)))
 
-    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+    def with_mesh(self, text: str) -> Self:
         """The block with so many cells along x, and along the other axes in proportion."""
-        fewest, first = thresholds.fewest_study, self.cells[0]
+        fewest, first = FEWEST_STUDY, self.cells[0]
         if not re.fullmatch("[0-9]{1,18}", text) or int(text) < fewest:
             raise InputError(f"{text!r} is no number of cells along x ({fewest} or more)")
-        block = self.refined(Fraction(int(text), first), thresholds)
+        block = self.refined(Fraction(int(text), first))
         if block is None:
             possible = ", ".join(str(int(first * f)) for f in self._factors(fewest))
             raise InputError(
@@ -98,7 +98,7 @@ class Block(DomainShape):
         """The longest side of the cells, m."""
         return max(s / n for s, n in zip(self.size, self.cells, strict=True))
 
-    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    def unknowns(self, dimension: int) -> float:
         """The number of unknowns."""
         return float(self._unknowns())
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from ...errors import InputError
 from ...schema import ExistingFile, Positive
-from .base import DEFAULT, DomainShape, Thresholds
+from .base import UNKNOWNS_OF_FILE, DomainShape
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -47,16 +47,16 @@ class FixedMesh(DomainShape):
 
         return refinement.repeated(super().build_hierarchy(comm, dimension, thresholds), self.refinements)
 
-    def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
+    def coarsest(self) -> Self:
         """The mesh as it is given."""
         return self.changed(refinements=0)
 
-    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+    def refined(self, factor: Fraction) -> Self | None:
         """The mesh refined more or less often; ``factor`` is a power of two."""
         often = self.refinements + factor.numerator.bit_length() - factor.denominator.bit_length()
         return self.changed(refinements=often) if 0 <= often <= MOST_REFINEMENTS else None
 
-    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+    def with_mesh(self, text: str) -> Self:
         """The mesh refined so often."""
         if not text.isdigit() or int(text) > MOST_REFINEMENTS:
             raise InputError(f"{text!r} is no number of refinements (0 to {MOST_REFINEMENTS})")
@@ -69,9 +69,9 @@ class FixedMesh(DomainShape):
             return f"{self.shape}, {'refined once' if often else 'as it is'}"
         return f"{self.shape}, refined {often} times"
 
-    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    def unknowns(self, dimension: int) -> float:
         """A guess: the mesh is not opened for it."""
-        return thresholds.unknowns_of_file * 2.0 ** (dimension * self.refinements)
+        return UNKNOWNS_OF_FILE * 2.0 ** (dimension * self.refinements)
 
 
 LONG = 20.0
@@ -140,7 +140,7 @@ class GivenMesh(FixedMesh):
         domain: Domain = self.given
         return domain
 
-    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    def unknowns(self, dimension: int) -> float:
         """How many the mesh has."""
         vertices = self.given.mesh.topology.index_map(0).size_global
         return float(dimension * vertices * 2 ** (dimension * self.refinements))
@@ -153,11 +153,11 @@ class OnlyMesh(GivenMesh):
         """The mesh with the coarser ones that it has."""
         return self.build(comm, dimension)
 
-    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+    def refined(self, factor: Fraction) -> Self | None:
         """None: there is no other mesh."""
         return self if factor == 1 else None
 
-    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+    def with_mesh(self, text: str) -> Self:
         """Refused."""
         raise InputError(
             "the model has data on its mesh (UFL, a fem.Function, an energy with such data), so it has no other mesh; "

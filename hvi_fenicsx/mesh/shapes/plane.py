@@ -13,7 +13,7 @@ from pydantic import model_validator
 from ...errors import InputError
 from ...geometry import Outline
 from ...schema import Mistake, validation_error
-from .base import DEFAULT, DomainShape, Thresholds
+from .base import LARGEST_PART, DomainShape
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -26,7 +26,7 @@ from ...schema import Length, vector
 
 _MOST_CELLS = 2e8
 """Beyond this gmsh, which meshes on one rank, needs more memory than machines have."""
-_AREA_OF_VERTEX = math.sqrt(3.0) / 2.0
+_AREA_OF_VERTEX = math.sqrt(3) / 2
 """Area that belongs to a vertex in a mesh of equilateral triangles, over h²."""
 
 
@@ -67,12 +67,12 @@ class PlaneShape(DomainShape):
         domain.check_affordable(comm, self.unknowns(2), 2, "domain.mesh_size", "make it larger")
         return gmsh_model.build(comm, self.outline(), self.mesh_size)
 
-    def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
+    def coarsest(self) -> Self:
         """The shape with its mesh size doubled as long as the cells stay small beside its extent."""
-        largest = math.sqrt(self.box_area()) * thresholds.largest_part
+        largest = math.sqrt(self.box_area()) * LARGEST_PART
         return self._finer(Fraction(1, 2 ** max(0, math.floor(math.log2(largest / self.mesh_size)))))
 
-    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+    def refined(self, factor: Fraction) -> Self | None:
         """The shape with its mesh sizes divided by ``factor``."""
         return self._finer(factor)
 
@@ -80,7 +80,7 @@ class PlaneShape(DomainShape):
         sizes = {name: getattr(self, name) for name in self.mesh_sizes}
         return self.changed(**{name: float(h / factor) for name, h in sizes.items() if h is not None})
 
-    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+    def with_mesh(self, text: str) -> Self:
         """The shape with this mesh size (m), its other sizes in proportion."""
         try:
             size = float(text)
@@ -98,7 +98,7 @@ class PlaneShape(DomainShape):
         """The mesh size, m."""
         return self.mesh_size
 
-    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    def unknowns(self, dimension: int) -> float:
         """About how many unknowns the mesh has, if all its cells have one size."""
         return 2.0 * vertices(self.outline().area, self.mesh_size, self.mesh_size)
 
@@ -142,7 +142,7 @@ class Round(PlaneShape):
         """Area of the square around the whole disk, m²."""
         return 4.0 * self.radius**2
 
-    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    def unknowns(self, dimension: int) -> float:
         """About how many unknowns the mesh has."""
         return 2.0 * vertices(math.pi * self.radius**2 * self.part, self.mesh_size, self.finest)
 

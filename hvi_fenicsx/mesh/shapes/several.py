@@ -21,7 +21,7 @@ from pydantic import (
 
 from ...errors import InputError
 from ...schema import LONGEST, Mistake, Table, choose, mistakes_of, shown, unknown, validation_error
-from .base import DEFAULT, DomainShape, Thresholds
+from .base import DomainShape
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -206,23 +206,23 @@ class SeveralBodies(DomainShape):
     def _with_forms(self, forms: Mapping[str, DomainShape]) -> Self:
         return self.changed(bodies={name: body.changed(form=forms[name]) for name, body in self.bodies.items()})
 
-    def coarsest(self, thresholds: Thresholds = DEFAULT) -> Self:
+    def coarsest(self) -> Self:
         """Each body with the mesh that an adaptive solve begins with."""
-        return self._with_forms({name: body.form.coarsest(thresholds) for name, body in self.bodies.items()})
+        return self._with_forms({name: body.form.coarsest() for name, body in self.bodies.items()})
 
-    def refined(self, factor: Fraction, thresholds: Thresholds = DEFAULT) -> Self | None:
+    def refined(self, factor: Fraction) -> Self | None:
         """Each body with cells ``factor`` times finer; None where one of them has no such mesh."""
-        found = {name: body.form.refined(factor, thresholds) for name, body in self.bodies.items()}
+        found = {name: body.form.refined(factor) for name, body in self.bodies.items()}
         forms = {name: form for name, form in found.items() if form is not None}
         return self._with_forms(forms) if len(forms) == len(found) else None
 
-    def with_mesh(self, text: str, thresholds: Thresholds = DEFAULT) -> Self:
+    def with_mesh(self, text: str) -> Self:
         """Each body with a mesh so many times finer."""
         try:
             factor = Fraction(text)
         except (ValueError, ZeroDivisionError):
             factor = Fraction(0)
-        found = self.refined(factor, thresholds) if factor > 0 else None
+        found = self.refined(factor) if factor > 0 else None
         if found is None:
             raise InputError(
                 f"{shown(text)} is no factor by which the meshes of all bodies can be made finer, like 1, 2 or 1/2"
@@ -239,9 +239,9 @@ class SeveralBodies(DomainShape):
         known = [width for width in found if width is not None]
         return max(known) if len(known) == len(found) else None
 
-    def unknowns(self, dimension: int, thresholds: Thresholds = DEFAULT) -> float:
+    def unknowns(self, dimension: int) -> float:
         """About how many unknowns all meshes have."""
-        return sum(body.form.unknowns(dimension, thresholds) for body in self.bodies.values())
+        return sum(body.form.unknowns(dimension) for body in self.bodies.values())
 
     def files(self) -> tuple[Path, ...]:
         """The files of all bodies."""
