@@ -144,10 +144,6 @@ def _name(gmsh: Any, path: Path, dimension: int, tag: int) -> str:
         ) from None
 
 
-if __name__ == "__main__":
-    main()
-
-
 _QUADRATIC = {1: 8, 2: 9, 3: 11}
 """Gmsh's element type of the simplex of second order, by dimension."""
 _ORDER = {1: [0, 1, 2], 2: [0, 1, 2, 4, 5, 3]}
@@ -198,3 +194,7 @@ def _facets(gmsh: Any, path: Path, dimension: int, group: int) -> tuple[Array, E
     if not cell_checks.is_curved(found):
         found = found[:0]
     return found, np.full(len(found), group, dtype=np.int32)
+
+
+if __name__ == "__main__":
+    main()
