@@ -19,21 +19,15 @@ from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
 from hvi_fenicsx.laws.smoothing import create
-from hvi_fenicsx.paths import curve, equations, segments
-from hvi_fenicsx.paths.branch import Passage, Refused
+from hvi_fenicsx.paths import segments
 from hvi_fenicsx.paths.distances import Distances
-from hvi_fenicsx.paths.equations import Bordered
 from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.full_load import at_full_load
-from hvi_fenicsx.paths.jumps import CurvedJump
 from hvi_fenicsx.paths.motion import Relaxation
-from hvi_fenicsx.paths.passages import Crossing, _Approach
-from hvi_fenicsx.paths.relations import ContactPoints, Values
 from hvi_fenicsx.paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.paths.thresholds import FollowingThresholds
 from hvi_fenicsx.paths.vertex_laws import is_straight
 from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
-from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
 
 Array = npt.NDArray[np.float64]
 DROP = [(0, 0), (1, 1), (1, 0.4)]
@@ -313,18 +307,6 @@ def test_a_load_that_turns_takes_a_free_body_to_its_other_side(
         assert rest[-1].work == pytest.approx(states[-1].work, abs=1e-9)
 
 
-def test_a_vector_of_no_length_but_for_rounding_moves_only_where_it_sets_out() -> None:
-    """A bond that falls less steeply than the spring along its slip is stiff, and more steeply than that across it."""
-    given = problem(np.diag([3.0, 0.5]), [1.0, 0.0], lengths(Exponential(1.0, 0.2, 0.5), 1))
-    follower = CurvedFollower(given, PathOptions(programme=(2.0,)))
-    states = follower.states()
-    assert next(s for s in states if s.event is Event.KINK).factor == pytest.approx(1.0)
-    points, z = follower._points, follower._branch.here.y[:-1]
-    for rounded in (z, z * (1.0 - 1e-15), z * (1.0 + 1e-15)):
-        assert points.unstable_directions(points.values(rounded)) == 0
-    assert all(state.stable for state in states)
-
-
 @pytest.mark.parametrize("seed", [0, 1, 36])
 def test_a_body_that_is_stiffer_than_its_laws_fall_never_jumps_nor_turns(seed: int) -> None:
     """The energy is strictly convex; slips turn on the way, and a bond that turned back slips on within a step."""
@@ -485,102 +467,6 @@ def test_a_curved_path_has_a_state_at_each_wanted_factor_that_it_comes_to(follow
         assert least[0] - 1e-9 <= state.factor - state.x[0] <= most[0] + 1e-9
 
 
-def test_the_derivatives_of_the_forces_are_those_of_the_matrix() -> None:
-    """Along random directions, at the states of a path on which slips turn."""
-    generator = np.random.default_rng(5)
-    follower, _ = path(oblique(SMOOTHED), programme=(0.6,))
-    points, values = follower._points, follower._branch.here.values
-    for direction in generator.standard_normal((5, 6)):
-        moved = points.stiffness @ (points.moved(values) @ direction) + points.risen(values) @ direction
-        assert moved == pytest.approx(points.jacobian(values) @ direction, rel=1e-12)
-
-
-def test_a_curve_is_followed_with_few_factorisations(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of a point serve beside it, with another row too: some two for each state; the peak is the same."""
-    made = []
-
-    class Counted(Bordered):
-        def __init__(self, matrix: Array, thresholds: FollowingThresholds) -> None:
-            made.append(1)
-            super().__init__(matrix, thresholds)
-
-    monkeypatch.setattr(equations, "Bordered", Counted)
-    given, options = line(Exponential(1.0, 0.2, 0.5), 8), {"programme": (9.0,), "follow": Follow.EXACT}
-    _, states = path(given, **options)
-    few = len(made)
-    monkeypatch.setattr(Counted, "takes", lambda self, row: False)
-    wanted = path(given, **options)[1]
-    assert peak(states) == pytest.approx(peak(wanted), rel=1e-12)
-    assert few < 2.5 * len(states)
-    assert len(made) - few > 1.5 * few
-
-
-def test_a_body_that_comes_off_is_let_go_where_it_is_out_of_reach() -> None:
-    """Steps in time grow; in one that would lead far beyond, where no digits are left, the motion ends on its way."""
-    given = plate(graph(DROP), 5, 0.7)
-    follower, states = path(given, programme=(9.0,))
-    start, points, load = follower._branch.here.y[:-1], follower._points, given.load(2.0 * peak(states))
-    motion = Relaxation(given, points, start, load, held=False, step=lambda: None)
-    motion.theta = 1e-8
-    assert motion.run(np.ones(len(points)))
-    assert motion.escapes
-    assert float(np.max(np.abs(points.s(motion.z)))) < 1e6
-
-
-@pytest.mark.parametrize("smoothing", ["chks", "log_exp"])
-def test_a_motion_passes_many_sharp_drops_in_few_steps(smoothing: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It rests where all bonds carry what their drops leave: S x = f - 0.4 w. No way is gone twice on the way there."""
-    evaluated = []
-
-    def counted(points: ContactPoints, z: Array) -> Values:
-        evaluated.append(1)
-        return values(points, z)
-
-    values = ContactPoints.values
-    given = line(create(smoothing, graph(DROP), epsilon=1e-6), 8)
-    given = replace(given, elastic=DenseStiffness(given.stiffness + 0.05 * np.eye(8)))
-    follower, _ = path(given, programme=(0.1,))
-    start, points, load = follower._branch.here.y[:-1], follower._points, np.linspace(1.0, 1.5, 8)
-    monkeypatch.setattr(ContactPoints, "values", counted)
-    motion = Relaxation(given, points, start, load, held=True, step=lambda: None)
-    assert motion.run(np.ones(len(points)))
-    x = np.linalg.solve(given.stiffness, load - 0.4 * given.bonds[0].weights)
-    assert values(points, motion.z).x == pytest.approx(x, rel=1e-5)
-    assert len(evaluated) < 4000
-
-
-class GoingRound(Crossing):
-    """Passages that lead from each of two cells to the other for ever."""
-
-    def _ways(self, approach: _Approach) -> Array:
-        return np.zeros_like(approach.rates)
-
-    def _pass(self, k: int, rates: Array) -> None:
-        points = self._points
-        before = points.segment(k)
-        points.enter(k, 1 - int(points.numbers[k]))
-        self.passages.append(Passage(point=k, before=before, after=points.segment(k)))
-
-
-def test_passages_that_go_round_end_soon() -> None:
-    """Not after as many as all points might need: each costs a factorisation."""
-    follower, _ = path(line(graph(DROP), 30), programme=(0.1,))
-    crossing = GoingRound(follower._branch, lambda: None)
-    with pytest.raises(Refused):
-        crossing.run()
-    assert len(crossing.passages) < 10
-
-
-def test_a_jump_lands_nowhere_from_where_passages_go_round(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The path could not go on from there: it would be told as lost, though another way may lead on."""
-    follower, _ = path(line(graph(DROP), 30), programme=(0.1,))
-    jump = CurvedJump(follower._problem, follower._branch, 1, True, lambda: None)
-    elsewhere = follower._branch.z + 1e-6
-    assert jump._landed(elsewhere) is not None
-    monkeypatch.setattr(curve, "Crossing", GoingRound)
-    assert jump._landed(elsewhere) is None
-
-
 @pytest.mark.parametrize("excess", [1e-2, 1e-3, 1e-6])
 def test_a_jump_that_is_shorter_than_a_step_is_seen(excess: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """A bond that falls a little faster than its spring k: k λ = k x + exp(-x) is 1 at rest, and again at 2 excess.
@@ -625,22 +511,6 @@ def test_a_jump_goes_on_in_the_sense_in_which_the_energy_falls(monkeypatch: pyte
     assert sum(state.event is Event.JUMP for state in states) > 5
     assert min(state.released for state in states) > -1e-12
     assert largest_distance(given, states, (0,)) < 1e-8
-
-
-class TurningBack(GoingRound):
-    """Passages that leave all numbers as they are: each point turns back once, to a graph of its own."""
-
-    def _ways(self, approach: _Approach) -> Array:
-        return np.array([np.inf if k in self._turned else 0.0 for k in range(len(approach.rates))])
-
-    def _pass(self, k: int, rates: Array) -> None:
-        self._turned.add(k)
-        self.passages.append(Passage(point=k, before=self._points.segment(k), after=self._points.segment(k)))
-
-
-def test_many_points_may_turn_back_at_one_state() -> None:
-    follower, _ = path(line(graph(DROP), 30), programme=(0.1,))
-    assert len(TurningBack(follower._branch, lambda: None).run()) == 30
 
 
 def test_smoothed_laws_tend_to_the_law() -> None:
