@@ -38,7 +38,7 @@ def scene_of(family: str, cells: int) -> Scene:
     """The scene of a family."""
     law, solver = FAMILIES[family]
     demo, size = ("jureczka_ochal.toml", [cells, cells // 2]) if law is None else ("strong_law.toml", [cells, cells])
-    table = read_scene(common.DEMOS / demo, [f"domain.cells={size}"]).model_dump(exclude_none=True)
+    table = read_scene(common.DEMOS / demo, [f"domain.cells={size}"]).tables()
     if law is not None:
         table["boundary"]["pull"]["traction"] = [6e6, 0.0]
         table["boundary"]["floor"]["friction"] = law

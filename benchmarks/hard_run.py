@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from hvi_fenicsx.certify.certificate import Examination
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.load_paths.following import Control, PathRun
-from hvi_fenicsx.scene import PathTable
+from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.workflow import Preparation, finish

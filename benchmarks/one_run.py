@@ -22,13 +22,13 @@ from mpi4py import MPI
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.certify.estimate.contact_errors import ratio
 from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.model import Scene
 from hvi_fenicsx.runtime import timing
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.scene import Scene
-from hvi_fenicsx.scene_model import model_of, options_of
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers.registry import options_of
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system import petsc_options
 from hvi_fenicsx.system.linear_settings import LinearSettings
@@ -70,7 +70,7 @@ def linear(scene: Scene, kind: str) -> Figures:
     timer = Timer()
     system, options, levels = assembled(scene, timer), options_of(scene.solver), ()
     if kind == "mg":
-        levels = nested_iteration.coarser_levels(model_of(scene), system, options, RunControl(timer=timer))
+        levels = nested_iteration.coarser_levels(scene.formulation(), system, options, RunControl(timer=timer))
     solver = ActiveSetSolver(system, levels, LinearSettings(KINDS[kind]), timer)
     _, iterations = resting_start(solver, [t.law for t in system.terms], scene.solver.tolerance)
     return {**timer.report(), "linear": iterations, "dofs": system.dofs, "certified": True}
@@ -80,7 +80,7 @@ def assembled(scene: Scene, timer: Timer) -> System:
     """The scene's system, on its mesh with its mesh hierarchy."""
     with timer("mesh"):
         domain = scene.domain.build_hierarchy(COMM, scene.dimension, Thresholds())
-    return assemble(domain, model_of(scene), timer)
+    return assemble(domain, scene.formulation(), timer)
 
 
 def plain(scene: Scene) -> Figures:

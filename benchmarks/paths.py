@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.modelling.following import ModelPath
-from hvi_fenicsx.scene.overrides import override
+from hvi_fenicsx.api.following import ModelPath
+from hvi_fenicsx.model.overrides import override
 
 LIST = Path(__file__).with_suffix(".toml")
 PAGE = common.ROOT / "docs" / "benchmarks" / "paths.md"

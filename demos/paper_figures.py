@@ -87,7 +87,7 @@ def boundary(points: Array, u: Array) -> tuple[Array, Array]:
 def law_of(wall: str) -> tuple[QuadraticLinear, float]:
     """The law of the scene, unsmoothed, and the paper's ε in N/m."""
     scene = read_scene(DEMOS / f"wall_{wall}.toml")
-    table = scene.model_dump()["boundary"]["floor"]["friction"]
+    table = scene.tables()["boundary"]["floor"]["friction"]
     law = create(table.pop("law"), table)
     epsilon = scene.solver.epsilon_absolute
     assert isinstance(law, QuadraticLinear)

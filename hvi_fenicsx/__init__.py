@@ -21,44 +21,46 @@ Names are loaded when they are first used, so that importing the package costs n
 from __future__ import annotations
 
 import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 _HOME = {
     "__version__": "runtime.versions",
-    "Adhesion": "modelling",
-    "Anisotropic": "modelling",
-    "Body": "modelling",
-    "BodyForce": "modelling",
-    "Cohesion": "modelling",
-    "Contact": "modelling",
-    "Displacement": "modelling",
-    "Energy": "modelling",
-    "Force": "modelling",
-    "Friction": "modelling",
+    "Adhesion": "effects",
+    "Anisotropic": "effects",
+    "Body": "model",
+    "BodyForce": "effects",
+    "Cohesion": "effects",
+    "Contact": "effects",
+    "Displacement": "effects",
+    "Energy": "model.energy",
+    "Force": "effects",
+    "Friction": "effects",
     "InputError": "errors",
-    "In": "modelling",
-    "Isotropic": "modelling",
-    "Model": "modelling",
-    "Moment": "modelling",
+    "In": "effects",
+    "Isotropic": "effects",
+    "Model": "model",
+    "Moment": "effects",
     "NewtonStep": "runtime.log",
-    "On": "modelling",
-    "Orthotropic": "modelling",
-    "Pressure": "modelling",
-    "Scene": "scene",
-    "Solution": "modelling",
+    "On": "effects",
+    "Orthotropic": "effects",
+    "Pressure": "effects",
+    "Scene": "model",
+    "Solution": "api",
     "Superpotential": "laws",
-    "Support": "modelling",
-    "Temperature": "modelling",
-    "Traction": "modelling",
-    "check": "modelling",
-    "dump_scene": "scene",
-    "equilibria": "modelling",
-    "follow": "modelling",
+    "Support": "effects",
+    "Temperature": "effects",
+    "Traction": "effects",
+    "check": "api",
+    "dump_scene": "model",
+    "equilibria": "api",
+    "follow": "api",
     "prepare": "workflow",
-    "read_scene": "scene",
+    "read_scene": "model",
     "set_log_level": "runtime.log",
-    "solve": "modelling",
-    "study": "modelling",
+    "solve": "api",
+    "study": "api",
 }
 __all__ = [
     "Adhesion",
@@ -101,39 +103,32 @@ __all__ = [
 
 if TYPE_CHECKING:
     from . import laws
-    from .errors import InputError
-    from .laws import Superpotential
-    from .modelling import (
+    from .api import Solution, check, equilibria, follow, solve, study
+    from .effects import (
         Adhesion,
         Anisotropic,
-        Body,
         BodyForce,
         Cohesion,
         Contact,
         Displacement,
-        Energy,
         Force,
         Friction,
         In,
         Isotropic,
-        Model,
         Moment,
         On,
         Orthotropic,
         Pressure,
-        Solution,
         Support,
         Temperature,
         Traction,
-        check,
-        equilibria,
-        follow,
-        solve,
-        study,
     )
+    from .errors import InputError
+    from .laws import Superpotential
+    from .model import Body, Model, Scene, dump_scene, read_scene
+    from .model.energy import Energy
     from .runtime.log import NewtonStep, set_log_level
     from .runtime.versions import __version__
-    from .scene import Scene, dump_scene, read_scene
     from .workflow import prepare
 
 
@@ -147,3 +142,14 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+
+
+class _Package(ModuleType):
+    """The package, in which a function keeps its name where a room has the same one: ``hvi.study``."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _HOME and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -106,7 +106,7 @@ def _run_on_ranks(options: argparse.Namespace) -> int:
 @contextmanager
 def _placed(options: argparse.Namespace) -> Iterator[None]:
     """Say where in the scene file a key stands that an error names."""
-    from .scene import with_place
+    from .model import with_place
 
     try:
         yield

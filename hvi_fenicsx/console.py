@@ -8,12 +8,12 @@ from typing import Any
 
 from .certify.certificate import Examination
 from .certify.estimate.estimator import Estimate
+from .model import PathTable
 from .paths.load_path import LoadPath
 from .problem import effect_summary
 from .reduced import loading
 from .rigid import AnyBody, LoadFactors, Mode
 from .runtime.terminal import percent
-from .scene import PathTable
 from .solvers import nested_iteration, registry
 from .solvers.method import Counts
 from .workflow import Preparation, Solution

@@ -71,6 +71,13 @@ class SpatialValue(ABC):
         """Whether it is known at all points; else it belongs to a mesh, and on others is known at its vertices only."""
         return True
 
+    def check_mesh(self, mesh: Any) -> None:  # noqa: B027
+        """Refuse a mesh that it does not belong to.
+
+        Raises:
+            InputError: it has data of another mesh.
+        """
+
     @abstractmethod
     def at(self, points: Array) -> Array:
         """Values at points of shape (n, 3), m; shape (n,). Not checked for finiteness."""

@@ -19,11 +19,11 @@ from ..certify.estimate.thresholds import DEFAULT as SAMPLING
 from ..mesh import nodes, refinement
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
+from ..model import Model
 from ..problem.problem import Problem
 from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
 from ..runtime.timing import Timer
-from ..scene import Scene
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.levels import Level, Levels
@@ -80,7 +80,7 @@ class AdaptiveSolver:
     existence: bool = False
     thresholds: Thresholds = DEFAULT
 
-    def begin(self, scene: Scene, comm: MPI.Comm) -> AdaptiveLevel:
+    def begin(self, scene: Model, comm: MPI.Comm) -> AdaptiveLevel:
         """Solve a scene on its own mesh, without a coarser one. Collective.
 
         Args:
@@ -92,7 +92,7 @@ class AdaptiveSolver:
         """
         return self._begun(prepare(scene, comm, self.timer, thresholds=self.thresholds))
 
-    def first_domain(self, scene: Scene, comm: MPI.Comm) -> Domain:
+    def first_domain(self, scene: Model, comm: MPI.Comm) -> Domain:
         """The body on the mesh to begin with. Collective.
 
         Args:
@@ -105,7 +105,7 @@ class AdaptiveSolver:
         with self.timer("mesh"):
             return coarsest(scene).domain.build_hierarchy(comm, scene.dimension, self.thresholds.mesh)
 
-    def begin_resolved(self, scene: Scene, domain: Domain, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
+    def begin_resolved(self, scene: Model, domain: Domain, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
         """As :meth:`begin`, on a mesh that is refined where the data on the boundary ask for it. Collective.
 
         Args:
@@ -131,7 +131,7 @@ class AdaptiveSolver:
         return AdaptiveLevel(prepared=prepared, solution=found.estimated(), levels=found.levels, step=None)
 
     def refine(
-        self, level: AdaptiveLevel, refined: Refinement, scene: Scene, ahead: fem.Function | None = None
+        self, level: AdaptiveLevel, refined: Refinement, scene: Model, ahead: fem.Function | None = None
     ) -> AdaptiveLevel:
         """Solve a scene on the refined mesh, from the solution on the coarser one. Collective.
 
@@ -157,7 +157,7 @@ class AdaptiveSolver:
         step, levels = found
         return self._solved(level, prepared, levels, step, ahead)
 
-    def again(self, level: AdaptiveLevel, scene: Scene) -> AdaptiveLevel:
+    def again(self, level: AdaptiveLevel, scene: Model) -> AdaptiveLevel:
         """Solve a scene with another solver table on the same mesh. Collective.
 
         Args:
@@ -168,7 +168,7 @@ class AdaptiveSolver:
         first = [Level(prepared.system, one.system, one.prolongation) for one in level.levels[:1]]
         return self._solved(level, prepared, (*first, *level.levels[1:]), _identity(before.load))
 
-    def _prepared(self, level: AdaptiveLevel, scene: Scene, domain: Domain) -> Preparation:
+    def _prepared(self, level: AdaptiveLevel, scene: Model, domain: Domain) -> Preparation:
         known = None if self.existence else level.solution.solvability
         return prepare(scene, level.comm, self.timer, domain, known, self.thresholds)
 
@@ -256,7 +256,7 @@ def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:
     return np.flatnonzero(squares >= everything[last] * (1 - 1e-9)).astype(np.int32)
 
 
-def coarsest(scene: Scene) -> Scene:
+def coarsest(scene: Model) -> Model:
     """The scene on the mesh to begin with: its own, made coarser as far as its shape allows."""
     return scene.changed(domain=scene.domain.coarsest())
 

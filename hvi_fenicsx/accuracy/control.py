@@ -11,9 +11,9 @@ from mpi4py import MPI
 
 from ..mesh import nodes
 from ..mesh.domain import Domain
+from ..model import Model
 from ..runtime import memory
 from ..runtime.mpi import largest
-from ..scene import Scene
 from . import adaptive, quantities
 from .adaptive import AdaptiveLevel, AdaptiveSolver
 from .error_balance import Elements, ErrorBalance
@@ -25,7 +25,7 @@ _LARGEST = 2**31 - 1
 
 
 def solve_to_goal(
-    scene: Scene,
+    scene: Model,
     comm: MPI.Comm,
     goal: Goal,
     solver: AdaptiveSolver,
@@ -67,7 +67,7 @@ def solve_to_goal(
 
 
 def _at_cheaper_degree(
-    scene: Scene, goal: Goal, domain: Domain, begun: Callable[[int], AdaptiveRun], thresholds: ControlThresholds
+    scene: Model, goal: Goal, domain: Domain, begun: Callable[[int], AdaptiveRun], thresholds: ControlThresholds
 ) -> tuple[AdaptiveRun, DegreeChoice | None]:
     """The run on its first mesh, and how its degree was chosen where both were tried. Collective.
 
@@ -105,7 +105,7 @@ class AdaptiveRun:
         steps: the meshes whose error is known.
     """
 
-    scene: Scene
+    scene: Model
     domain: Domain
     goal: Goal
     solver: AdaptiveSolver

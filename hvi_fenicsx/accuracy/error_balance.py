@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model import Model
 from ..runtime import memory
-from ..scene import Scene
 from .goal import AdaptiveStep
 from .quantity_base import Quantity
 from .thresholds import CONTROL, ControlThresholds
@@ -115,7 +115,7 @@ class ErrorBalance:
         """The error that smoothing may cause: a part of the accuracy, or all that a fine enough mesh leaves."""
         return max(self.thresholds.smoothing * self.accuracy, self._beside(mesh))
 
-    def next_scene(self, scene: Scene, last: AdaptiveStep) -> Scene:
+    def next_scene(self, scene: Model, last: AdaptiveStep) -> Model:
         """The scene with the ε and the tolerance of the next step.
 
         Args:

@@ -12,10 +12,10 @@ from mpi4py import MPI
 
 from .. import console
 from ..errors import ExitCode
+from ..model import read_scene
 from ..problem import side_moments
 from ..runtime import terminal
 from ..runtime.mpi import on_root
-from ..scene import read_scene
 from ..solvers import obstacle_force
 from ..system import existence
 from ..workflow import Preparation, prepare

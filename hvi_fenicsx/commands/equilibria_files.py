@@ -14,12 +14,12 @@ from ..equilibrium_search.found import Found
 from ..equilibrium_search.search import falls_passed
 from ..equilibrium_search.stationarity import StationaryPoint
 from ..errors import ExitCode
+from ..model import dump_scene
 from ..results import ResultFolder, plain, tables
 from ..results.summary import common
 from ..results.whole import write_record
 from ..runtime import writing
 from ..runtime.mpi import largest, on_root
-from ..scene import dump_scene
 from ..typing import Array
 from ..workflow import Preparation, Solution
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from .. import console
 from ..load_paths.following import Control, PathRun
+from ..model import PathTable
 from ..paths.load_path import PathRow
 from ..paths.state import End
 from ..results import path_files
@@ -14,7 +15,6 @@ from ..runtime import journal
 from ..runtime.journal import Journal
 from ..runtime.mpi import on_root
 from ..runtime.timing import Timer
-from ..scene import PathTable
 from ..workflow import prepare
 from . import session
 from .session import COMM, LOG, Command, Session, say, tell_moving

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from .. import console, results
+from ..model import Model, dump_scene, read_scene
 from ..report.html.render import NAME as PAGE
 from ..results.folder import inputs_of, read_finished
 from ..results.output_folder import existing
@@ -21,7 +22,6 @@ from ..runtime import log, terminal
 from ..runtime.mpi import Interrupt, on_root
 from ..runtime.timing import Timer
 from ..runtime.versions import __version__
-from ..scene import Scene, dump_scene, read_scene
 from ..system import petsc_options
 
 COMM = MPI.COMM_WORLD
@@ -59,7 +59,7 @@ class Session:
     """
 
     options: argparse.Namespace
-    scene: Scene
+    scene: Model
     folder: results.ResultFolder
     timer: Timer
     interrupted: Callable[[], bool]
@@ -77,7 +77,7 @@ class Session:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def scene_of(options: argparse.Namespace) -> Scene:
+def scene_of(options: argparse.Namespace) -> Model:
     """The scene, with PETSc's options set. Collective.
 
     Args:
@@ -91,7 +91,7 @@ def scene_of(options: argparse.Namespace) -> Scene:
 
 
 def execute(
-    options: argparse.Namespace, scene: Scene, command: Command, timer: Timer, work: Callable[[Session], int]
+    options: argparse.Namespace, scene: Model, command: Command, timer: Timer, work: Callable[[Session], int]
 ) -> int:
     """Have a command write its folder, unless that is finished already; the exit code. Collective.
 
@@ -128,7 +128,7 @@ def execute(
     return int(code)
 
 
-def _finished(target: Path, scene: Scene, command: Command) -> int | None:
+def _finished(target: Path, scene: Model, command: Command) -> int | None:
     """The exit code of a finished result of the same scene, which is told; None where there is none. Rank 0 only."""
     record, fault = read_finished(target, scene)
     if fault is not None:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from .. import results
 from ..errors import ExitCode
+from ..model import read_scene
 from ..results.output_folder import Existing
 from ..runtime import log
 from ..runtime.manifest import MARKS
 from ..runtime.mpi import Interrupt, on_root
-from ..scene import read_scene
 from ..study import plan
 from ..study.conduct import conduct
 from ..study.table import Study

@@ -1,8 +1,25 @@
-"""The effects: importing the package registers those that come with the program."""
+"""The effects: what may act on a body, and where. A new one is a new class, known by its key once it is defined."""
 
 from ..class_registry import load_modules
-from . import anisotropic, cohesion, contact, elasticity, friction, loads, normal_laws, thermal, total_loads
-from .base import Drive, Effect, Evaluate, FormContext, Place, SideMoments, Sizes, SurfaceLoad, load_name
+from .base import (
+    Drive,
+    Effect,
+    Evaluate,
+    FormContext,
+    In,
+    On,
+    Place,
+    SideMoments,
+    Sides,
+    Sizes,
+    SurfaceLoad,
+    from_python,
+    in_words,
+    load_name,
+    names_in_python,
+    plain,
+)
+from .contact import Contact
 from .contribution import (
     Averaged,
     BoundaryLaw,
@@ -14,40 +31,57 @@ from .contribution import (
     ObstacleMove,
     Towards,
 )
-from .formula_field import FormulaField
+from .elasticity import Anisotropic, Isotropic, Orthotropic
+from .law_effects import Adhesion, Cohesion, Friction, LawEffect, Support
+from .loads import BodyForce, Displacement, Force, Moment, Pressure, Temperature, Traction
 from .role import Role, role_of
+from .values import FormulaField
 
 __all__ = [
+    "Adhesion",
+    "Anisotropic",
     "Averaged",
+    "BodyForce",
     "BoundaryLaw",
+    "Cohesion",
     "Condition",
+    "Contact",
     "Contribution",
     "Direction",
+    "Displacement",
     "Drive",
     "Effect",
     "Evaluate",
+    "Force",
     "FormContext",
     "FormulaField",
+    "Friction",
+    "In",
+    "Isotropic",
+    "LawEffect",
+    "Moment",
     "NormalBounds",
     "ObstacleForce",
     "ObstacleMove",
+    "On",
+    "Orthotropic",
     "Place",
+    "Pressure",
     "Role",
     "SideMoments",
+    "Sides",
     "Sizes",
+    "Support",
     "SurfaceLoad",
+    "Temperature",
     "Towards",
-    "anisotropic",
-    "cohesion",
-    "contact",
-    "elasticity",
-    "friction",
+    "Traction",
+    "from_python",
+    "in_words",
     "load_name",
-    "loads",
-    "normal_laws",
+    "names_in_python",
+    "plain",
     "role_of",
-    "thermal",
-    "total_loads",
 ]
 
 load_modules(__name__)

@@ -8,20 +8,35 @@ from __future__ import annotations
 
 import inspect
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+import numpy as np
+from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
+from pydantic_core import PydanticCustomError
 
 from ..class_registry import enter
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..laws import Superpotential
+from ..schema import located_error, names_of, shown
 from ..typing import Array
 from .contribution import Contribution
+
+Names = tuple[str, ...]
+"""Names of sides or of regions, which are one place."""
+Sides = str | Sequence[str]
+"""The name of a side, or a list of names that are one place."""
+F = TypeVar("F", bound=Callable[..., None])
+
+
+def from_python(init: F) -> F:
+    """Marks the constructor that programs call: tables are read past it, by ``model_validate``."""
+    init.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+    return init
 
 
 class Place(Enum):
@@ -149,7 +164,11 @@ class SurfaceLoad:
 
 
 class Effect(BaseModel):
-    """One physical contribution: validated data (SI) and what it adds.
+    """One physical contribution: validated data (SI), what it adds, and where it acts.
+
+    Attributes:
+        where: the sides or regions where it acts; None: the whole body.
+        name: of its table in a scene file, of its boundary part in results; empty where it has none yet.
 
     Class attributes:
         key: the scene file's key.
@@ -177,12 +196,85 @@ class Effect(BaseModel):
     on_interfaces: ClassVar[bool] = False
     is_sum: ClassVar[bool] = False
     registry: ClassVar[dict[Place, dict[str, type[Effect]]]] = {place: {} for place in Place}
+    _where: Names | None = PrivateAttr(default=None)
+    _name: str = PrivateAttr(default="")
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
         if "key" in cls.__dict__ and cls.in_files:
             enter(Effect.registry[cls.place], cls, cls.key, "effect")
+
+    @property
+    def where(self) -> Names | None:
+        """The sides or regions where it acts; None: the whole body."""
+        return self._where
+
+    @property
+    def name(self) -> str:
+        """The name of its table in a scene file."""
+        return self._name
+
+    def at(self, where: Sides | None, name: str = "") -> Self:
+        """The effect at another place.
+
+        Args:
+            where: sides or regions; None: the whole body.
+            name: of the place.
+
+        Raises:
+            InputError: these are no names.
+        """
+        placed = self.model_copy()
+        placed._where, placed._name = None if where is None else names_in_python(where), name
+        return placed
+
+    def _make(self, where: Sides | None, **keys: Any) -> None:
+        """Fill in what a program gives; a refusal names the effect and its place."""
+        place = None if where is None else names_in_python(where)
+        try:
+            BaseModel.__init__(self, **{key: plain(value) for key, value in keys.items()})
+        except ValidationError as error:
+            raise self.refused(str(located_error(error, type(self))), place) from None
+        self._where = place
+
+    @classmethod
+    def refused(cls, text: str, where: Names | None) -> InputError:
+        """The refusal of an effect in a program: a line for each that is wrong, with the effect and its place."""
+        lines = text.replace('write "free"', "write None").splitlines()
+        return InputError("\n".join(f"{cls.__name__} on {in_words(where)}: {line}" for line in lines))
+
+    def fitted(self, dimension: int) -> Self:
+        """Itself in a space of 2 or 3 dimensions: what a program has left open is filled in."""
+        return self
+
+    def spatial_values(self) -> Iterator[SpatialValue]:
+        """The values in space among its fields."""
+        for _, given in self:
+            for value in given if isinstance(given, tuple | list) else (given,):
+                if isinstance(value, SpatialValue):
+                    yield value
+
+    def on_mesh(self, mesh: Any) -> Self:
+        """Itself on the mesh of a body. Collective.
+
+        Args:
+            mesh: the dolfinx mesh.
+
+        Raises:
+            InputError: on all ranks alike: it has data of another mesh.
+        """
+        for value in self.spatial_values():
+            value.check_mesh(mesh)
+        return self
+
+    def is_portable(self, mesh: Any) -> bool:
+        """Whether it can be assembled on another mesh than a body's: it makes no form with data of that one.
+
+        Args:
+            mesh: of the body.
+        """
+        return True
 
     @abstractmethod
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -298,3 +390,76 @@ def load_name(where: str | None, effect: Effect) -> str:
         effect: what drives it.
     """
     return f"{where or 'body'}.{effect.key}"
+
+
+def names_in_python(given: Any) -> Names:
+    """The names that a program gives, read as those of a scene file.
+
+    Args:
+        given: a name, or a list of names.
+
+    Raises:
+        InputError: it is something else, empty, or has a name twice.
+    """
+    try:
+        return names_of(given)
+    except PydanticCustomError as error:
+        raise InputError(f"the place {error.message()} (is {shown(given)})") from None
+
+
+def in_words(where: Names | None) -> str:
+    """A place in messages.
+
+    Args:
+        where: the sides or regions; None: the whole body.
+    """
+    return ", ".join(where) if where else "the body"
+
+
+def plain(given: Any) -> Any:
+    """NumPy's number or array, or another kind of real number, as Python's; lists of such too; all else as it is.
+
+    Args:
+        given: what a program gave.
+    """
+    if isinstance(given, np.generic | np.ndarray):
+        return given.tolist()
+    if isinstance(given, list | tuple):
+        return [plain(one) for one in given]
+    return {key: plain(value) for key, value in given.items()} if isinstance(given, dict) else given
+
+
+def On(side: Sides, effect: Effect) -> Effect:
+    """An effect on a side, such as one of your own class. Not collective.
+
+    Args:
+        side: the side's name, or a list of sides.
+        effect: any effect that acts on a boundary.
+
+    Raises:
+        InputError: it is no effect, or acts in the volume.
+    """
+    if _known("On", effect).place is not Place.BOUNDARY:
+        raise InputError(f"On: {effect.key} acts in a {effect.place.value}: write hvi.In(effect, region)")
+    return effect.at(side)
+
+
+def In(effect: Effect, region: Sides | None = None) -> Effect:
+    """An effect in the volume, or a material, such as one of your own class. Not collective.
+
+    Args:
+        effect: any effect that acts in a body.
+        region: where, a name or a list; None: in the whole body.
+
+    Raises:
+        InputError: it is no effect, or acts on a side.
+    """
+    if _known("In", effect).place is Place.BOUNDARY:
+        raise InputError(f"In: {effect.key} acts on a side: write hvi.On(side, effect)")
+    return effect.at(region)
+
+
+def _known(user: str, given: Any) -> Effect:
+    if not isinstance(given, Effect):
+        raise InputError(f"{user}: {given!r} is no effect; give an object of a subclass of hvi_fenicsx.effects.Effect")
+    return given

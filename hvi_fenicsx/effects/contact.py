@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -14,17 +15,16 @@ from typing_extensions import override
 from ..formula import Formula, SpatialValue
 from ..schema import refusal
 from ..typing import Array
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sizes
+from .base import Drive, Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python, names_in_python
 from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
-from .formula_field import FormulaField, as_formula, require_components
-from .obstacle_field import ObstacleField, ObstacleGap
-from .obstacles import NonzeroVector, Obstacle, unit
+from .obstacles import NonzeroVector, Obstacle, ObstacleField, ObstacleGap, unit
+from .values import FormulaField, Value, as_value, require_components
 
 MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""
 Gap = Annotated[
     SpatialValue | Literal["measured"],
-    BeforeValidator(lambda value: value if isinstance(value, str) and value == MEASURED else as_formula(value)),
+    BeforeValidator(lambda value: value if isinstance(value, str) and value == MEASURED else as_value(value)),
     PlainSerializer(lambda gap: gap if isinstance(gap, str) else gap.source),
 ]
 """A number, a formula in x, y, z (SI), or "measured"."""
@@ -84,6 +84,23 @@ class Contact(Effect):
     obstacle: ObstacleField | None = None
     """instead of `gap`: a flat obstacle near a curved part, { point = [0, 0], normal = [0, 1] }, or one of another
     `shape`: see docs/obstacles.md"""
+
+    @from_python
+    def __init__(
+        self,
+        side: Sides,
+        gap: Value | None = None,
+        lower: Value | None = None,
+        upper: Value | None = None,
+        obstacle: tuple[Sequence[float], Sequence[float]] | Mapping[str, Any] | None = None,
+        direction: Sequence[float] | None = None,
+    ) -> None:
+        if (isinstance(obstacle, tuple | list) and len(obstacle) != 2) or isinstance(obstacle, int | float | str):
+            text = f"obstacle: give a point and a normal, ([0, 0], [0, 1]), or a table, not {obstacle!r}"
+            raise self.refused(text, names_in_python(side))
+        ways = {"gap": gap, "lower": lower, "upper": upper, "obstacle": obstacle}
+        given = {key: value for key, value in ways.items() if value is not None} or {"gap": 0.0}
+        self._make(side, **given, direction=direction)
 
     @model_validator(mode="after")
     def _one_way(self) -> Contact:

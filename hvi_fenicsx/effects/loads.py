@@ -1,19 +1,35 @@
-"""What drives the body: tractions, body forces, prescribed displacements."""
+"""What drives the body: loads, by area, by volume or as sums over a part; prescribed displacements; heat."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BeforeValidator, PlainSerializer
+import numpy as np
+from pydantic import BeforeValidator, PlainSerializer, SerializerFunctionWrapHandler, model_serializer
+from pydantic_core import PydanticCustomError
 from typing_extensions import override
 
 from ..errors import InputError
-from ..formula import Formula, SpatialValue
-from ..schema import refusal
-from .base import Drive, Evaluate, FormContext, Place, Sizes, SurfaceLoad, part_of
+from ..formula import SpatialValue
+from ..schema import Finite, refusal
+from ..typing import Array
+from .base import (
+    Drive,
+    Evaluate,
+    FormContext,
+    Place,
+    SideMoments,
+    Sides,
+    Sizes,
+    SurfaceLoad,
+    from_python,
+    names_in_python,
+    part_of,
+)
 from .contribution import Condition, Contribution
-from .formula_field import FormulaField
-from .plain_values import Listed
+from .elasticity import Elasticity, strain, voigt
+from .values import FormulaField, Listed, OneValue, Value, Vector, as_value
 
 
 class Traction(Listed):
@@ -25,6 +41,10 @@ class Traction(Listed):
     term: ClassVar[str] = "<g, v> += ∫ t·v ds"
 
     values: tuple[FormulaField, ...]
+
+    @from_python
+    def __init__(self, side: Sides, values: Vector) -> None:
+        self._make(side, values=values)
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -57,6 +77,10 @@ class BodyForce(Listed):
 
     values: tuple[FormulaField, ...]
 
+    @from_python
+    def __init__(self, values: Vector, region: Sides | None = None) -> None:
+        self._make(region, values=values)
+
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its region."""
@@ -76,9 +100,9 @@ def _component(value: Any) -> Any:
     if value is None or (isinstance(value, str) and value == "free"):
         return "free"
     try:
-        return value if isinstance(value, SpatialValue) else Formula(value)
-    except InputError as error:
-        raise refusal(f'{error}; or write "free" to leave the component alone') from None
+        return as_value(value)
+    except PydanticCustomError as error:
+        raise refusal(f'{error.message()}; or write "free" to leave the component alone') from None
 
 
 Component = Annotated[
@@ -89,7 +113,7 @@ Component = Annotated[
 """A formula or "free"."""
 
 
-class PrescribedDisplacement(Listed):
+class Displacement(Listed):
     """A prescribed displacement (m): a list of formulas, one for each component. ``"free"`` prescribes nothing."""
 
     key: ClassVar[str] = "displacement"
@@ -98,6 +122,13 @@ class PrescribedDisplacement(Listed):
     term: ClassVar[str] = "u_i = value, by component"
 
     values: tuple[Component, ...]
+
+    @from_python
+    def __init__(self, side: Sides, values: Vector) -> None:
+        if isinstance(values, Sequence) and any(isinstance(value, str) and value == "free" for value in values):
+            where, text = names_in_python(side), 'write None in place of "free", the word of scene files'
+            raise self.refused(text, where)
+        self._make(side, values=values)
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -113,3 +144,215 @@ class PrescribedDisplacement(Listed):
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
         """The stress of the largest component, as a strain over the body's length."""
         return max((largest(f) for f in self.values if f != "free"), default=0.0) * sizes.modulus / sizes.length
+
+
+class Pressure(OneValue):
+    """A pressure p (N/m²) against the boundary: a number or a formula; negative: suction."""
+
+    key: ClassVar[str] = "pressure"
+    place: ClassVar[Place] = Place.BOUNDARY
+    drive: ClassVar[Drive] = Drive.LOAD
+    term: ClassVar[str] = "<g, v> += -∫ p v·n ds"
+
+    @from_python
+    def __init__(self, side: Sides, value: Value) -> None:
+        self._make(side, value=value)
+
+    @override
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        """The linear form over its part."""
+        import ufl
+
+        pressure = context.render(self.value) / context.number(context.stress)
+        work = -pressure * ufl.inner(context.normal, context.test)
+        return Contribution(linear=(work * context.facets(part_of(where, self.key), self.value),))
+
+    @override
+    def surface_load(self) -> SurfaceLoad:
+        """The pressure."""
+        return SurfaceLoad(pressure=self.value)
+
+    @override
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+        """The largest pressure."""
+        return largest(self.value)
+
+
+class _Total(Listed):
+    """A load that is stated as a sum over its part; one of a single number is written without brackets."""
+
+    place: ClassVar[Place] = Place.BOUNDARY
+    drive: ClassVar[Drive] = Drive.LOAD
+    is_sum: ClassVar[bool] = True
+
+    values: tuple[Finite, ...]
+
+    @override
+    @classmethod
+    def _entries(cls, data: Any) -> tuple[Any, ...]:
+        numbers = tuple(data) if isinstance(data, list | tuple) else (data,)
+        if not all(isinstance(n, int | float) and not isinstance(n, bool) for n in numbers):
+            raise refusal("is the sum over the part: numbers only; for a load that varies use traction")
+        return tuple(map(float, numbers))
+
+    @model_serializer(mode="wrap")
+    def _as_numbers(self, handler: SerializerFunctionWrapHandler) -> Any:
+        found = list(handler(self)["values"])
+        return found[0] if len(found) == 1 else found
+
+
+class Force(_Total):
+    """A force (N; N/m in 2D) on a part, one number for each component, spread evenly over it."""
+
+    key: ClassVar[str] = "force"
+    label: ClassVar[str] = "a force on the whole part"
+    term: ClassVar[str] = "<g, v> += ∫ F/|part| · v ds"
+
+    @from_python
+    def __init__(self, side: Sides, values: Sequence[float]) -> None:
+        self._make(side, values=values)
+
+    @override
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        """The linear form over its part."""
+        import ufl
+
+        part = part_of(where, self.key)
+        scale = context.side_moments(part).area * context.stress
+        mean = ufl.as_vector([context.number(force / scale) for force in self.values])
+        return Contribution(linear=(ufl.inner(mean, context.test) * context.facets(part),))
+
+    @override
+    def spread_at(self, moments: SideMoments, points: Array) -> Array:
+        """The force over the area."""
+        return np.tile(np.array(self.values) / moments.area, (len(points), 1))
+
+    @override
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+        """The largest component over the body's length, squared in 3D."""
+        return max(map(abs, self.values)) / sizes.length ** (len(self.values) - 1)
+
+
+class Moment(_Total):
+    """A moment (N m; N in 2D) on a part about its centroid: one number in 2D, three in 3D.
+
+    The traction A x r grows linearly with the distance r from the centroid, as in a bent or twisted beam; its sum is
+    zero.
+    """
+
+    key: ClassVar[str] = "moment"
+    label: ClassVar[str] = "a moment on the whole part"
+    term: ClassVar[str] = "<g, v> += ∫ (A x r)·v ds, the moment of A x r being M"
+
+    @from_python
+    def __init__(self, side: Sides, value: float | Sequence[float]) -> None:
+        self._make(side, values=value)
+
+    @override
+    def check(self, dimension: int) -> None:
+        """One component in 2D, three in 3D."""
+        if len(self.values) != (1 if dimension == 2 else 3):
+            wanted = "one number (about z)" if dimension == 2 else "three numbers"
+            raise InputError(f"moment has {len(self.values)} components; in {dimension}D it is {wanted}")
+
+    @override
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        """The linear form over its part.
+
+        Raises:
+            InputError: no traction of this kind has the moment: the part has no extent across it.
+        """
+        import ufl
+
+        part = part_of(where, self.key)
+        moments = context.side_moments(part)
+        rate, met = _rotation(moments.second, self.values)
+        if not met:
+            text = "the part has no extent across the moment's axis; take a wider part"
+            raise InputError(f"boundary.{part}.moment: {text}")
+        x = ufl.SpatialCoordinate(context.test.ufl_function_space().mesh)
+        r = [x[i] - context.number(c) for i, c in enumerate(moments.centroid)]
+        a = [context.number(c / context.stress) for c in rate]
+        if context.dimension == 2:
+            traction = ufl.as_vector([-a[2] * r[1], a[2] * r[0]])
+        else:
+            traction = ufl.cross(ufl.as_vector(a), ufl.as_vector(r))
+        return Contribution(linear=(ufl.inner(traction, context.test) * context.facets(part),))
+
+    @override
+    def spread_at(self, moments: SideMoments, points: Array) -> Array:
+        """A x r."""
+        d = len(moments.centroid)
+        r = np.pad(points[:, :d] - moments.centroid, ((0, 0), (0, 3 - d)))
+        return np.asarray(np.cross(_rotation(moments.second, self.values)[0], r)[:, :d], dtype=np.float64)
+
+    @override
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+        """The largest component over the body's length squared, cubed in 3D."""
+        return max(map(abs, self.values)) / sizes.length ** (2 if len(self.values) == 1 else 3)
+
+
+def _rotation(second: Array, moment: tuple[float, ...]) -> tuple[Array, bool]:
+    """A (3,) with ∫ r x (A x r) ds = M, from the second moments ∫ r rᵀ ds, (d, d), and whether there is one.
+
+    A plane part turns about z.
+    """
+    wide = np.pad(second, (0, 3 - len(second)))
+    inertia = np.trace(wide) * np.eye(3) - wide
+    wanted = np.array([0.0, 0.0, *moment] if len(moment) == 1 else moment)
+    rate = np.asarray(np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ wanted)
+    return rate, bool(np.allclose(inertia @ rate, wanted, rtol=0.0, atol=1e-9 * np.max(np.abs(wanted))))
+
+
+class Temperature(OneValue):
+    """The temperature above that of the stress-free state (K): a number or a formula.
+
+    Strains α ΔT by the material's `thermal_expansion`; the stress is C : (ε(u) - α ΔT I).
+    """
+
+    key: ClassVar[str] = "temperature"
+    label: ClassVar[str] = "a change of temperature"
+    place: ClassVar[Place] = Place.BODY
+    drive: ClassVar[Drive] = Drive.KINEMATIC
+    term: ClassVar[str] = "<g, v> += ∫ C:(α ΔT I):ε(v) dx"
+
+    @from_python
+    def __init__(self, value: Value, region: Sides | None = None) -> None:
+        self._make(region, value=value)
+
+    @override
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        """The linear forms over the materials of its region."""
+        pairs = [(m, cells) for m, cells in _heated(context, where) if m.thermal_expansion]
+        if not pairs:
+            place = f" of {where}" if where else ""
+            raise InputError(f"body.temperature does nothing: give the material{place} thermal_expansion = α (1/K)")
+        loads = tuple(self._load(context, m) * cells for m, cells in pairs)
+        return Contribution(strains=loads, across=tuple(self._across(context, pairs)))
+
+    def _across(self, context: FormContext, heated: list[tuple[Elasticity, Any]]) -> Iterator[Any]:
+        """What holds the thickness of a plane body back from expanding."""
+        for material, cells in heated:
+            if held := float(material.out_of_plane()[2]):
+                yield -context.number(held / context.stress) * context.render(self.value) * context.scalar_test * cells
+
+    def _load(self, context: FormContext, material: Elasticity) -> Any:
+        """(C : αI) : ε(v) ΔT, nondimensional."""
+        virtual = context.number(context.length) * strain(context.test)
+        pairs = zip(material.thermal_stress() / context.stress, voigt(virtual, context.dimension), strict=True)
+        return context.render(self.value) * sum(context.number(float(s)) * e for s, e in pairs if s)
+
+    @override
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+        """E α ΔT."""
+        return sizes.modulus * sizes.expansion * largest(self.value)
+
+
+def _heated(context: FormContext, where: str | None) -> list[tuple[Elasticity, Any]]:
+    """The materials in a region, with the measures of where they overlap it."""
+    found = []
+    for region, material in context.materials:
+        cells = context.cells(where, region)
+        if isinstance(material, Elasticity) and cells is not None:
+            found.append((material, cells))
+    return found

@@ -7,20 +7,22 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationInfo, model_validator
 from pydantic.fields import FieldInfo
 from typing_extensions import override
 
 from ..class_registry import enter
 from ..errors import InputError
-from ..schema import ExistingFile, Finite, Positive, refusal
+from ..formula import SpatialValue
+from ..schema import ExistingFile, Finite, Positive, refusal, unknown
 from ..typing import Array
-from .formula_field import require_components
 from .surface_files import distances_along
+from .values import require_components
 
 _AS_TUPLE = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
 """What makes a field a vector."""
@@ -294,3 +296,48 @@ class Surface(Obstacle):
     @override
     def ahead(self, points: Array, direction: Array) -> Array:
         return self.scale * distances_along(self.file, np.asarray(points / self.scale, np.float64), direction)
+
+
+class ObstacleGap(SpatialValue):
+    """The distance of points from an obstacle, as a value in space."""
+
+    __slots__ = ("_obstacle", "source")
+
+    def __init__(self, obstacle: Obstacle) -> None:
+        self._obstacle, self.source = obstacle, f"distance from the obstacle ({obstacle.shape})"
+
+    @override
+    def at(self, points: Array) -> Array:
+        return self._obstacle.gap(points[:, : self._obstacle.dimension])
+
+    @override
+    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        raise NotImplementedError("bounds are evaluated at vertices")
+
+
+def read(value: Any, info: ValidationInfo) -> Obstacle:
+    """The obstacle of a table.
+
+    Args:
+        value: what a scene has, or an obstacle.
+        info: its context has the folder of the scene.
+
+    Raises:
+        PydanticCustomError: there is no such shape.
+        ValidationError: the table does not fit the shape.
+    """
+    if isinstance(value, Obstacle):
+        return value
+    if isinstance(value, list) and len(value) == 2:
+        value = {"point": value[0], "normal": value[1]}
+    if not isinstance(value, Mapping):
+        raise refusal("must be a table, like { point = [0, 0], normal = [0, 1] }")
+    keys = dict(value)
+    name = keys.pop("shape", Plane.shape)
+    if not isinstance(name, str) or name not in Obstacle.registry:
+        raise refusal(unknown("shape", name, Obstacle.registry))
+    return Obstacle.registry[name].model_validate(keys, context=info.context)
+
+
+ObstacleField = Annotated[Obstacle, BeforeValidator(read)]
+"""An obstacle as a field of a scene."""

@@ -11,6 +11,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..errors import InputError
+from ..model import PathTable
 from ..paths.follower import Follower
 from ..paths.load_path import LoadPath, PathRow
 from ..paths.state import End, Event, Follow, PathOptions, PathState, Watch
@@ -20,7 +21,6 @@ from ..problem.problem import Problem
 from ..reduced import loading
 from ..reduced.condensation import Condensation
 from ..runtime.journal import Record
-from ..scene import PathTable
 from ..solvers import obstacle_force
 from ..system import existence
 from ..workflow import Preparation

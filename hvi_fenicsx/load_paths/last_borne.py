@@ -13,12 +13,12 @@ import numpy as np
 
 from ..certify import certificate, plausibility
 from ..errors import InputError, SolverError
+from ..model import PathTable
 from ..paths.state import End
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..reduced import loading
 from ..runtime.log import logger
-from ..scene import PathTable
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.context import never
 from ..solvers.method import Borne

@@ -1,4 +1,4 @@
-"""A part of the boundary: sides of a domain, or the piece of them where inequalities hold."""
+"""Parts of the boundary: sides of a domain, the piece of them where inequalities hold, two sides that meet."""
 
 from __future__ import annotations
 
@@ -117,3 +117,18 @@ class BoundaryPart:
         middles = dmesh.compute_midpoints(domain.mesh, domain.dimension - 1, found)
         rounded = np.round(middles / domain.length, _DIGITS) * domain.length
         return found[self.where.at(rounded)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class InterfaceSides:
+    """What is said of an interface, where two sides meet.
+
+    Attributes:
+        first: the side that carries contact and laws.
+        second: the other one.
+        tied: whether the sides are glued for ever.
+    """
+
+    first: str
+    second: str
+    tied: bool = False

@@ -17,14 +17,13 @@ from dolfinx import fem
 from ..effects import Drive, Evaluate, Place, load_name
 from ..errors import InputError
 from ..formula import SpatialValue
-from ..mesh.boundary_part import BoundaryPart
+from ..mesh.boundary_part import BoundaryPart, InterfaceSides
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from . import bulk, contact_parts, dirichlet, interfaces, part_facets, part_laws, scaling
 from .contact_surface import Surface
 from .domain_forms import DomainForms
-from .interface_sides import Sides
 from .part_laws import Modification, unchanged
 from .problem import PlacedContribution, PrescribedComponent, Problem
 from .scaling import Placed, Scales
@@ -35,7 +34,7 @@ _BETWEEN = ", between the vertices of the mesh"
 
 
 @dataclass(frozen=True)
-class Model:
+class Formulation:
     """What is solved, on any mesh of the body.
 
     Attributes:
@@ -50,12 +49,12 @@ class Model:
     parts: Mapping[str, BoundaryPart]
     effects: Sequence[Placed]
     modify: Modification = unchanged
-    interfaces: Mapping[str, Sides] = field(default_factory=dict)
+    interfaces: Mapping[str, InterfaceSides] = field(default_factory=dict)
     degree: int = 1
     volumetric_ratio: float = np.inf
 
 
-def compose(domain: Domain, model: Model, thresholds: CompositionThresholds = DEFAULT) -> Problem:
+def compose(domain: Domain, model: Formulation, thresholds: CompositionThresholds = DEFAULT) -> Problem:
     """The problem of a model on a domain. Collective.
 
     Args:
@@ -136,7 +135,7 @@ def _problem(
     context: DomainForms,
     scales: Scales,
     contributions: Sequence[PlacedContribution],
-    model: Model,
+    model: Formulation,
     implausible: tuple[str, ...],
     thresholds: CompositionThresholds,
 ) -> Problem:
@@ -181,7 +180,7 @@ def _surfaces(
     context: DomainForms,
     contributions: Sequence[PlacedContribution],
     fixed: Entities,
-    model: Model,
+    model: Formulation,
     thresholds: CompositionThresholds,
 ) -> tuple[dict[str, Surface], tuple[interfaces.Interface, ...]]:
     """The parts of Γc by name, those of interfaces too, and the interfaces. Collective."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..mesh import cell_checks, nodes
+from ..mesh.boundary_part import InterfaceSides
 from ..mesh.facets import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
@@ -16,21 +17,6 @@ from .domain_forms import DomainForms
 from .facet_integrals import is_curved
 from .facet_overlaps import Facets, Overlaps
 from .thresholds import CompositionThresholds
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sides:
-    """What a scene says of an interface.
-
-    Attributes:
-        first: the side that carries contact and laws.
-        second: the other one.
-        tied: whether the sides are glued for ever.
-    """
-
-    first: str
-    second: str
-    tied: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +32,7 @@ class Pair:
     """
 
     name: str
-    sides: Sides
+    sides: InterfaceSides
     first: Facets
     second: Facets
     curved: bool = False
@@ -71,7 +57,7 @@ class Pair:
         return np.asarray(both[(both >= start) & (both < end)] - start, dtype=np.int32)
 
 
-def pair(context: DomainForms, name: str, sides: Sides) -> Pair:
+def pair(context: DomainForms, name: str, sides: InterfaceSides) -> Pair:
     """The facets of both sides on all ranks. Collective.
 
     Args:

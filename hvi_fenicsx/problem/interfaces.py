@@ -14,6 +14,7 @@ from dolfinx import fem
 from scipy.sparse import csr_array
 
 from ..geometry import tangents
+from ..mesh.boundary_part import InterfaceSides
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from . import curved_shapes, dual_basis, interface_checks, interface_sides
@@ -21,7 +22,7 @@ from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
 from .facet_overlaps import Facets, Overlaps
-from .interface_sides import Pair, Sides
+from .interface_sides import Pair
 from .thresholds import DEFAULT, CompositionThresholds
 
 
@@ -52,12 +53,15 @@ class Interface:
     first: Facets
     second: Facets
     overlaps: Overlaps
-    sides: Sides
+    sides: InterfaceSides
     curved: bool
 
 
 def find(
-    context: DomainForms, wanted: Mapping[str, Sides], occupied: Entities, thresholds: CompositionThresholds = DEFAULT
+    context: DomainForms,
+    wanted: Mapping[str, InterfaceSides],
+    occupied: Entities,
+    thresholds: CompositionThresholds = DEFAULT,
 ) -> tuple[Interface, ...]:
     """The interfaces of a problem. Collective.
 

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple, Self
 from mpi4py import MPI
 
 from ..errors import InputError, NotWrittenError
+from ..model import Model, dump_scene
 from ..runtime import manifest
 from ..runtime.manifest import MARKS
 from ..runtime.mpi import on_root
-from ..scene import Scene, dump_scene
 from .output_folder import Existing, OutputFolder, placed
 
 _XML, _PNG = b"</VTKFile>", b"IEND\xaeB`\x82"
@@ -84,7 +84,7 @@ class ResultFolder:
         assert self._folder is not None
         return self._folder.announce(name)
 
-    def commit(self, scene: Scene) -> None:
+    def commit(self, scene: Model) -> None:
         """Make the written files the result, all at once. Collective.
 
         Args:
@@ -96,7 +96,7 @@ class ResultFolder:
         self.comm.barrier()
         self.kept = on_root(self.comm, lambda: self._commit(scene))
 
-    def _commit(self, scene: Scene) -> tuple[str, ...]:
+    def _commit(self, scene: Model) -> tuple[str, ...]:
         assert self._folder is not None
         with self._folder.told():
             self._refuse_torn()
@@ -116,7 +116,7 @@ class ResultFolder:
             self._folder.close()
 
 
-def inputs_of(scene: Scene, folder: Path) -> dict[str, str]:
+def inputs_of(scene: Model, folder: Path) -> dict[str, str]:
     """SHA-256 of the files that a scene names.
 
     Args:
@@ -149,7 +149,7 @@ class Finished(NamedTuple):
     fault: str | None = None
 
 
-def read_finished(target: Path, scene: Scene) -> Finished:
+def read_finished(target: Path, scene: Model) -> Finished:
     """The result of a scene in a folder, if one is there, whole and of the same mesh files and plugins.
 
     Args:

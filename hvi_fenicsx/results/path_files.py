@@ -10,12 +10,12 @@ from dolfinx import fem
 
 from ..certify import certificate
 from ..load_paths.following import PathRun
+from ..model import dump_scene
 from ..paths.load_path import LoadPath
 from ..paths.state import End, Event
 from ..report.html import path_page
 from ..runtime import writing
 from ..runtime.mpi import on_root
-from ..scene import dump_scene
 from ..workflow import unsolved
 from . import tables, vtk_fields
 from .contact_parts import contact_parts

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..model import dump_scene
 from ..problem.cell_stress import stress_of_parts
 from ..report import solution_arrays
 from ..report.errors import ReportError
@@ -17,7 +18,6 @@ from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime import writing
 from ..runtime.mpi import is_processor_free, on_root
 from ..runtime.timing import Timer
-from ..scene import dump_scene
 from ..typing import Array
 from ..workflow import Solution
 from . import gathering, tables, vtk_fields

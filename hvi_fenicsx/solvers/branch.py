@@ -21,10 +21,11 @@ from ..errors import SolverError
 from ..formula import Formula
 from ..laws import Superpotential
 from ..laws.smoothing import QUADRATIC
+from ..model.options import Start
 from ..problem.law_term import LawTerm
 from ..system.system import System
 from ..typing import Array
-from .context import SolveContext, Start
+from .context import SolveContext
 from .convergence import Outcome
 from .convex_step import UNBOUNDED, ConvexStep, no_step
 from .law_models import Cells

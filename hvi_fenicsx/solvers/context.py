@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Self
 
-from ..formula import Formula
+from pydantic import PrivateAttr
+
+from ..model.options import SolverTable
 from ..rigid import Solvability
 from ..runtime.log import NewtonStep, newton_step
 from ..runtime.timing import Timer
@@ -103,7 +105,7 @@ class SolveContext:
         Args:
             changes: fields of :class:`.SolverOptions` and their values.
         """
-        return replace(self, options=replace(self.options, **changes))
+        return replace(self, options=self.options.model_copy(update=changes))
 
     def tell(self, method: str, epsilon: float | None, iteration: int, residual: float, contact: int) -> None:
         """Tell a Newton step to whom the progress is shown.
@@ -125,39 +127,27 @@ class SolveContext:
         return self.options.relative_width(self.system)
 
 
-Start = Literal["unbroken", "resting", "broken"] | Sequence[Formula]
-"""Slips by which the first pieces of the laws are chosen.
+class SolverOptions(SolverTable):
+    """The table ``[solver]`` with the numbers that tune the methods."""
 
-None; those at rest (contact closed, every bond a spring); very large ones; those of a displacement (m) by component.
-"""
+    _thresholds: Thresholds = PrivateAttr(default=DEFAULT)
 
+    @classmethod
+    def of(cls, table: SolverTable, thresholds: Thresholds = DEFAULT) -> Self:
+        """The options of a table.
 
-@dataclass(frozen=True, kw_only=True)
-class SolverOptions:
-    """How a problem is solved.
+        Args:
+            table: what the user wants.
+            thresholds: the numbers that tune the methods.
+        """
+        found = cls.model_construct(**dict(table))
+        found._thresholds = thresholds
+        return found
 
-    Attributes:
-        method: name of the method; auto chooses by the effects.
-        epsilon: width of the laws' smoothing relative to their energy scale; None for exact laws.
-        epsilon_absolute: the width in N/m (J/m²) instead.
-        start: the pieces of the laws on which the branch iteration begins.
-        tolerance: relative residual of the inequality.
-        linear_solver: what the user wants; auto chooses by size.
-        second_order: whether to factorise the Hessian where a falling law leaves open if u is a local minimum; None:
-            where that takes little of a run.
-        max_iterations: Newton iterations of one solve at most.
-        thresholds: the numbers that tune the methods.
-    """
-
-    method: str = "auto"
-    epsilon: float | None = None
-    epsilon_absolute: float | None = None
-    start: Start = "unbroken"
-    tolerance: float = 1e-8
-    linear_solver: Literal["auto", "lu", "gamg"] = "auto"
-    second_order: bool | None = None
-    max_iterations: int = 100
-    thresholds: Thresholds = DEFAULT
+    @property
+    def thresholds(self) -> Thresholds:
+        """The numbers that tune the methods."""
+        return self._thresholds
 
     def relative_width(self, system: System) -> float | None:
         """ε relative to the first law's energy scale; None for exact laws, or without a law."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from dolfinx import fem
 
-from ..problem.compose import Model
+from ..problem.compose import Formulation
 from ..problem.problem import Problem
 from ..rigid import Solvability
 from ..runtime.log import logger
@@ -34,7 +34,7 @@ _NEAR = 1e-12
 
 
 def settled(
-    model: Model, found: LevelSolution, solvability: Solvability, options: SolverOptions, control: RunControl
+    model: Formulation, found: LevelSolution, solvability: Solvability, options: SolverOptions, control: RunControl
 ) -> LevelSolution:
     """A solution whose mode mixity is the frozen one; the same where no law asks for it. Collective.
 

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from ..errors import InputError
 from ..mesh import nodes
 from ..mesh.transfer import DegreeTransfer, Transfer
-from ..problem.compose import Model
+from ..problem.compose import Formulation
 from ..rigid import Solvability
 from ..runtime.log import logger
 from ..system.levels import Level, Levels, prolongation, with_coarser_system
@@ -65,7 +65,7 @@ def _has_coarser(system: System, options: SolverOptions) -> bool:
 
 
 def solve(
-    model: Model, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
+    model: Formulation, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
 ) -> LevelSolution:
     """Solve a system; with a mesh hierarchy and a method that takes a start, from the coarsest level on. Collective.
 
@@ -148,7 +148,7 @@ def _stopped(system: System, start: CoarseStart, thresholds: Thresholds) -> Leve
 
 
 def solve_from_displacement(
-    model: Model,
+    model: Formulation,
     system: System,
     u: fem.Function,
     solvability: Solvability,
@@ -187,7 +187,7 @@ def _log_level(system: System, kind: type[Method]) -> None:
     _LOG.info("level of %d unknowns: method %s", system.dofs, kind.label)
 
 
-def coarser_levels(model: Model, system: System, options: SolverOptions, control: RunControl) -> Levels:
+def coarser_levels(model: Formulation, system: System, options: SolverOptions, control: RunControl) -> Levels:
     """The coarser levels for the multigrid of an equation, which needs no solutions on them. Collective.
 
     Args:
@@ -207,7 +207,7 @@ def coarser_levels(model: Model, system: System, options: SolverOptions, control
         return (Level(system, coarse, prolongation(system, coarse, transfer)), *levels)
 
 
-def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[System, Transfer] | None:
+def _coarser_system(model: Formulation, system: System, control: RunControl) -> tuple[System, Transfer] | None:
     """The next coarser system, of degree 1 first, then on coarser meshes, and the transfer from it. Collective.
 
     None where a piece of a side is lost on the coarser mesh, or meets another one there.
@@ -227,12 +227,12 @@ def _coarser_system(model: Model, system: System, control: RunControl) -> tuple[
         return None
 
 
-def _of_degree_one(model: Model, system: System, control: RunControl) -> System:
+def _of_degree_one(model: Formulation, system: System, control: RunControl) -> System:
     """The system of degree 1 on the same mesh. Collective."""
     return assemble(system.problem.domain, _coarser_model(model, system), control.timer, system.thresholds)
 
 
-def _coarser_model(model: Model, system: System) -> Model:
+def _coarser_model(model: Formulation, system: System) -> Formulation:
     """The model of the next coarser level, of degree 1.
 
     Below degree 2 a nearly incompressible body that is too large for a direct solver is softened, and stays so on the
@@ -247,7 +247,7 @@ def _coarser_model(model: Model, system: System) -> Model:
 
 
 def refined_levels(
-    model: Model,
+    model: Formulation,
     system: System,
     coarse: System,
     below: Levels,
@@ -282,7 +282,8 @@ def refined_levels(
 
 def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:
     """The options with the tolerance of a coarser level."""
-    return replace(options, tolerance=max(options.thresholds.coarse_tolerance, options.tolerance))
+    tolerance = max(options.thresholds.coarse_tolerance, options.tolerance)
+    return options.model_copy(update={"tolerance": tolerance})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError
-from ..problem.compose import Model
+from ..problem.compose import Formulation
 from ..problem.problem import BoundsForce, Problem
 from ..rigid import Solvability
 from ..runtime.log import logger
@@ -124,7 +124,7 @@ class ObstacleForceSolve:
     """
 
     def __init__(
-        self, model: Model, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
+        self, model: Formulation, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
     ) -> None:
         force = pressed(system.problem)
         assert force is not None
@@ -181,7 +181,7 @@ class ObstacleForceSolve:
         self._counts.add(found.result.counts)
         return found
 
-    def _moved(self, way: float) -> Model:
+    def _moved(self, way: float) -> Formulation:
         metres = way * self._system.problem.scales.displacement
         return replace(self._model, effects=[(w, effect.obstacle_moved(metres)) for w, effect in self._model.effects])
 

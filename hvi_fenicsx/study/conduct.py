@@ -10,6 +10,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from ..errors import NotWrittenError
+from ..model import Model
 from ..report.errors import ReportError
 from ..report.html import study_page
 from ..results.folder import inputs_of
@@ -17,7 +18,6 @@ from ..results.output_folder import Existing, OutputFolder, placed
 from ..runtime import writing
 from ..runtime.manifest import MARKS
 from ..runtime.mpi import on_root
-from ..scene import Scene
 from ..solvers.context import never
 from . import pictures
 from .measure import Measurement, Store, write_json
@@ -100,7 +100,7 @@ def _finished(plan: Plan, store: Store, output: OutputFolder | None) -> tuple[St
         return study, fill(output, study, plan.own.scene, store)
 
 
-def fill(output: OutputFolder, study: Study, scene: Scene, store: Store) -> list[str]:
+def fill(output: OutputFolder, study: Study, scene: Model, store: Store) -> list[str]:
     """Write tables, pictures and page of a study beside its points.
 
     Args:

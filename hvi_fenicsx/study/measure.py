@@ -22,6 +22,7 @@ from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
 from ..errors import ExitCode, HviError, NotWrittenError
+from ..model import dump_scene
 from ..report import solution_arrays as archive
 from ..report.errors import ResultError
 from ..report.solution_arrays import SolutionArrays
@@ -32,7 +33,6 @@ from ..runtime.manifest import Manifest
 from ..runtime.mpi import largest, on_root, time_over
 from ..runtime.timing import Timer
 from ..runtime.versions import __version__
-from ..scene import dump_scene
 from ..solvers.context import never
 from ..workflow import Solution, find_solution, prepare
 from .errors import stiffness

@@ -13,11 +13,11 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..laws import smoothing
 from ..mesh.shapes import DomainShape
+from ..model import Model, SolverTable, dump_scene
 from ..report.units import quantity
-from ..scene import Scene, SolverTable, dump_scene
-from ..scene_model import options_of
 from ..schema import input_error, unknown
 from ..solvers import registry
+from ..solvers.registry import options_of
 
 EXACT = "exact"
 """The width of a smoothing that is none."""
@@ -52,7 +52,7 @@ class Point:
         accuracy: instead of that mesh, one refined adaptively until the estimate is below this (`hvi run --accuracy`).
     """
 
-    scene: Scene
+    scene: Model
     accuracy: float | None = None
 
     @property
@@ -152,7 +152,7 @@ def _number(text: str) -> Any:
 class _Planner:
     """Makes the points of a study of a scene."""
 
-    scene: Scene
+    scene: Model
     left_out: list[str] = field(default_factory=list)
 
     def combinations(self, axes: Values) -> Iterator[Point]:
@@ -168,7 +168,7 @@ class _Planner:
             except InputError as error:
                 self.left_out.append(f"{', '.join(f'{name} {value}' for name, value in pairs.items())}: {error}")
 
-    def _on_mesh(self, mesh: str | DomainShape) -> Scene:
+    def _on_mesh(self, mesh: str | DomainShape) -> Model:
         try:
             shape = self.scene.domain.with_mesh(mesh) if isinstance(mesh, str) else mesh
             return self.scene.changed(domain=shape)
@@ -180,9 +180,9 @@ class _Planner:
     def default(self) -> Iterator[Values]:
         """Meshes by widths; on the scene's own mesh smoothings, methods, tolerances; both degrees; adaptive meshes."""
         exact, meshes = {"epsilon": (EXACT,)}, {"mesh": _default_meshes(self.scene)}
-        widths = {"epsilon": (EXACT, "0.1", "0.01")} if _laws(self.scene) else exact
+        widths = {"epsilon": (EXACT, "0.1", "0.01")} if self.scene.laws() else exact
         yield {**meshes, **widths}
-        if _laws(self.scene):
+        if self.scene.laws():
             yield {"epsilon": ("1", "0.001")}
             yield {**widths, "smoothing": smoothing.available()}
         yield {"method": registry.available()}
@@ -193,7 +193,7 @@ class _Planner:
             yield {"accuracy": ("0.1", "0.03"), "degree": ("1", "2")}
 
 
-def make(scene: Scene, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
+def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
     """The plan for a scene: all combinations of the axes' values; without axes, the default plan.
 
     The scene's own setting and the exact law on every mesh are always in it: they tell the error of h from that of ε.
@@ -232,18 +232,18 @@ def _asked(axes: Values) -> Iterator[Values]:
         yield {name: values for name, values in axes.items() if name in ("accuracy", "degree")}
 
 
-def _check_axes(scene: Scene, axes: Sequence[tuple[str, Sequence[str]]]) -> None:
+def _check_axes(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> None:
     names = [name for name, _ in axes]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"--axis {name}: is given twice; put its values into one list")
-        if name in _UNSMOOTHED and not _laws(scene):
+        if name in _UNSMOOTHED and not scene.laws():
             raise InputError(f"--axis {name}: the scene has no law that could be smoothed; leave the axis out")
     if set(_WIDTHS) <= set(names):
         raise InputError("--axis epsilon_absolute: epsilon is given too; leave one of them out")
 
 
-def _solved(scene: Scene, pairs: Mapping[str, str]) -> Scene:
+def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:
     """A scene with other values in its solver table.
 
     Raises:
@@ -259,29 +259,25 @@ def _solved(scene: Scene, pairs: Mapping[str, str]) -> Scene:
     try:
         found = scene.with_solver(**values)
     except ValidationError as error:
-        raise input_error(error, Scene) from None
+        raise input_error(error, SolverTable) from None
     solver = found.solver
     options_of(solver)
-    for law in _laws(found) if solver.smoothing else ():
-        smoothing.create(solver.smoothing, law, epsilon=solver.epsilon, epsilon_absolute=solver.epsilon_absolute)
+    for law in found.laws() if solver.smoothing else ():
+        smoothing.create(str(solver.smoothing), law, epsilon=solver.epsilon, epsilon_absolute=solver.epsilon_absolute)
     return found
 
 
-def _laws(scene: Scene) -> list[Any]:
-    return [law for placed in scene.effects() for law in placed.effect.superpotentials()]
-
-
-def _refined(scene: Scene, factor: Fraction) -> Scene | None:
+def _refined(scene: Model, factor: Fraction) -> Model | None:
     """The scene with cells ``factor`` times finer each way; None where there is no such mesh."""
     shape = scene.domain.refined(factor)
     return None if shape is None else scene.changed(domain=shape)
 
 
-def _can_be_refined(scene: Scene) -> bool:
+def _can_be_refined(scene: Model) -> bool:
     return scene.domain.refined(Fraction(2)) is not None
 
 
-def _default_meshes(scene: Scene) -> list[DomainShape]:
+def _default_meshes(scene: Model) -> list[DomainShape]:
     """The scene's mesh, two coarser ones, and a finer one if twice finer ones are affordable as references."""
     found = [scene] + [s for n in (2, 4) if (s := _refined(scene, Fraction(1, n))) is not None]
     finer, reference = (_refined(scene, Fraction(n)) for n in (2, 4))
@@ -300,5 +296,5 @@ def _reference(finest: Point, degree: int) -> tuple[Point, ...]:
     return tuple(Point(one) for one in (fine, *coarser) if one is not None)
 
 
-def _affordable(scene: Scene) -> bool:
+def _affordable(scene: Model) -> bool:
     return Point(scene).unknowns <= LARGEST[scene.dimension]

@@ -10,9 +10,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..errors import ExitCode, InputError
+from ..model import SolverTable
 from ..runtime.terminal import percent
 from ..runtime.versions import __version__, versions
-from ..scene import SolverTable
 from ..schema import unknown
 from .errors import NORMS, Certainty, Errors, Fields, ReferenceSolution, certainty
 from .measure import PHASES, RECORDED, Store
@@ -258,7 +258,7 @@ def evaluate(plan: Plan, store: Store) -> Study:
     finest, *coarser = plan.reference
     arrays = store.solution(finest)
     assert arrays is not None
-    reference = ReferenceSolution(arrays, store.stiffness(finest), plan.own.scene.interface)
+    reference = ReferenceSolution(arrays, store.stiffness(finest), plan.own.scene.body.interfaces)
     levels = [reference.errors(found) for point in coarser if (found := _fields(reference, store, point)) is not None]
     certain = certainty(levels)
     rows = tuple(_rows(plan, store, reference, certain))

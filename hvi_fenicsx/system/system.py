@@ -20,7 +20,7 @@ from ..effects import load_name
 from ..errors import InputError
 from ..mesh.domain import Domain
 from ..problem import references, scaling
-from ..problem.compose import Model, compose
+from ..problem.compose import Formulation, compose
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.vectors import assembled, new_vector, product, turn
@@ -276,7 +276,7 @@ class System:
         self.free_leftovers()
 
 
-def assemble(domain: Domain, model: Model, timer: Timer, thresholds: Thresholds = DEFAULT) -> System:
+def assemble(domain: Domain, model: Formulation, timer: Timer, thresholds: Thresholds = DEFAULT) -> System:
     """Compose a model on a domain, compile its forms and assemble them. Collective.
 
     Args:

@@ -10,14 +10,14 @@ from ..certify import plausible_problem
 from ..mesh import nodes
 from ..mesh.domain import Domain, check_affordable
 from ..mesh.thresholds import Thresholds as MeshThresholds
-from ..problem.compose import Model
+from ..model import Model
+from ..problem.compose import Formulation
 from ..problem.problem import Problem
 from ..rigid import LoadFactors, Solvability
 from ..runtime.log import logger, warn
 from ..runtime.timing import Timer
-from ..scene import Scene
-from ..scene_model import model_of, options_of
 from ..solvers.context import SolverOptions
+from ..solvers.registry import options_of
 from ..solvers.thresholds import Thresholds as SolverThresholds
 from ..system import existence
 from ..system.system import System, assemble
@@ -55,8 +55,8 @@ class Preparation:
         warnings: sentences about numbers that may be mistakes, as far as they are known before the solve.
     """
 
-    scene: Scene
-    model: Model
+    scene: Model
+    model: Formulation
     options: SolverOptions
     system: System
     solvability: Solvability
@@ -82,7 +82,7 @@ class Preparation:
 
 
 def prepare(
-    scene: Scene,
+    scene: Model,
     comm: MPI.Comm = MPI.COMM_WORLD,
     timer: Timer | None = None,
     domain: Domain | None = None,
@@ -103,7 +103,7 @@ def prepare(
         InputError: on all ranks alike.
     """
     timer = timer or Timer()
-    options, model = options_of(scene.solver, thresholds.solvers), model_of(scene)
+    options, model = options_of(scene.solver, thresholds.solvers), scene.formulation()
     with timer("mesh"):
         domain = domain or _meshed(scene, comm, thresholds.mesh)
     system = assemble(domain, model, timer, thresholds.solvers.linear)
@@ -125,7 +125,7 @@ def prepare(
     )
 
 
-def _meshed(scene: Scene, comm: MPI.Comm, thresholds: MeshThresholds) -> Domain:
+def _meshed(scene: Model, comm: MPI.Comm, thresholds: MeshThresholds) -> Domain:
     """The body on its mesh; each shape knows what its own vertices take, but neither other bodies nor the degree."""
     domain, degree = scene.domain.build_hierarchy(comm, scene.dimension, thresholds), scene.solver.degree or 1
     place, mend = ("solver.degree", "use degree 1, or fewer cells") if degree > 1 else ("domain", "use fewer cells")
@@ -134,7 +134,7 @@ def _meshed(scene: Scene, comm: MPI.Comm, thresholds: MeshThresholds) -> Domain:
     return domain
 
 
-def _warnings(scene: Scene, system: System, solvability: Solvability) -> tuple[str, ...]:
+def _warnings(scene: Model, system: System, solvability: Solvability) -> tuple[str, ...]:
     """Warnings about numbers that may be mistakes, logged. Collective."""
     found = (
         *scene.domain.implausible(system.problem.domain.length),

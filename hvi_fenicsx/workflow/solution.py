@@ -11,10 +11,10 @@ from ..certify.estimate.estimator import Estimate
 from ..certify.placed_forces import PlacedForces
 from ..certify.uniqueness import Uniqueness
 from ..errors import ExitCode
+from ..model import Model
 from ..problem.problem import Problem
 from ..rigid import Solvability
 from ..runtime.timing import Timer
-from ..scene import Scene
 from ..solvers.method import SolveResult
 from ..solvers.obstacle_force import ObstacleBalance
 from ..typing import Array
@@ -90,7 +90,7 @@ class Solution:
         balance: where the obstacle is that a force presses, and whether contact bears it; None without one.
     """
 
-    scene: Scene
+    scene: Model
     problem: Problem
     solvability: Solvability
     solve_result: SolveResult | None

@@ -13,9 +13,9 @@ from ..certify.certificate import Examination
 from ..certify.estimate.estimator import estimate
 from ..certify.uniqueness import Uniqueness, uniqueness
 from ..errors import SolverError
+from ..model import Model
 from ..runtime.log import logger, newton_step, warn
 from ..runtime.timing import Timer
-from ..scene import Scene
 from ..solvers import frozen_mixity, nested_iteration, obstacle_force, refinement
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.method import SolveResult
@@ -30,7 +30,7 @@ _LOG = logger("workflow")
 
 
 def solve(
-    scene: Scene,
+    scene: Model,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
     progress: Progress = newton_step,

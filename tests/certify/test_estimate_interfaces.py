@@ -54,7 +54,7 @@ def test_a_uniform_stress_has_no_error(between: Table, stress: list[list[float]]
 
 def test_stiff_bonds_between_bodies_at_degree_two() -> None:
     between = {"cohesion": {"law": "graph", "points": [[0, 0], [1e-8, 4e6], [4e-5, 0]], "beta": 0.7}}
-    table = uniform(between, [[0.0, 0.0], [0.0, 1e6]], (0.0, 1.0), 2).model_dump()
+    table = uniform(between, [[0.0, 0.0], [0.0, 1e6]], (0.0, 1.0), 2).tables()
     lid = {"lid": {"on": "upper.top", "traction": [2e5, 1e6]}, "foot": {"on": "lower.bottom", "displacement": [0, 0]}}
     (row,) = rows(Scene.model_validate(table | {"boundary": lid}).with_solver(tolerance=1e-8), 1, 1)
     assert row.certified

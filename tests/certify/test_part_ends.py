@@ -11,7 +11,7 @@ from runs import hvi, summary, write_scene
 from scenes import Table
 
 from hvi_fenicsx import Scene, solve
-from hvi_fenicsx.modelling.solution import ModelSolution
+from hvi_fenicsx.api.solution import ModelSolution
 
 LOAD, END = 1e6, 0.3
 

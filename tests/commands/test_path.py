@@ -18,10 +18,10 @@ from runs import ROOT, command, hvi
 from hvi_fenicsx import prepare, read_scene
 from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.load_paths.following import Control, PathRun
+from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.paths.load_path import LoadPath
 from hvi_fenicsx.results import path_files
 from hvi_fenicsx.runtime.journal import Record
-from hvi_fenicsx.scene import PathTable
 
 BAR = ROOT / "demos" / "glued_bar.toml"
 SHORT = ("--set", "domain.size=[0.05, 0.001]", "--set", "domain.cells=[50, 1]")

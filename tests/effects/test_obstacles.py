@@ -11,7 +11,7 @@ from runs import ROOT
 from scenes import E, Table, model
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.effects.contact import Contact
+from hvi_fenicsx.effects import Contact
 from hvi_fenicsx.effects.obstacles import Obstacle, Vector
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.schema import mistakes_of
@@ -139,7 +139,7 @@ def solved(table: Table) -> hvi.Solution:
 def disk(contact: Table) -> Table:
     """The half-disk of the demo on a coarse mesh."""
     scene = hvi.read_scene(ROOT / "demos/hertz.toml", ["domain.mesh_size=0.01", "domain.mesh_size_below=0.6e-3"])
-    table: Table = scene.model_dump(mode="json")
+    table: Table = scene.tables()
     table["boundary"]["floor"] |= {"contact": contact, "where": "y < 0.05"}
     return table
 

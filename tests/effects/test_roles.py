@@ -14,9 +14,17 @@ import tomli_w
 from runs import process, summary
 from scenes import model
 
-from hvi_fenicsx.effects import BoundaryLaw, Contribution, Direction, Effect, FormContext, Place, role_of
-from hvi_fenicsx.effects.contact import Contact
-from hvi_fenicsx.effects.friction import Friction
+from hvi_fenicsx.effects import (
+    BoundaryLaw,
+    Contact,
+    Contribution,
+    Direction,
+    Effect,
+    FormContext,
+    Friction,
+    Place,
+    role_of,
+)
 from hvi_fenicsx.laws import Exponential, PolylineLaw, TractionGraph
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.pictures import loads_supports
@@ -28,7 +36,7 @@ import ufl
 from hvi_fenicsx.effects import (
     BoundaryLaw, Condition, Contribution, Direction, Drive, Effect, FormulaField, NormalBounds, Place, SurfaceLoad
 )
-from hvi_fenicsx.effects.law_effect import LawEffect
+from hvi_fenicsx.effects import LawEffect
 from hvi_fenicsx.formula import Formula
 
 

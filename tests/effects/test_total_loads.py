@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from runs import hvi, write_scene
 from scenes import NU, E, Table
 
 import hvi_fenicsx
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import InputError, Scene, prepare
 from hvi_fenicsx.workflow import solve
 
 
@@ -85,7 +84,7 @@ def test_a_force_in_space_has_its_resultant() -> None:
     ],
 )
 def test_what_makes_no_sense_is_refused(loads: Table, words: str) -> None:
-    with pytest.raises(ValidationError, match=words):
+    with pytest.raises(InputError, match=words):
         Scene.model_validate(plate(**loads))
 
 

@@ -15,11 +15,11 @@ from mpi4py import MPI
 from runs import hvi, summary
 
 from hvi_fenicsx import InputError, Scene, prepare, read_scene
+from hvi_fenicsx.api import solve
 from hvi_fenicsx.mesh import facets as facet_sizes
 from hvi_fenicsx.mesh import gmsh_file, refinement
 from hvi_fenicsx.mesh.curved import CurvedFacets
 from hvi_fenicsx.mesh.domain import Domain
-from hvi_fenicsx.modelling import solve
 
 DEMOS = Path(__file__).parents[2] / "demos"
 DISK = """

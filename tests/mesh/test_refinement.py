@@ -26,9 +26,9 @@ from hvi_fenicsx.mesh import gmsh_file, refinement
 from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.scene_model import model_of, options_of
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.solvers.nested_iteration import CoarseStart, solve_from_coarser
+from hvi_fenicsx.solvers.registry import options_of
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import levels
 from hvi_fenicsx.system.system import System, assemble
@@ -170,7 +170,7 @@ def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
 
 
 def assembled(scene: Scene, body: Domain) -> System:
-    return assemble(body, model_of(scene), Timer())
+    return assemble(body, scene.formulation(), Timer())
 
 
 @pytest.mark.parametrize("ranks", LONG_RANKS[1:])

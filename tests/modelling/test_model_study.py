@@ -63,7 +63,7 @@ def test_data_on_the_mesh_leave_the_model_that_mesh(body: hvi.Body, tmp_path: Pa
     [
         ({"mash": [1]}, 'unknown axis "mash"; did you mean "mesh"'),
         ({"epsilon": 0.1}, "epsilon is 0.1; give a list"),
-        ({"epsilon": [-1]}, "must be a number above 0, or exact"),
+        ({"epsilon": [-1]}, "must be greater than 0"),
         ({"mesh": ["fine"]}, "is no number of refinements"),
     ],
 )

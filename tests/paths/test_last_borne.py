@@ -9,8 +9,8 @@ from scenes import DELTA, P, block, displacement, far, points, quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import Scene
+from hvi_fenicsx.api.solution import ModelSolution
 from hvi_fenicsx.load_paths import following
-from hvi_fenicsx.modelling.solution import ModelSolution
 
 ABOVE, STRENGTH, CELLS = 0.97 * P, 1e6, 3
 PUSHED = block(CELLS, ABOVE, P, quadratic_linear(STRENGTH))

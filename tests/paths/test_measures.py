@@ -10,8 +10,8 @@ import pytest
 from scenes import STEEL, Table, quadratic_linear
 
 from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.api import solve
 from hvi_fenicsx.load_paths.measures import Measures
-from hvi_fenicsx.modelling import solve
 from hvi_fenicsx.reduced.condensation import Condensation
 
 FACTOR = 0.4

@@ -65,7 +65,7 @@ def test_a_plate_that_goes_down_and_up_compresses_a_column() -> None:
 
 
 def test_a_scene_names_the_obstacle_that_its_path_moves() -> None:
-    table = column().model_dump(mode="json") | {"path": {"to": 1.0, "scaled": ["lid.contact"]}}
+    table = column().tables() | {"path": {"to": 1.0, "scaled": ["lid.contact"]}}
     path = hvi.follow(hvi.Scene.model_validate(table))
     assert path.scaled == ("lid.contact",)
     assert path.force("lid")[-1, 2] == pytest.approx(-E * 0.12 / 0.5 * WAY, rel=1e-9)
@@ -88,7 +88,7 @@ def test_a_roller_presses_as_in_single_runs_with_the_roller_there(friction: Tabl
     assert sum(row.event == "contact" for row in path.rows) > 3
     closed = [row for row in path.rows if row.factor > 0.3]
     for row in (closed[0], closed[len(closed) // 2], closed[-1]):
-        table = punch(row.factor * WAY, friction).model_dump(mode="json")
+        table = punch(row.factor * WAY, friction).tables()
         table["boundary"]["side"]["traction"] = [row.factor * FORCE, 0.0]
         single = hvi.solve(hvi.Scene.model_validate(table), estimate=False)
         assert single.converged
@@ -120,7 +120,7 @@ def test_an_obstacle_whose_gaps_change_otherwise_is_not_moved_by_a_path(scene: h
     ],
 )
 def test_laws_that_would_feel_the_displacement_of_an_obstacle_are_refused(law: str, obstacle: Table, said: str) -> None:
-    table = punch(friction={}, **obstacle).model_dump(mode="json")
+    table = punch(friction={}, **obstacle).tables()
     table["boundary"]["top"][law] = FRICTION
     with pytest.raises(hvi.InputError, match=said):
         hvi.check(hvi.Scene.model_validate(table))

@@ -122,7 +122,7 @@ def test_a_rigid_motion_has_no_condensed_force_and_the_work_of_the_loads() -> No
 
 def test_the_path_of_a_body_on_nothing_ends_at_once() -> None:
     """No unknown carries anything, and a rigid motion is left."""
-    table = slender().model_dump()
+    table = slender().tables()
     boundary = {name: part for name, part in table["boundary"].items() if name != "floor"}
     path = hvi.follow(hvi.Scene.model_validate(table | {"boundary": boundary}))
     assert (path.end, len(path.rows), path.uncertified) == ("escapes", 2, 0)

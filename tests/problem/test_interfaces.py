@@ -15,8 +15,8 @@ from scenes import NESTED, Table, quadratic_linear
 
 from hvi_fenicsx import InputError, Scene, prepare, solve
 from hvi_fenicsx.certify import placed_forces
+from hvi_fenicsx.model import dump_scene
 from hvi_fenicsx.problem.problem import Problem
-from hvi_fenicsx.scene.writer import dump_scene
 
 Array = npt.NDArray[np.float64]
 E, NU = 2.0e11, 0.3
@@ -223,7 +223,7 @@ def test_bodies_that_only_hold_each_other_separate_or_not() -> None:
 @pytest.mark.parametrize(("push", "degree"), [(2e5, 1), (6e5, 1), pytest.param(6e5, 2, marks=pytest.mark.long)])
 def test_a_stiff_partner_is_a_rigid_floor(push: float, degree: int) -> None:
     friction = quadratic_linear(2e6, 1e-6)
-    table = pushed(push, degree, friction=friction).model_dump()
+    table = pushed(push, degree, friction=friction).tables()
     table["material"] = {
         "soft": {**MATERIAL, "region": "upper"},
         "stiff": {**MATERIAL, "region": "lower", "youngs_modulus": 1e6 * E},
@@ -255,7 +255,7 @@ def test_a_stiff_partner_is_a_rigid_floor(push: float, degree: int) -> None:
 
 @pytest.mark.parametrize("degree", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_multigrid_on_levels_with_their_own_seams_finds_the_same(degree: int) -> None:
-    table = pushed(6e5, friction=quadratic_linear(1e6, 2e-6)).model_dump()
+    table = pushed(6e5, friction=quadratic_linear(1e6, 2e-6)).tables()
     table["domain"]["lower"]["cells"], table["domain"]["upper"]["cells"] = [32, 32], [48, 32]
     table["solver"] = {"tolerance": 1e-10, "degree": degree}
     scene = Scene.model_validate(table)
@@ -272,7 +272,7 @@ def test_a_measured_gap_closes_before_it_carries() -> None:
         "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
         "sink": {"on": "upper.top", "displacement": [0.0, -3e-6]},
     }
-    table = stacked(boundary, {"contact": {"gap": "measured"}}).model_dump()
+    table = stacked(boundary, {"contact": {"gap": "measured"}}).tables()
     table["domain"]["upper"]["origin"] = [0.0, 0.5 + 2e-6]
     found = solve(Scene.model_validate(table))
     strain = 1e-6 / 0.9
@@ -338,7 +338,7 @@ def test_a_scene_with_bodies_and_interfaces_is_written_and_read_again() -> None:
 
 
 def changed(path: str, value: Any) -> Table:
-    table = pushed(3e5).model_dump(exclude_none=True)
+    table = pushed(3e5).tables()
     *keys, last = path.split(".")
     place = table
     for key in keys:
@@ -381,7 +381,7 @@ def test_sides_exchanged_change_less_than_a_finer_mesh_does() -> None:
     energies = []
     for finer in (2, 4, 8):
         for between in (["upper.bottom", "lower.top"], ["lower.top", "upper.bottom"]):
-            table = pushed(3e5, friction=quadratic_linear(1e6, 1e-6)).model_dump()
+            table = pushed(3e5, friction=quadratic_linear(1e6, 1e-6)).tables()
             table["interface"]["seam"]["between"] = between
             for body in table["domain"].values():
                 body["cells"] = [finer * n for n in body["cells"]]
@@ -405,6 +405,6 @@ def covering() -> Scene:
 @pytest.mark.long
 def test_exchanging_the_sides_changes_less_with_each_mesh() -> None:
     """Energies, so at least the second order in the mesh width."""
-    differences = differences_by_side(covering().model_dump(), (2, 4, 8))
+    differences = differences_by_side(covering().tables(), (2, 4, 8))
     assert np.all(differences[:-1] / differences[1:] > 4.0)
     assert differences[-1] < 1e-5

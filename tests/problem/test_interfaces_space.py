@@ -150,7 +150,7 @@ def test_words_say_which_block_leaves_and_how() -> None:
     assert escaped.solvability.state == "escapes"
     assert escaped.solvability.direction is not None
     assert escaped.solvability.direction.name == 'translation along +x of body "upper": it slides off body "lower"'
-    lifted = pushed(0.0).model_dump(exclude_none=True)
+    lifted = pushed(0.0).tables()
     lifted["boundary"]["press"]["traction"] = [0.0, 0.0, 1e5]
     away = solved(Scene.model_validate(lifted)).solvability
     assert away.state == "escapes"
@@ -168,7 +168,7 @@ def test_a_block_tips_over_on_the_other_at_the_load_of_statics() -> None:
 @pytest.mark.long
 def test_a_stiff_partner_is_a_rigid_floor() -> None:
     friction = quadratic_linear(2e6, 1e-6)
-    table = pushed(4e5, friction=friction).model_dump(exclude_none=True)
+    table = pushed(4e5, friction=friction).tables()
     stiff = {"region": "lower", "youngs_modulus": 1e6 * E}
     table["material"] = {"soft": {**MATERIAL, "region": "upper"}, "stiff": {**MATERIAL, **stiff}}
     floor = {"seam": {"on": "upper.bottom", **CONTACT, "friction": friction}}
@@ -189,7 +189,7 @@ def test_a_stiff_partner_is_a_rigid_floor() -> None:
 
 def test_bodies_that_overlap_or_do_not_meet_are_refused() -> None:
     for origin, words in (([0.2, 0.1, 0.3], "it overlaps the body"), ([1.2, 0.1, 0.5], "do not face each other")):
-        table = pushed(3e5).model_dump(exclude_none=True)
+        table = pushed(3e5).tables()
         table["domain"]["upper"]["origin"] = origin
         with pytest.raises(InputError, match=words):
             prepare(Scene.model_validate(table))
@@ -235,7 +235,7 @@ def test_exchanging_the_sides_changes_less_with_finer_meshes() -> None:
         "push": {"on": "upper.left", "traction": [4e5, 0.0, 0.0]},
     }
     scene = stacked(boundary, {**CONTACT, "friction": quadratic_linear(1e6, 1e-6)})
-    differences = differences_by_side(scene.model_dump(exclude_none=True), (1, 4))
+    differences = differences_by_side(scene.tables(), (1, 4))
     assert differences[0] / differences[1] > 16.0
 
 

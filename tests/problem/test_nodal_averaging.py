@@ -84,7 +84,7 @@ def test_plain_p1_is_kept_where_it_does_not_lock() -> None:
 def test_a_uniform_stress_is_reproduced(load: float) -> None:
     """Patch test: a body between a wall and a floor, pressed on top; plane strain, u1 = 0 on both sides."""
     nu = 0.49
-    tables = scene(5, nu).model_dump(exclude_none=True)
+    tables = scene(5, nu).tables()
     tables["boundary"] = {
         "walls": {"on": ["left", "right"], "displacement": [0.0, "free"]},
         "floor": {"on": "bottom", "contact": {"gap": 0.0}},

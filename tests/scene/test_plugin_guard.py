@@ -13,7 +13,7 @@ from runs import hvi, process
 from scenes import model
 
 from hvi_fenicsx import InputError, dump_scene, read_scene
-from hvi_fenicsx.scene.scene import Scene
+from hvi_fenicsx.model import Scene
 
 LAW = """
 from dataclasses import dataclass

@@ -67,7 +67,7 @@ _HELD = {"left": [0.0, "free", "free"], "front": ["free", 0.0, "free"]}
 def test_a_disk_is_pressed_by_a_plate_as_hertz_says() -> None:
     """The peak of the pressure is sqrt(F E* / (π R)): no displacement is given, only the force."""
     scene = hvi.read_scene(ROOT / "demos/hertz.toml", ["domain.mesh_size=0.01", "domain.mesh_size_below=0.6e-3"])
-    table = scene.model_dump(mode="json")
+    table = scene.tables()
     load = table["boundary"].pop("top")
     table["boundary"]["held"] = {"on": load["on"], "displacement": [0.0, 0.0]}
     plate = {"point": [0.0, 0.0], "normal": [0.0, 1.0], "force": [0.0, 4e3]}

@@ -56,7 +56,7 @@ def taken(solution: Solution) -> SolutionArrays:
 def reference_of(solution: Solution) -> ReferenceSolution:
     matrix = stiffness(solution)
     assert matrix is not None
-    return ReferenceSolution(taken(solution), matrix, solution.scene.interface)
+    return ReferenceSolution(taken(solution), matrix, solution.scene.body.interfaces)
 
 
 def errors(reference: ReferenceSolution, found: SolutionArrays) -> dict[str, float]:

@@ -8,7 +8,6 @@ from scenes import NESTED, Table, model
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.scene_model import model_of
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.system.system import System
@@ -33,7 +32,7 @@ def springs(system: System) -> Array:
 def test_translations_meet_the_same_bonds_on_all_levels_at_corners_too() -> None:
     scene = Scene.model_validate(glued_corner())
     system = (found := prepare(scene, MPI.COMM_SELF, thresholds=NESTED)).system
-    levels = nested_iteration.coarser_levels(model_of(scene), system, found.options, RunControl(timer=Timer()))
+    levels = nested_iteration.coarser_levels(scene.formulation(), system, found.options, RunControl(timer=Timer()))
     assert len(levels) > 1
     assert system.frames is not None
     generator = np.random.default_rng(2)

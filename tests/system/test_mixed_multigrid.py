@@ -13,7 +13,6 @@ from scenes import NESTED, Table, model, two_blocks
 
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.runtime.timing import Timer
-from hvi_fenicsx.scene_model import model_of
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
@@ -67,7 +66,9 @@ def blocks() -> Table:
 def prepared(table: Table) -> tuple[Preparation, Levels]:
     scene = Scene.model_validate(table)
     found = prepare(scene, MPI.COMM_SELF, thresholds=NESTED)
-    levels = nested_iteration.coarser_levels(model_of(scene), found.system, found.options, RunControl(timer=Timer()))
+    levels = nested_iteration.coarser_levels(
+        scene.formulation(), found.system, found.options, RunControl(timer=Timer())
+    )
     assert levels
     return found, levels
 

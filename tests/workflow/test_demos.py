@@ -159,7 +159,7 @@ def test_the_anchor_opens_as_far_as_its_pull_needs() -> None:
 
 def giving(broken: int) -> float:
     """The energy with so many vertices of the ground broken from the right, the others on springs: a linear system."""
-    scene = demo("jureczka_ochal").scene.model_dump(mode="json")
+    scene = demo("jureczka_ochal").scene.tables()
     del scene["boundary"]["ground"]
     ready = prepare(Scene.model_validate(scene))
     system, scales = ready.system, ready.problem.scales

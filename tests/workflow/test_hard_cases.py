@@ -20,7 +20,7 @@ from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.load_paths.following import Control, PathRun
-from hvi_fenicsx.scene import PathTable
+from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.solvers import refinement
 from hvi_fenicsx.solvers.method import SolveResult
 from hvi_fenicsx.solvers.refinement import refined

@@ -1,0 +1,19 @@
+"""From Python: a model is solved, checked, followed, searched and studied (docs/python.md); solutions in SI."""
+
+from .following import ModelPath, follow
+from .solution import ModelSolution as Solution
+from .solving import check, solve
+from .stationary import Equilibria, equilibria
+from .studying import ModelStudy, study
+
+__all__ = [
+    "Equilibria",
+    "ModelPath",
+    "ModelStudy",
+    "Solution",
+    "check",
+    "equilibria",
+    "follow",
+    "solve",
+    "study",
+]

@@ -1,0 +1,205 @@
+"""What was found, for people: fields and tables in SI."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from dolfinx import fem
+from matplotlib.figure import Figure
+
+from ..certify.certificate import Examination
+from ..errors import InputError
+from ..problem import spaces
+from ..problem.cell_stress import cell_stress, space_of_stress
+from ..problem.scaling import Scales
+from ..report.contact_part import ContactPart
+from ..results import ResultFolder
+from ..results.contact_parts import contact_parts
+from ..results.output_folder import existing
+from ..results.whole import picture_process, write_whole
+from ..runtime import log, terminal
+from ..runtime.argument_checks import require_kind, require_path
+from ..runtime.terminal import percent
+from ..solvers.method import SolveResult
+from ..typing import Array
+from ..workflow import Solution
+from . import plotting
+
+_LOG = log.logger("api")
+GIVEN = {"command": None, "petsc": None}
+"""The entries of ``summary.json`` for the command line, which a program has not."""
+
+
+class _ContactParts(dict[str, ContactPart]):
+    """The parts of Γc by name."""
+
+    def __missing__(self, part: str) -> ContactPart:
+        raise KeyError(f"no contact and no law acts on {part!r}; there are: {', '.join(self) or 'none'}")
+
+
+def displacement(u: fem.Function, scales: Scales) -> fem.Function:
+    """A displacement in m, with its values at the nodes as coefficients. Collective.
+
+    Args:
+        u: in units of u0, ghosts updated.
+        scales: with u0.
+    """
+    found = spaces.in_lagrange_basis(u)
+    found.name = "displacement"
+    found.x.array[:] *= scales.displacement
+    return found
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ModelSolution(Solution):
+    """A solution with its fields in SI, on the body's mesh.
+
+    ``u``, ``stress``, ``contact`` and resultants are computed when they are first used; that is collective. They are
+    the same on all ranks but for the fields, of which each rank has its own part.
+    """
+
+    @cached_property
+    def u(self) -> fem.Function:
+        """The displacement, m, ghosts updated; Lagrange's elements of ``solver.degree``. Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        return displacement(self._solved.u, self.problem.scales)
+
+    @cached_property
+    def stress(self) -> fem.Function:
+        """The stress, N/m², tension positive: (3, 3), at degree 1 constant in each cell, at degree 2 linear.
+
+        Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        field = fem.Function(space_of_stress(self.problem.space, (3, 3)), name="stress")
+        values = cell_stress(self.problem.bulk, self._solved.u)
+        field.x.array[: values.size] = values.ravel()
+        field.x.scatter_forward()
+        return field
+
+    @property
+    def energy(self) -> float:
+        """The potential energy, J/m in 2D, J in 3D; the same on all ranks, not collective.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        return self._examined.energy * self.problem.scales.energy
+
+    @cached_property
+    def contact(self) -> Mapping[str, ContactPart]:
+        """The parts with contact or laws, by name; the same on all ranks. Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        parts = contact_parts(self.problem, self._examined.states)
+        return self.problem.domain.mesh.comm.bcast(_ContactParts(parts), root=0)
+
+    @cached_property
+    def resultants(self) -> Mapping[str, Array]:
+        """The forces on the body by the side or region they act on, N/m in 2D, N in 3D; (d,) each.
+
+        Loads, reactions of supports, contact and laws of a place are added up; all places together are in balance.
+        The same on all ranks. Collective when first used.
+
+        Raises:
+            InputError: on all ranks alike: nothing was solved, since no solution exists.
+        """
+        if self.forces is None:
+            raise InputError(self._nothing)
+        found = self.forces.resultants(self.problem.domain.mesh.comm)
+        return {name: force * self.problem.scales.force for name, force in found.items()}
+
+    def resultant(self, part: str) -> Array:
+        """The force on the body at a side or region, N/m in 2D, N in 3D; (d,). Collective when first used.
+
+        Args:
+            part: the name; "body" for a load on the whole body.
+
+        Raises:
+            InputError: on all ranks alike: there is no such place, or nothing was solved.
+        """
+        if part not in self.resultants:
+            raise InputError(f"nothing acts on {part!r}; there are: {', '.join(self.resultants)}")
+        return self.resultants[part]
+
+    def plot(self, picture: str | None = None) -> Figure | None:
+        """A picture of it as a matplotlib figure, which a notebook shows. Collective; None on ranks other than 0.
+
+        Args:
+            picture: one of those that a result folder has: body, stress, scene, contact, escape; with several contact
+                parts contact_NAME. None: body, or escape where no solution exists.
+
+        Raises:
+            InputError: on all ranks alike: there is no such picture of it.
+        """
+        require_kind("picture", picture, (str, type(None)), "the name of a picture, or None")
+        return plotting.draw(self, picture or ("escape" if self.solve_result is None else "body"))
+
+    def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
+        """Write the folder that ``hvi run`` writes. Collective.
+
+        ``scene.toml`` can be run again where the model has nothing that only Python knows.
+
+        Args:
+            folder: where to.
+            force: whether a result that is there already is replaced.
+            pictures: whether to draw.
+
+        Raises:
+            InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
+        """
+        require_path("folder", folder)
+        comm, dimension = self.problem.domain.mesh.comm, self.problem.scales.dimension
+        with (
+            ResultFolder(comm, Path(folder), existing(force=force)) as target,
+            picture_process(target, dimension, _LOG.warning, wanted=pictures) as process,
+        ):
+            write_whole(target, self, self.timer, GIVEN, _LOG.warning, process)
+            target.commit(self.scene)
+
+    @property
+    def _solved(self) -> SolveResult:
+        if self.solve_result is None:
+            raise InputError(self._nothing)
+        return self.solve_result
+
+    @property
+    def _examined(self) -> Examination:
+        if self.examination is None:
+            raise InputError(self._nothing)
+        return self.examination
+
+    @property
+    def _nothing(self) -> str:
+        way = self.solvability.direction
+        return f"nothing was solved: {self.reason}" + (f" ({way.name})" if way else "")
+
+    def _rows(self) -> list[tuple[str, str]]:
+        """What is said of it at a glance."""
+        unit = "J/m" if self.problem.scales.dimension == 2 else "J"
+        rows = [("result", self.reason), ("existence", self.solvability.state), ("unknowns", f"{self.dofs:,}")]
+        if self.examination is not None:
+            rows += [("energy", f"{self.energy:.10g} {unit}"), ("certificate", str(self.certificate))]
+        if self.obstacle is not None:
+            rows.append((f"obstacle of {self.obstacle.part}", str(self.obstacle)))
+        if self.estimate is not None:
+            part = self.estimate.total / (self.estimate.energy_norm or 1.0)
+            rows.append(("estimated error", f"{percent(part)} in the energy norm"))
+        return rows + [("warning", warning) for warning in self.warnings]
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name}: {text}" for name, text in self._rows())
+
+    def _repr_html_(self) -> str:
+        return terminal.html_table(self._rows())

@@ -1,0 +1,282 @@
+"""Laws on Γc: friction (paper: j), adhesion, support, and cohesion of opening and slip together."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ModelWrapValidatorHandler,
+    PlainSerializer,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails
+from typing_extensions import override
+
+from .. import laws
+from ..errors import InputError
+from ..formula import Formula, SpatialValue
+from ..laws import Mixity, mixities
+from ..schema import OneOf, refusal, shown
+from . import law_formulas
+from .base import Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python, names_in_python
+from .contribution import ONE, BoundaryLaw, Contribution, Direction
+from .law_formulas import PlacedLaw
+from .values import FormulaField, Value
+
+
+def _law(value: Any) -> PlacedLaw:
+    if isinstance(value, laws.Superpotential):
+        return PlacedLaw(law=value)
+    if not isinstance(value, dict):
+        raise refusal('must be a table, like { law = "name", ... }')
+    parameters = dict(value)
+    name = parameters.pop("law", None)
+    if not isinstance(name, str):
+        raise refusal(f'the law\'s name is missing: law = "name"; allowed: {", ".join(laws.available())}')
+    try:
+        return law_formulas.create(name, parameters)
+    except InputError as error:
+        if isinstance(error.__cause__, ValidationError):
+            raise _explained(error.__cause__) from None  # it knows the place of each wrong parameter
+        raise refusal(str(error)) from None
+
+
+def _explained(error: ValidationError) -> ValidationError:
+    """What is wrong with a law's parameters; if one is a text, why it is no formula."""
+    for found in error.errors():
+        if found["type"] == "float_type" and isinstance(text := found["input"], str):
+            try:
+                Formula(text)
+            except InputError as wrong:
+                said = refusal(f"must be a number (is {shown(text)}) or a formula in x, y, z: {wrong}")
+                details = InitErrorDetails(type=said, loc=found["loc"], input=text)
+                return ValidationError.from_exception_data(error.title, [details])
+    return error
+
+
+LawField = Annotated[
+    laws.Superpotential,
+    BeforeValidator(lambda value: _law(value).law),
+    PlainSerializer(lambda law: laws.describe(law)),
+]
+"""A superpotential as a field of a scene model: ``{ law = "name", ...parameters }``."""
+
+
+def _positive(value: SpatialValue) -> SpatialValue:
+    if value.is_number and not float(value.source) > 0.0:
+        raise refusal(f"is {value.source} and must be positive; leave the law out where there is none")
+    return value
+
+
+Multiplier = Annotated[FormulaField, AfterValidator(_positive)]
+
+
+def _lowest_traction(law: laws.Superpotential) -> float:
+    """The smallest traction at the kinks and on the way to four times the typical displacement, N/m²."""
+    x = np.concatenate([law.kinks[law.kinks > 0.0], np.linspace(0.0, 4.0, 65)[1:] * law.length_scale])
+    return float(np.min([law.left(x), law.right(x)]))
+
+
+class LawEffect(Effect):
+    """A law that acts on one displacement of a boundary part.
+
+    Class attributes:
+        direction: the displacement it acts on.
+    """
+
+    place: ClassVar[Place] = Place.BOUNDARY
+    exclusive: ClassVar[bool] = True
+    on_interfaces: ClassVar[bool] = True
+    direction: ClassVar[Direction]
+
+    law: LawField
+    """the name of the law; write its parameters as further keys of the same table"""
+    multiplier: Multiplier = ONE
+    """what all tractions of the law are multiplied by, a positive number or a formula in x, y, z"""
+    length_multiplier: Multiplier = ONE
+    """what all displacements of the law are multiplied by, a positive number or a formula in x, y, z"""
+    _placed: PlacedLaw | None = PrivateAttr(default=None)
+    _given: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    @from_python
+    def __init__(
+        self, side: Sides, law: laws.Superpotential, *, multiplier: Value = 1.0, length_multiplier: Value = 1.0
+    ) -> None:
+        self._make_law(side, law, multiplier=multiplier, length_multiplier=length_multiplier)
+
+    def _make_law(self, side: Sides, law: Any, **keys: Any) -> None:
+        if not isinstance(law, laws.Superpotential):
+            text = f"law: give a law as an object, such as hvi.laws.Graph(points), not {law!r}"
+            raise self.refused(text, names_in_python(side))
+        self._make(side, law=law, **keys)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _from_table(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        law = data.get("law") if isinstance(data, dict) else None
+        if isinstance(data, cls) or isinstance(law, laws.Superpotential):
+            return handler(data)
+        if not isinstance(data, dict):
+            return handler({"law": _law(data).law})
+        own = {key: data[key] for key in cls.model_fields if key != "law" and key in data}
+        placed = _law({key: value for key, value in data.items() if key not in own})
+        effect = handler({"law": placed.law, **own})
+        return effect._multiplied_by(placed, data) if placed.parameters else effect
+
+    def _multiplied_by(self, placed: PlacedLaw, given: dict[str, Any]) -> Self:
+        """The effect with what formulas in the place of numbers make of its law; it is stored as it was given."""
+        changed = self.model_copy(
+            update={
+                "multiplier": law_formulas.times(self.multiplier, placed.multiplier),
+                "length_multiplier": law_formulas.times(self.length_multiplier, placed.length_multiplier),
+            }
+        )
+        changed._placed, changed._given = placed, given
+        return changed
+
+    @model_serializer(mode="wrap")
+    def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
+        table = handler(self)
+        for key in ("multiplier", "length_multiplier"):
+            if self._given or getattr(self, key) == ONE:
+                table.pop(key, None)  # pydantic may have been told to leave it out
+        return {**table.pop("law"), **table, **self._given}
+
+    @override
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        """The law, acting on its displacement."""
+        return Contribution(laws=(self._brought(),))
+
+    def _brought(self, slip: float = 1.0) -> BoundaryLaw:
+        return BoundaryLaw(
+            self.direction,
+            self.law,
+            self.multiplier,
+            self.length_multiplier,
+            slip,
+            contradictions=self._placed.contradictions if self._placed else None,
+        )
+
+    @override
+    def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:
+        """A traction that is negative somewhere: it pushes the body on."""
+        lowest = _lowest_traction(self.law)
+        if lowest >= -1e-9 * self.law.traction_scale:
+            return ()
+        return (
+            f"the law's traction falls to {lowest:.3g} N/m² at a positive displacement, where it does not resist but "
+            "pushes the body on; is a sign wrong?",
+        )
+
+    @override
+    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+        """The law's own, times its multiplier."""
+        return self.law.traction_scale * largest(self.multiplier)
+
+
+class Friction(LawEffect):
+    """A law of the tangential displacement: -σ_t ∈ ∂j(u_t). It also acts on lifted vertices, as in the paper."""
+
+    key: ClassVar[str] = "friction"
+    term: ClassVar[str] = "∫ j⁰(u_t; v_t - u_t) ds on Γc, vertex quadrature"
+    direction: ClassVar[Direction] = Direction.SLIP
+
+    @override
+    def check(self, dimension: int) -> None:
+        """In 3D the law acts on |u_t| and must be even."""
+        if dimension == 3 and not self.law.even:
+            reason = "is one-sided; in 3D friction acts on |u_t| and must be even"
+            raise InputError(f'law = "{self.law.name}" {reason}')
+
+
+class Adhesion(LawEffect):
+    """A law of the opening: σ_n ∈ ∂j(-u·n). It pulls the body back; it may act with or without unilateral contact."""
+
+    key: ClassVar[str] = "adhesion"
+    term: ClassVar[str] = "∫ j⁰(-u_n; -(v_n - u_n)) ds on Γc, vertex quadrature"
+    direction: ClassVar[Direction] = Direction.OPENING
+
+
+class Support(LawEffect):
+    """A law of the penetration (normal compliance): -σ_n ∈ ∂j(u·n). It pushes the body back."""
+
+    key: ClassVar[str] = "support"
+    term: ClassVar[str] = "∫ j⁰(u_n; v_n - u_n) ds on Γc, vertex quadrature"
+    direction: ClassVar[Direction] = Direction.PENETRATION
+
+
+class Cohesion(LawEffect):
+    """A law j = g(δ) of both modes, δ = sqrt(⟨opening⟩₊² + beta² |slip|²). Compression is contact's matter."""
+
+    key: ClassVar[str] = "cohesion"
+    term: ClassVar[str] = "∫ j⁰(u; v - u) ds on Γc, j = g(δ), δ² = ⟨-u_n⟩₊² + β² |u_t|², vertex quadrature"
+    direction: ClassVar[Direction] = Direction.SEPARATION
+
+    beta: Annotated[float, Field(ge=1e-9, le=1e9)] = 1.0
+    """what a slip is multiplied by beside an opening: the strength in shear is beta times that in tension, and both
+    modes take the same energy"""
+    mixity: Annotated[str | None, OneOf(mixities)] = None
+    """the criterion by which the energy of separation depends on the mode; by default it does not"""
+    energy_ratio: Annotated[float | None, Field(ge=1e-9, le=1e9)] = None
+    """with mixity: the energy of slip alone over that of opening alone; the strength in shear is beta energy_ratio
+    times that in tension"""
+    exponent: Annotated[float | None, Field(ge=1.0, le=100.0)] = None
+    """with mixity: the exponent of the criterion"""
+
+    @from_python
+    def __init__(
+        self,
+        side: Sides,
+        law: laws.Superpotential,
+        beta: float = 1.0,
+        mixity: Mixity | None = None,
+        *,
+        multiplier: Value = 1.0,
+        length_multiplier: Value = 1.0,
+    ) -> None:
+        if mixity is not None and not isinstance(mixity, Mixity):
+            text = f"mixity: give a criterion, such as hvi.laws.PowerLaw(...), or None, not {mixity!r}"
+            raise self.refused(text, names_in_python(side))
+        keys = {} if mixity is None else {"mixity": mixity.name, **asdict(mixity)}
+        multipliers = {"multiplier": multiplier, "length_multiplier": length_multiplier}
+        self._make_law(side, law, beta=beta, **multipliers, **keys)
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        given = [self.mixity, self.energy_ratio, self.exponent]
+        if any(g is None for g in given) and any(g is not None for g in given):
+            raise refusal("mixity, energy_ratio and exponent belong together: state all three of them, or none")
+        return self
+
+    @property
+    def _criterion(self) -> Mixity | None:
+        if self.mixity is None or self.energy_ratio is None or self.exponent is None:
+            return None
+        return mixities()[self.mixity](energy_ratio=self.energy_ratio, exponent=self.exponent)
+
+    @override
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        """The law, acting on the effective displacement."""
+        return Contribution(laws=(replace(self._brought(self.beta), mixity=self._criterion),))
+
+    @override
+    def check(self, dimension: int) -> None:
+        """The law is known for δ ≥ 0 alone, and bonds do not push apart."""
+        if not self.law.even:
+            reason = "is one-sided; cohesion acts on δ, which is never negative: leave one_sided out"
+            raise InputError(f'law = "{self.law.name}" {reason}')
+        if self.mixity is not None and float(self.law.right(np.zeros(1))[0]) > 0.0:
+            reason = "has a traction at rest, where there is no mode yet; with mixity let it rise from 0 on a short way"
+            raise InputError(f'law = "{self.law.name}" {reason}')
+        if self.law.c4 > 0.0:
+            reason = "has negative tractions, which would push the sides apart; use adhesion and friction instead"
+            raise InputError(f'law = "{self.law.name}" {reason}')

@@ -1,0 +1,154 @@
+"""An elasticity by a user's own bilinear form, and what is checked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from dolfinx.fem.petsc import assemble_matrix
+from petsc4py import PETSc
+from pydantic import Field
+from typing_extensions import override
+
+from ..effects import Contribution, Effect, FormContext, Place, Sides, from_python
+from ..errors import InputError
+from ..mesh import nodes
+from ..problem.spaces import displacement_space
+from ..rigid import RigidBody, rigid_fields
+from ..runtime import forms
+from ..runtime.mpi import agree
+from ..typing import Array
+
+Form = Callable[[Any, Any], Any]
+
+
+_ROUNDING = 1e-10
+"""What counts as none in an assembled form, beside its size; of a rigid motion's energy, beside that of a stretch."""
+
+
+class Energy(Effect):
+    """An elasticity by a bilinear form of the user's own: twice its energy is form(u, u).
+
+    The form is in SI (J/m in 2D, J in 3D), of a trial function u and a test function v in m, and must depend on their
+    strains only. Where other materials are elsewhere, it must itself integrate over its region.
+    """
+
+    key: ClassVar[str] = "energy"
+    place: ClassVar[Place] = Place.MATERIAL
+    in_files: ClassVar[bool] = False
+    term: ClassVar[str] = "a(u, v), a form of the user's own"
+
+    form: Any = Field(exclude=True)
+    """makes the form of trial and test function, SI"""
+    modulus: float = 0.0
+    """the stiffness against stretches, N/m²; known on a mesh"""
+
+    @from_python
+    def __init__(self, form: Form, region: Sides | None = None) -> None:
+        if not callable(form):
+            raise self.refused(f"give a function that returns the UFL form a(u, v), not {form!r}", None)
+        self._make(region, form=form)
+
+    @override
+    def on_mesh(self, mesh: dmesh.Mesh) -> Energy:
+        """Itself with its stiffness, its form being symmetric and without energy of rigid motions. Collective."""
+        space = displacement_space(mesh)
+        matrix = _assembled(self.form, space)
+        _check_symmetry(matrix)
+        stiffness = _stretch_stiffness(matrix, space)
+        _check_rigid_motions(matrix, space, stiffness)
+        matrix.destroy()
+        return self.model_copy(update={"modulus": stiffness})
+
+    @override
+    def modulus_scale(self) -> float:
+        """The stiffness against stretches."""
+        return self.modulus
+
+    @override
+    def contribute(self, context: FormContext, where: str | None) -> Contribution:
+        """The form, nondimensional."""
+        factor = context.number(context.length ** (2 - context.dimension) / context.modulus)
+        return Contribution(bilinear=(factor * self.form(context.trial, context.test),))
+
+    def is_portable(self, mesh: dmesh.Mesh) -> bool:
+        """Whether the same form can be made on another mesh: it has no data of this one.
+
+        Args:
+            mesh: the body's mesh.
+        """
+        space = displacement_space(mesh)
+        form = self.form(ufl.TrialFunction(space), ufl.TestFunction(space))
+        measured = any(integral.subdomain_data() is not None for integral in form.integrals())
+        return not (form.coefficients() or form.constants() or measured)
+
+
+def _assembled(form: Form, space: fem.FunctionSpace) -> PETSc.Mat:
+    try:
+        made = form(ufl.TrialFunction(space), ufl.TestFunction(space))
+    except ValueError as error:  # so UFL refuses data of several meshes
+        raise InputError(f"UFL refuses the form: {error} Its data must be on body.mesh") from error
+    if not isinstance(made, ufl.Form) or len(made.arguments()) != 2:
+        raise InputError("the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
+    matrix = assemble_matrix(forms.compiled(made))
+    matrix.assemble()
+    return matrix
+
+
+def _check_symmetry(matrix: PETSc.Mat) -> None:
+    transposed = matrix.transpose(PETSc.Mat())
+    transposed.axpy(-1.0, matrix)
+    gap, size = transposed.norm(PETSc.NormType.FROBENIUS), matrix.norm(PETSc.NormType.FROBENIUS)
+    transposed.destroy()
+    if not size > 0.0:
+        raise InputError("the form is zero on this body")
+    if not gap <= _ROUNDING * size:
+        raise InputError(
+            f"the form is not symmetric: a(u, v) and a(v, u) differ by {gap / size:.1e} of its size; an energy "
+            "is, such as a(u, v) = ∫ C ε(u) : ε(v) dx with a symmetric C"
+        )
+
+
+def _energy(matrix: PETSc.Mat, field: Array) -> float:
+    """a(v, v) of a field at the owned vertices, (n, d). Collective."""
+    x, y = matrix.createVecs()
+    x.array[:] = field.ravel()
+    matrix.mult(x, y)
+    return float(x.dot(y))
+
+
+def _owned_points(space: fem.FunctionSpace) -> Array:
+    return nodes.points(space)[: space.dofmap.index_map.size_local]
+
+
+def _stretch_stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:
+    """The largest energy of a unit stretch along an axis, over the volume, N/m². Collective."""
+    points, d = _owned_points(space), space.mesh.geometry.dim
+    volume = space.mesh.comm.allreduce(
+        fem.assemble_scalar(forms.compiled(fem.Constant(space.mesh, PETSc.ScalarType(1.0)) * ufl.dx))
+    )
+    energies = [_energy(matrix, points[:, i : i + 1] * np.eye(d)[i]) / volume for i in range(d)]
+    if not min(energies) > 0.0:
+        axis = "xyz"[int(np.argmin(energies))]
+        raise InputError(f"a stretch along {axis} costs no energy (a(v, v) = {min(energies):.3g}); it must")
+    return float(max(energies))
+
+
+def _check_rigid_motions(matrix: PETSc.Mat, space: fem.FunctionSpace, stiffness: float) -> None:
+    points, d = _owned_points(space), space.mesh.geometry.dim
+    corners = agree(space.mesh.comm, (points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)))
+    low, high = np.min([c[0] for c in corners], axis=0), np.max([c[1] for c in corners], axis=0)
+    length = float(np.max(high - low))
+    fields = rigid_fields((points - (low + high) / 2) / length, RigidBody(dimension=d, centre=np.zeros(3)))
+    names = [f"the translation along {axis}" for axis in "xyz"[:d]]
+    names += ["the rotation"] if d == 2 else [f"the rotation about {axis}" for axis in "xyz"]
+    for number, name in enumerate(names):
+        if abs(_energy(matrix, fields[:, number])) > _ROUNDING * stiffness * length ** (d - 2):
+            raise InputError(
+                f"{name} costs energy, as a rigid motion of an elastic body must not; write the form in the "
+                "strain sym(grad(u)), and what holds the body as a Displacement, Contact or Support"
+            )

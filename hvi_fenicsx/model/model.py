@@ -1,0 +1,363 @@
+"""The model: a body, the effects on it, and how to solve; checked in one place, written as a scene file."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import tomli_w
+
+from ..effects import Effect, Place, in_words
+from ..errors import InputError
+from ..mesh.boundary_part import BoundaryPart
+from ..mesh.shapes import DomainShape
+from ..schema import Mistake, unknown
+from . import consistency
+from .body import Body
+from .content import TABLES, WHOLE, Content, dotted
+from .options import PathTable, SolverTable
+
+if TYPE_CHECKING:
+    from ..problem.compose import Formulation
+
+_WHOLE_BODY = "whole body"
+_LONGEST_NAME = 90
+"""Characters of the name of a place; a scene allows 100, and a number may follow."""
+
+
+class Model(Content):
+    """What is solved: effects on a body. Creation is collective.
+
+    A scene file is a model read, ``scene.toml`` one written. Nobody may change it afterwards.
+
+    Args:
+        body: the body on its mesh.
+        effects: with their places.
+        title: one line that names the model.
+
+    Raises:
+        InputError: on all ranks alike: a value is not allowed, or effects contradict each other.
+    """
+
+    def __init__(self, body: Body, effects: Sequence[Effect], title: str = "") -> None:
+        self.body, self.title = _checked_body(body), title
+        listed = [self._placed(effect) for effect in _listed("model", effects)]
+        if not any(effect.place is Place.MATERIAL for effect in listed):
+            raise InputError("model: no effect is a material; add one, such as hvi.Isotropic(youngs_modulus=..., ...)")
+        named = list(_named(listed))
+        for effect in named:
+            if effect.where is not None and effect.where[0] in body.interfaces and effect.name not in body.interfaces:
+                raise InputError(f"{effect.where[0]}: {effect.key} acts there already; give it once")
+        parts = {e.name: body.pieces.get(e.name) or BoundaryPart(e.where or ()) for e in named if _is_on_side(body, e)}
+        self._complete(named, parts)
+
+    @classmethod
+    def of_tables(cls, body: Body, effects: Iterable[Effect], parts: Mapping[str, BoundaryPart], **rest: Any) -> Self:
+        """The model that the tables of a scene file are. Not collective.
+
+        Args:
+            body: the body.
+            effects: with their places, named by their tables.
+            parts: where each boundary table stands.
+            **rest: title, solver, path, plugins.
+
+        Raises:
+            Mistakes: it contradicts itself.
+        """
+        model = cls.__new__(cls)
+        model.from_file, model.body = True, body
+        model.__dict__.update(rest)
+        model._complete(effects, parts)
+        return model
+
+    def _complete(self, effects: Iterable[Effect], parts: Mapping[str, BoundaryPart]) -> None:
+        """With all that it is, checked."""
+        self.parts = {**parts, **{name: BoundaryPart((one.first,)) for name, one in self.body.interfaces.items()}}
+        order = list(TABLES)
+        self.effects = tuple(sorted(effects, key=lambda e: order.index(self.table(e))))
+        if mistakes := consistency.contradictions(self):
+            raise Mistakes(self, mistakes)
+
+    def _placed(self, effect: Effect) -> Effect:
+        """An effect of a program on the body's mesh, checked; a refusal names it and its place. Collective."""
+        _check_place(self.body, effect)
+        try:
+            placed = effect.fitted(self.body.dimension).on_mesh(self.body.mesh)
+            placed.check(self.body.dimension)
+        except InputError as error:
+            if str(error).startswith(f"{type(effect).__name__} on"):
+                raise
+            raise effect.refused(str(error), effect.where) from error
+        return placed
+
+    def replace(self, *effects: Effect) -> Self:
+        """The model with other effects in the place of those of the same kind at the same place. Collective.
+
+        Mesh and coarser meshes are kept.
+
+        Args:
+            *effects: the new effects.
+
+        Raises:
+            InputError: on all ranks alike: the model has no such effect there, or several.
+        """
+        changed = list(self.effects)
+        for one in _listed("replace", effects):
+            position = self._position(one)
+            old = changed[position]
+            placed = self._placed(one) if not self.from_file else one.fitted(self.dimension)
+            changed[position] = placed.at(old.where if self.from_file else placed.where, old.name)
+        return self._copy()._checked(changed)
+
+    def _position(self, wanted: Effect) -> int:
+        """The number of the effect that another one stands for."""
+        places = frozenset(wanted.where or ())
+        alike = [i for i, e in enumerate(self.effects) if (e.place, e.key) == (wanted.place, wanted.key)]
+        found = [i for i in alike if places in (frozenset(self.effects[i].where or ()), {self.effects[i].name})]
+        if len(found) == 1:
+            return found[0]
+        known = "; ".join(f"{e.key} on {in_words(tuple(sorted(e.where or ())))}" for e in self.effects)
+        count = "no" if not found else "several effects"
+        where = in_words(tuple(sorted(places)))
+        raise InputError(f"replace: the model has {count} {wanted.key} on {where}; it has {known}")
+
+    def _copy(self) -> Self:
+        """A model like it, to be changed and checked."""
+        model = self.__new__(type(self))
+        model.__dict__.update(self.__dict__)
+        return model
+
+    def _checked(self, effects: Iterable[Effect]) -> Self:
+        """Itself with other effects, checked."""
+        own = {name: part for name, part in self.parts.items() if name not in self.body.interfaces}
+        self._complete(effects, own)
+        return self
+
+    def changed(
+        self,
+        domain: DomainShape | None = None,
+        solver: SolverTable | None = None,
+        path: PathTable | None = None,
+    ) -> Self:
+        """The model with another mesh, other options or another load path, checked again. Not collective.
+
+        Args:
+            domain: the body's shape with its mesh.
+            solver: how to solve.
+            path: the load path.
+        """
+        model = self._copy()
+        model.body = self.body if domain is None else self.body.with_shape(domain)
+        model.solver, model.path = solver or self.solver, path or self.path
+        return model._checked(self.effects)
+
+    def with_domain(self, **values: Any) -> Self:
+        """The model with other values in ``[domain]``, validated again. Not collective.
+
+        Args:
+            **values: the new values by their keys.
+
+        Raises:
+            ValidationError: the values are not allowed.
+        """
+        return self.changed(domain=self.domain.changed(**values))
+
+    def with_solver(self, **values: Any) -> Self:
+        """The model with other values in ``[solver]``, validated again. Not collective.
+
+        Args:
+            **values: the new values by their keys.
+
+        Raises:
+            ValidationError: the values are not allowed, or do not fit the others.
+        """
+        return self.changed(solver=self.solver.changed(**values))
+
+    def formulation(self) -> Formulation:
+        """The effects and their places, its laws smoothed where it says so, for any mesh. Not collective."""
+        from ..laws import smoothing
+        from ..problem.compose import Formulation
+        from ..problem.part_laws import Modification, unchanged
+
+        wanted = self.solver
+        modify: Modification = unchanged
+        if (kind := wanted.smoothing) is not None:
+            epsilon, absolute = wanted.epsilon, wanted.epsilon_absolute
+            modify = functools.partial(smoothing.create, kind, epsilon=epsilon, epsilon_absolute=absolute)
+        return Formulation(self.parts, list(self.acting()), modify, self.body.interfaces, wanted.degree or 1)
+
+    def in_words(self, message: str) -> str:
+        """A message in which keys are effects and their places, if a program made the model. Not collective.
+
+        Args:
+            message: of an error.
+        """
+        if self.from_file:
+            return message
+        words = {}
+        for effect in self.effects:
+            for place in dict.fromkeys((effect.name, *(effect.where or ()))):
+                for table in ("boundary", "interface", "body", "material"):
+                    words[f"{table}.{place}"] = in_words(effect.where)
+                    words[f"{table}.{place}.{effect.key}"] = f"{effect.key} on {in_words(effect.where)}"
+        for key in sorted(words, key=len, reverse=True):
+            message = message.replace(f"{key}.", f"{words[key]}: ").replace(key, words[key])
+        return message.replace('write "free"', "write None")
+
+    def tables(self, folder: Path | None = None) -> dict[str, Any]:
+        """The tables of the scene file that it is, every default written out. Not collective.
+
+        Args:
+            folder: from which the paths of mesh files and plugins are given; None: absolute paths.
+        """
+        context = None if folder is None else {"folder": folder}
+        write = functools.partial(_written, context=context)
+        found: dict[str, Any] = {"title": self.title}
+        if self.plugins:
+            found["plugins"] = [path if folder is None else os.path.relpath(path, folder) for path in self.plugins]
+        found |= {"domain": write(self.domain)}
+        effects: dict[str, dict[str, Any]] = {table: {} for table in TABLES}
+        for name, part in self.parts.items():
+            if (sides := self.body.interfaces.get(name)) is not None:
+                effects["interface"][name] = {"between": [sides.first, sides.second], "tied": sides.tied}
+            else:
+                piece = {} if part.where is None else {"where": part.where.source}
+                effects["boundary"][name] = {"on": _one_or_list(part.on), **piece}
+        for effect in self.effects:
+            own = effects[self.table(effect)].setdefault(effect.name, {})
+            if effect.place is not Place.BOUNDARY and effect.where is not None:
+                own["region"] = _one_or_list(effect.where)
+            if effect.place is Place.MATERIAL:
+                own |= {"elasticity": effect.key, **write(effect)}
+            else:
+                own[effect.key] = write(effect)
+        found |= {table: _flat(named) for table, named in effects.items() if named}
+        path = {} if self.path is None else {"path": write(self.path)}
+        return found | {"solver": write(self.solver), **path}
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both say the same of the same body."""
+        return isinstance(other, Model) and self._content() == other._content()
+
+    def __hash__(self) -> int:
+        return hash(self.title)
+
+    def _content(self) -> tuple[Any, ...]:
+        body = self.domain, self.parts, self.body.interfaces
+        return (*body, self.effects, self.title, self.solver, self.path, self.plugins)
+
+    def __repr__(self) -> str:
+        names = (f"{type(effect).__name__} on {in_words(effect.where)}" for effect in self.effects)
+        return f"Model({self.body!r}: {', '.join(names)})"
+
+
+class Mistakes(InputError):
+    """What is wrong with a model, each at its place.
+
+    Args:
+        model: the model, where there is one.
+        found: the mistakes.
+    """
+
+    def __init__(self, model: Model | None, found: Sequence[Mistake]) -> None:
+        lines = (": ".join(filter(None, (dotted(m.where), m.text))) for m in found)
+        text = "\n".join(lines)
+        super().__init__(text if model is None else model.in_words(text))
+        self.found = tuple(found)
+
+
+def dump_scene(scene: Model, folder: Path | None = None) -> str:
+    """The model as a scene file; read again from that folder it gives an equal one. Not collective.
+
+    Args:
+        scene: the model.
+        folder: from which the paths of mesh files and plugins are given; None: absolute paths.
+    """
+    return tomli_w.dumps(scene.tables(folder))
+
+
+def is_portable(model: Model) -> bool:
+    """Whether a model can be assembled on other meshes than its body's: no energy has data of that one.
+
+    Args:
+        model: the model.
+    """
+    return model.from_file or all(effect.is_portable(model.body.mesh) for effect in model.effects)
+
+
+def _written(table: Any, context: Any) -> Any:
+    return table.model_dump(mode="json", exclude_none=True, context=context)
+
+
+def _one_or_list(names: Sequence[str]) -> Any:
+    return names[0] if len(names) == 1 else list(names)
+
+
+def _flat(named: dict[str, Any]) -> dict[str, Any]:
+    """``[material]`` instead of ``[material.""]``."""
+    whole: dict[str, Any] | None = named.get(WHOLE)
+    return named if whole is None else whole
+
+
+def _checked_body(body: Any) -> Body:
+    if not isinstance(body, Body):
+        raise InputError(f"model: {body!r} is no body; make one of a mesh: hvi.Body(mesh, facets=..., names=...)")
+    return body
+
+
+def _listed(user: str, effects: Any) -> tuple[Effect, ...]:
+    """The effects that a model or a replacement, the user of them, is given."""
+    if isinstance(effects, Effect) or not isinstance(effects, Iterable):
+        raise InputError(f"{user}: effects are a list; write [...] around them")
+    listed = tuple(effects)
+    for one in listed:
+        if not isinstance(one, Effect) or (one.place is Place.BOUNDARY and one.where is None):
+            raise InputError(f'{user}: {one!r} is no effect with a place, such as hvi.Friction("floor", law)')
+    return listed
+
+
+def _is_on_side(body: Body, effect: Effect) -> bool:
+    return effect.place is Place.BOUNDARY and effect.name not in body.interfaces
+
+
+def _check_place(body: Body, effect: Effect) -> None:
+    """Refuse a name that is no side or region of the body."""
+    on_side = effect.place is Place.BOUNDARY
+    known: Collection[str] = body.sides if on_side else body.regions if effect.where else ()
+    alone = (*body.pieces, *body.interfaces) if on_side else ()
+    names = effect.where or ()
+    for name in names:
+        if name not in (*known, *(alone if len(names) == 1 else ())):
+            raise InputError(f"{type(effect).__name__}: {_no_place(name, known, alone)}")
+
+
+def _no_place(name: str, known: Collection[str], alone: Collection[str]) -> str:
+    """Why a name is none of a place, or none in a list."""
+    if name in alone:
+        return f"{name!r} stands alone, being a piece or an interface; a list is of whole sides: {', '.join(known)}"
+    if not known and not alone:
+        return f"the body has no place {name!r}"
+    return unknown("place", name, [*known, *alone])
+
+
+def _named(effects: Iterable[Effect]) -> Iterator[Effect]:
+    """Effects named by their places; with a number where a place has one of the kind already."""
+    taken: dict[tuple[Place, str], dict[str, tuple[str, ...] | None]] = {}
+    for effect in effects:
+        joined = "-".join(effect.where or (_WHOLE_BODY,))[:_LONGEST_NAME]
+        name, number = joined, 1
+        while not _fits(taken.setdefault((effect.place, name), {}), effect):
+            number += 1
+            name = f"{joined}.{number}"
+        taken[effect.place, name][effect.key] = effect.where
+        yield effect.at(effect.where, name)
+
+
+def _fits(table: Mapping[str, tuple[str, ...] | None], effect: Effect) -> bool:
+    """Whether a table of one place, with these effects by key, can hold another one."""
+    if effect.place is Place.MATERIAL and table:
+        return False
+    return effect.key not in table and all(where == effect.where for where in table.values())

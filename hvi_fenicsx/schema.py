@@ -1,0 +1,427 @@
+"""What all tables of a scene file share: strict and frozen, with refusals in plain words at the right place.
+
+Light: it loads pydantic and nothing heavier, and knows no particular table.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import itertools
+import json
+import os
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, Self, TypeVar, get_args
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    ModelWrapValidatorHandler,
+    PlainSerializer,
+    SerializationInfo,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import CoreSchema, ErrorDetails, InitErrorDetails, PydanticCustomError, core_schema
+
+from .class_registry import closest
+from .errors import InputError
+
+
+@functools.cache
+def descriptions(table: type[BaseModel]) -> Mapping[str, str]:
+    """The text of each field that has one, by name; of a field that is declared anew, the new one.
+
+    Args:
+        table: whose fields.
+    """
+    found: dict[str, str] = {}
+    for kind in reversed(table.__mro__):
+        if issubclass(kind, BaseModel):
+            anew = inspect.get_annotations(kind)
+            found = {name: text for name, text in found.items() if name not in anew} | _texts(kind)
+    return {name: found[name] for name in table.model_fields if name in found}
+
+
+def _texts(kind: type[BaseModel]) -> dict[str, str]:
+    """The texts below a class's own fields; none where its source is not at hand."""
+    try:
+        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+    except (OSError, TypeError, SyntaxError, ValueError):
+        return {}
+    assert isinstance(definition, ast.ClassDef)
+    found = {}
+    for field, below in itertools.pairwise(definition.body):
+        match field, below:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                found[name] = inspect.cleandoc(text)
+    return found
+
+
+Keys = tuple[str | int, ...]
+"""A place: the keys from the outermost table down to it; the entries of a list have numbers."""
+_LONGEST = 60
+"""Characters of a value that a message shows."""
+
+
+def refusal(text: str) -> PydanticCustomError:
+    """An error for a validator to raise; the reader of the scene adds its place."""
+    # Through the context, since braces in the text itself would be taken for places to fill.
+    return PydanticCustomError("scene", "{text}", {"text": text})
+
+
+def shown(value: Any) -> str:
+    """A value as a scene file would write it, cut where it is long."""
+    if isinstance(value, str):
+        text = json.dumps(value, ensure_ascii=False)
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, dict):
+        return "a table"
+    else:
+        text = _plain(value)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def _plain(value: Any) -> str:
+    try:
+        return str(value)
+    except ValueError:  # Python refuses to print whole numbers of thousands of digits
+        return "a huge number"
+
+
+def unknown(kind: str, name: Any, allowed: Iterable[str]) -> str:
+    """The message on an unknown name: the closest known one, and all that are allowed.
+
+    Args:
+        kind: what the name is of, like "shape".
+        name: the name, or what stands in its place.
+        allowed: the names that are known.
+    """
+    known = list(allowed)
+    if not isinstance(name, str):
+        return f"must be one of {', '.join(known)} in quotes (is {shown(name)})"
+    close = closest(name, known)
+    hint = f"did you mean {shown(close)}? " if close else ""
+    return f"unknown {kind} {shown(name)}; {hint}allowed: {', '.join(known) or 'none'}"
+
+
+def suggestion(error: ErrorDetails, model: type[BaseModel] | None) -> str | None:
+    """The key that was probably meant by an unknown one.
+
+    Args:
+        error: pydantic's, of the kind "extra_forbidden".
+        model: the table that was read.
+    """
+    return closest(str(error["loc"][-1]), _keys(model, error["loc"][:-1]))
+
+
+def message_of(error: ErrorDetails, model: type[BaseModel] | None, also: Iterable[str] = ()) -> str:
+    """The message on one finding: what is allowed and what is there, without pydantic's own terms.
+
+    Args:
+        error: pydantic's.
+        model: the table that was read, for its allowed keys.
+        also: keys that the table allows beside those of the model.
+    """
+    kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
+    if kind == "missing":
+        return "is missing" + _described(model, error["loc"])
+    if kind == "extra_forbidden":
+        return unknown("key", str(error["loc"][-1]), [*_keys(model, error["loc"][:-1]), *also])
+    if kind == "literal_error":
+        return _not_among(value, context.get("expected", ""))
+    if kind == "value_error":
+        return str(context["error"])
+    if kind in _TEXTS:
+        return f"{_TEXTS[kind](context)} (is {shown(value)}){_mend(kind, value)}"
+    return str(error["msg"])
+
+
+def _not_among(value: Any, expected: str) -> str:
+    """The message on a value that is not one of those listed, numbers or names in quotes."""
+    names = re.findall(r"'([^']*)'", expected)
+    return unknown("value", value, names) if names else f"must be {expected} (is {shown(value)})"
+
+
+_TEXTS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+    "greater_than": lambda c: f"must be greater than {c['gt']:g}",
+    "greater_than_equal": lambda c: f"must be {c['ge']:g} or more",
+    "less_than": lambda c: f"must be less than {c['lt']:g}",
+    "less_than_equal": lambda c: f"must be {c['le']:g} or less",
+    "finite_number": lambda c: "must be a finite number",
+    "float_type": lambda c: "must be a number",
+    "float_parsing": lambda c: "must be a number",
+    "int_type": lambda c: "must be a whole number",
+    "int_parsing": lambda c: "must be a whole number",
+    "int_parsing_size": lambda c: "must be a whole number of reasonable size",
+    "int_from_float": lambda c: "must be a whole number",
+    "bool_type": lambda c: "must be true or false",
+    "string_type": lambda c: "must be a text in quotes",
+    "tuple_type": lambda c: "must be a list, as in [..., ...]",
+    "list_type": lambda c: "must be a list, as in [..., ...]",
+    "dict_type": lambda c: "must be a table",
+    "model_type": lambda c: "must be a table",
+    "model_attributes_type": lambda c: "must be a table",
+    "too_long": lambda c: f"must have {c['max_length']} entries, not {c['actual_length']}",
+    "too_short": lambda c: f"must have {c['min_length']} entries, not {c['actual_length']}",
+    "string_too_long": lambda c: f"must have {c['max_length']} characters at most",
+}
+
+
+def _mend(kind: str, value: Any) -> str:
+    if kind in ("float_type", "int_type") and isinstance(value, str):
+        try:
+            float(value)
+        except ValueError:
+            return ""
+        return "; write it without quotes"
+    return ""
+
+
+def _described(model: type[BaseModel] | None, loc: Keys) -> str:
+    field = model_at(model, loc[:-1])
+    known = descriptions(field).get(str(loc[-1])) if field else None
+    return f": {known}" if known else ""
+
+
+def _keys(model: type[BaseModel] | None, loc: Keys) -> list[str]:
+    found = model_at(model, loc)
+    return [info.alias or name for name, info in found.model_fields.items()] if found else []
+
+
+def model_at(model: type[BaseModel] | None, loc: Keys) -> type[BaseModel] | None:
+    """The table that stands at a place within another, as far as the fields' types tell.
+
+    Args:
+        model: the outermost table.
+        loc: the keys down to the place.
+    """
+    for step in loc:
+        field = model.model_fields.get(str(step)) if model else None
+        model = _table_in(field.annotation) if field else None
+    return model
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (_table_in(argument) for argument in get_args(annotation))
+    return next((model for model in found if model), None)
+
+
+Kind = TypeVar("Kind", bound=BaseModel)
+
+
+class Mistake(NamedTuple):
+    """What is wrong with the user's tables, and where.
+
+    Attributes:
+        where: the place.
+        text: what is wrong, what is allowed, how to mend it.
+    """
+
+    where: Keys
+    text: str
+
+
+def validation_error(mistakes: Iterable[Mistake]) -> ValidationError:
+    """The mistakes as pydantic's own error, which keeps the place of each when tables are nested."""
+    details = [InitErrorDetails(type=refusal(m.text), loc=m.where, input=None) for m in mistakes]
+    return ValidationError.from_exception_data("scene", details)
+
+
+def mistakes_of(
+    error: ValidationError, model: type[BaseModel] | None = None, also: tuple[str, ...] = ()
+) -> list[Mistake]:
+    """What pydantic found, in plain words.
+
+    Args:
+        error: pydantic's error.
+        model: the table that was read, for its allowed keys.
+        also: keys that the table allows beside those of the model.
+    """
+    found = error.errors(include_url=False)
+    meant = {(*e["loc"][:-1], suggestion(e, model)) for e in found if e["type"] == "extra_forbidden"}
+    # A misspelt key is one mistake: that the right one is missing then goes without saying.
+    found = [e for e in found if e["type"] != "missing" or e["loc"] not in meant]
+    return [Mistake(tuple(e["loc"]), message_of(e, model, also)) for e in found]
+
+
+def input_error(error: ValidationError, model: type[BaseModel] | None = None) -> InputError:
+    """What pydantic found as one line for the user.
+
+    Args:
+        error: pydantic's error.
+        model: the table that was read, for its allowed keys.
+    """
+    return InputError("; ".join(m.text for m in mistakes_of(error, model)))
+
+
+def located_error(error: ValidationError, model: type[BaseModel] | None = None) -> InputError:
+    """What pydantic found, a line each, with the key before it.
+
+    Args:
+        error: pydantic's error.
+        model: the table that was read, for its allowed keys.
+    """
+    found = mistakes_of(error, model)
+    lines = ((".".join(str(key) for key in mistake.where if key != ""), mistake.text) for mistake in found)
+    return InputError("\n".join(f"{where}: {text}" if where else text for where, text in lines))
+
+
+class Table(BaseModel):
+    """A table of the scene file: frozen, no unknown keys, no silent conversions."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _in_plain_words(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
+        return cls._read_or_refuse(lambda: handler(data), [])
+
+    @classmethod
+    def _read_or_refuse(cls, read: Callable[[], Any], mistakes: list[Mistake]) -> Any:
+        """What ``read`` returns; all mistakes together if it finds some or some were found before."""
+        try:
+            table = read()
+        except ValidationError as error:
+            mistakes = [*mistakes, *mistakes_of(error, cls)]
+        if mistakes:
+            raise validation_error(mistakes)
+        return table
+
+    def changed(self, **values: Any) -> Self:
+        """A copy with other values, validated like a new table; what was left to its default still is.
+
+        Args:
+            **values: the new values by their keys.
+
+        Raises:
+            ValidationError: the values are not allowed, or do not fit the others.
+        """
+        given = {key: value for key, value in self if key in self.model_fields_set}
+        return type(self).model_validate({**given, **values})
+
+
+def choose(data: Any, key: str, classes: Mapping[str, type[Kind]], context: Any = None) -> Any:
+    """The table read by the class that its ``key`` names.
+
+    Args:
+        data: a table, or what shall be one.
+        key: whose value is the name of the class.
+        classes: the classes by name.
+        context: handed on to pydantic.
+
+    Raises:
+        ValidationError: no table, no such key, an unknown name, or what the class itself refuses.
+    """
+    if isinstance(data, BaseModel):
+        return data
+    if not isinstance(data, dict):
+        raise validation_error([Mistake((), f"must be a table with a {key} (is {shown(data)})")])
+    name = data.get(key)
+    if name is None:
+        raise validation_error([Mistake((key,), f"is missing; allowed: {', '.join(classes)}")])
+    if not isinstance(name, str) or name not in classes:
+        raise validation_error([Mistake((key,), unknown(key, name, classes))])
+    return classes[name].model_validate(data, context=context)
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Marks a field whose value is the name of a registered class; plugins may have registered more.
+
+    Attributes:
+        registered: the classes by their names, asked for whenever a scene is read.
+    """
+
+    registered: Callable[[], Mapping[str, type]]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self._check, handler(source))
+
+    def _check(self, value: Any) -> Any:
+        names = tuple(self.registered())
+        if value is not None and value not in names:
+            raise refusal(unknown("value", value, names))
+        return value
+
+
+def vector(length: int) -> BeforeValidator:
+    """A validator that reads TOML's list of ``length`` entries as a tuple."""
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise refusal(f"must be a list of {length}, as in [{', '.join(['...'] * length)}] (is {shown(value)})")
+        if len(value) != length:
+            raise refusal(f"must have {length} entries, not {len(value)}")
+        return tuple(value)
+
+    return BeforeValidator(read)
+
+
+def names_of(value: Any) -> tuple[str, ...]:
+    """One name or a list of names as a tuple.
+
+    Args:
+        value: as a scene file or a Python program has it.
+
+    Raises:
+        PydanticCustomError: it is something else, empty, or has a name twice.
+    """
+    names = (value,) if isinstance(value, str) else value
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n.strip() for n in names):
+        raise refusal('must be a name or a list of names in quotes, like "left" or ["left", "top"]')
+    if not names:
+        raise refusal("is an empty list; name at least one")
+    if len(set(names)) < len(names):
+        raise refusal("names the same thing twice")
+    return tuple(names)
+
+
+Names = Annotated[
+    tuple[str, ...],
+    BeforeValidator(names_of),
+    PlainSerializer(lambda names: names[0] if len(names) == 1 else list(names)),
+]
+"""One name or a list of names."""
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+"""A finite number."""
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+"""A finite number above 0."""
+SHORTEST, LONGEST = 1e-9, 1e9
+"""Lengths of a body, m: beyond them, squares and cubes of lengths exceed what double precision resolves."""
+Length = Annotated[float, Field(ge=SHORTEST, le=LONGEST)]
+"""A length of a body, m."""
+Count = Annotated[int, Field(gt=0)]
+"""A whole number above 0."""
+
+
+def _existing(value: Any, info: ValidationInfo) -> Path:
+    if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
+        raise refusal('must be the name of a file in quotes, like "part.msh"')
+    folder = (info.context or {}).get("folder", ".")
+    path = Path(os.path.abspath(Path(folder) / value))
+    if not path.is_file():
+        raise refusal(f"{path} {'is a folder' if path.is_dir() else 'does not exist'}")
+    return path
+
+
+def _written(path: Path, info: SerializationInfo) -> str:
+    """The path from the folder that the scene is written into; absolute where that is not known."""
+    folder = (info.context or {}).get("folder")
+    return str(path) if folder is None else os.path.relpath(path, folder)
+
+
+ExistingFile = Annotated[Path, BeforeValidator(_existing), PlainSerializer(_written)]
+"""A file that exists, absolute; its context has the folder that its name is relative to."""
