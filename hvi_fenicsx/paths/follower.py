@@ -14,11 +14,10 @@ from ..typing import Array
 from .branch import Branch, Move, Outcome, Passage, Refused, event_of
 from .branching import Way, chosen, ways_on
 from .curve import Curve
-from .cycles import Cycle, Cycles
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
 from .jumps import jump_from
-from .load_history import LoadHistory
+from .load_history import Cycle, Cycles, LoadHistory
 from .pivoting import StraightBranch
 from .relations import ContactPoints
 from .state import End, Event, Follow, PathOptions, PathState, Place, Stopped, Watch, place_of

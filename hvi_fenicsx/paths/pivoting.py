@@ -19,12 +19,11 @@ from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
-from .basis import FACTOR, Basis
 from .branch import Branch, Move, Outcome, Passage
 from .relations import ContactPoints
 from .segments import Kind, Segment, piece_at
 from .state import Position
-from .straight_state import StraightState
+from .straight_state import FACTOR, Basis, StraightState
 
 
 class StraightBranch(Branch):

@@ -14,13 +14,9 @@ from enum import Enum
 
 import numpy as np
 
-from ..errors import InputError
 from ..laws.traction_graph import TractionGraph
-from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
-from .lengths import VectorPoints
 from .thresholds import ROUNDING
-from .vertex_laws import VertexLaw
 
 _SIDES = ("left", "right")
 
@@ -287,29 +283,3 @@ def beside_opening(lower: float) -> tuple[Segment, ...]:
     if math.isfinite(lower):
         found.insert(0, Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=0.0))
     return tuple(found)
-
-
-def refuse_shared(problem: CondensedProblem, vectors: VectorPoints, laws: Sequence[VertexLaw]) -> None:
-    """Refuse what has no graph of its own: unknowns that a law on a length shares with another law or a bound.
-
-    Args:
-        problem: the problem.
-        vectors: the points of laws on a length.
-        laws: at all vertices.
-
-    Raises:
-        InputError: there are such unknowns, or openings with a bound above 0.
-    """
-    seen, openings = vectors.flat, vectors.opening_unknowns
-    with_one = [i for law in laws if not law.bonds.radial for i in law.unknowns]
-    low = np.isfinite(problem.lower)
-    low[openings] = problem.lower[openings] > 0.0
-    bounded = np.flatnonzero(low | np.isfinite(problem.upper))
-    shared = np.intersect1d(seen, np.concatenate([np.array(with_one, dtype=np.int64), bounded]))
-    if len(np.unique(seen)) == len(seen) and not shared.size:
-        return
-    raise InputError(
-        "path: at a vertex a law acts on |u_t| or on opening and slip, and contact or another law on a component of "
-        "it; such an edge has no path yet. Leave one of them away there, or let the parts not meet. Cohesion beside "
-        "contact has a path where nothing bounds the opening from above, and the gap is not negative"
-    )
