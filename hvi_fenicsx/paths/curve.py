@@ -192,7 +192,8 @@ class Curve(Events):
     @override
     def note(self, move: Move) -> None:
         if move.outcome is Outcome.FOLD:
-            self.trend, self.unstable = -self.trend, self._beyond(move)
+            self.trend = -self.trend
+            self.unstable = self._beyond(move)
             return
         if move.outcome in (Outcome.END, Outcome.TURNED):
             self._settle()
