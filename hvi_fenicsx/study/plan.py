@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -129,23 +130,21 @@ def _check(name: str, value: str) -> None:
     """Refuse a value that an axis does not have."""
     try:
         if name == "accuracy":
-            SolverTable.model_validate({"tolerance": _number(value)})  # a tolerance is what is between 0 and 1
+            SolverTable.model_validate({"tolerance": _value(value)})  # a tolerance is what is between 0 and 1
         elif name != "mesh" and not (name in _WIDTHS and value == EXACT):
             width = {"epsilon": 1.0} if name == "smoothing" else {}
-            options_of(SolverTable.model_validate({**width, name: _number(value)}))
+            options_of(SolverTable.model_validate({**width, name: _value(value)}))
     except (ValidationError, InputError) as error:
         mistake = str(input_error(error, SolverTable) if isinstance(error, ValidationError) else error)
         raise InputError(f"--axis {name}={value}: {mistake.partition(': ')[2] or mistake}") from None
 
 
-def _number(text: str) -> Any:
-    """A value of the solver table: a number where the text is one."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            pass
-    return text
+def _value(text: str) -> Any:
+    """A value of the solver table as TOML has it; what is none is a text."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
 
 
 @dataclass
@@ -172,10 +171,9 @@ class _Planner:
         try:
             shape = self.scene.domain.with_mesh(mesh) if isinstance(mesh, str) else mesh
             return self.scene.changed(domain=shape)
-        except ValidationError as error:
-            raise input_error(error, type(self.scene.domain)) from None
-        except InputError as error:
-            raise InputError(f"--axis mesh: {error}") from None
+        except (ValidationError, InputError) as error:
+            mistake = input_error(error, type(self.scene.domain)) if isinstance(error, ValidationError) else error
+            raise InputError(f"--axis mesh: {mistake}") from None
 
     def default(self) -> Iterator[Values]:
         """Meshes by widths; on the scene's own mesh smoothings, methods, tolerances; both degrees; adaptive meshes."""
@@ -249,7 +247,7 @@ def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:
     Raises:
         InputError: they contradict each other, or the laws cannot be smoothed so.
     """
-    values = {name: _number(value) for name, value in pairs.items()}
+    values = {name: _value(value) for name, value in pairs.items()}
     width = next((name for name in _WIDTHS if name in values), None)
     if width is not None and values[width] == EXACT:
         values |= _UNSMOOTHED

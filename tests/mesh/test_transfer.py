@@ -167,11 +167,3 @@ def test_refinements_that_memory_cannot_hold_are_refused(tmp_path: Path) -> None
     scene = read_scene(DEMOS / "strong_law.toml", [f'domain={{shape="file", file="{file}", refinements=10}}'])
     with pytest.raises(InputError, match=r"domain\.refinements: .* use fewer refinements"):
         workflow.solve(scene)
-
-
-@pytest.mark.parametrize("chosen", [[], [0], [3, 4, 5], [0, 2, 3, 7, 8, 9, 11]])
-def test_runs_copy_what_indices_would(chosen: list[int]) -> None:
-    whole, part = np.arange(12.0), np.full(len(chosen), np.nan)
-    for at, of in linear.consecutive_runs(np.array(chosen, dtype=np.int32)):
-        part[of] = whole[at]
-    assert part.tolist() == [float(i) for i in chosen]
