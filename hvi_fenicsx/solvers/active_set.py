@@ -248,7 +248,7 @@ class _SnesRun:
         Where net forces are left, which residuals by vertex do not tell, its norm falls as far as they have to.
         """
         thresholds = self.thresholds
-        least = thresholds.loose if moved else 0.0 if self.steady else thresholds.accurate
+        least = thresholds.loose if moved else 0.0 if self.steady else thresholds.coarse_tolerance
         wanted = max(thresholds.margin * self.tolerance, least * self.last)
         balanced = not np.any(self.sizes.net > 0.0)
         reached = self.owner.convergence.reaches(wanted, self.sizes.forces) if balanced else None

@@ -164,7 +164,7 @@ class Auto(BranchIteration):
     def _on_other_pieces(self, most: int | None) -> Iterator[SolveResult]:
         """On the pieces of the slips at rest, and with every bond broken, to either side."""
         resting, _ = resting_start(self.solver, self._laws)
-        for factor in (1.0, self.thresholds.broken_slip, -self.thresholds.broken_slip):
+        for factor in (1.0, self.thresholds.runaway, -self.thresholds.runaway):
             pieces = resting.copy()
             pieces.scale(factor)
             self._limit.next_start(most)
@@ -175,7 +175,7 @@ class Auto(BranchIteration):
 
         The bonds are as they are at rest, then unbroken.
         """
-        rested = at_rest(self.context, self._laws, self._majorants, self.thresholds.accurate)
+        rested = at_rest(self.context, self._laws, self._majorants, self.thresholds.coarse_tolerance)
         if rested is None:
             return
         unbroken = rested[0].duplicate()

@@ -105,7 +105,7 @@ class BranchIteration(Method):
         """ξ of the pieces to begin on: those of a displacement, or those of the options."""
         if branches is not None:
             return self._convex.subgradients(branches)
-        first = arguments(self.system, x, self.options.start, self.thresholds.broken_slip)
+        first = arguments(self.system, x, self.options.start, self.thresholds.runaway)
         return [law.concave.left(a) for law, a in zip(self._laws, first, strict=True)]
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:

@@ -127,7 +127,7 @@ class Condensation(Method):
         """When least squares end; not by the gradient, which is small wherever Φ is."""
         thresholds = self.options.thresholds
         most = self.options.max_iterations
-        return {"max_nfev": most, "ftol": thresholds.energy_rounding, "xtol": thresholds.least_step, "gtol": None}
+        return {"max_nfev": most, "ftol": thresholds.energy_rounding, "xtol": thresholds.energy_rounding, "gtol": None}
 
     def _record(self, mixed: _Complementarity, x: Array, points: list[Array]) -> None:
         """Keep and report an accepted point."""

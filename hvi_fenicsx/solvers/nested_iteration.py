@@ -243,7 +243,7 @@ def _coarser_model(model: Formulation, system: System) -> Formulation:
         return model
     large = mesh.geometry.dim * nodes.count(mesh, 1) > limits.largest_rubber[mesh.geometry.dim]
     softened = 0.0 < ratio <= limits.volumetric_ratio or large
-    return replace(model, degree=1, volumetric_ratio=limits.softened_ratio if softened else np.inf)
+    return replace(model, degree=1, volumetric_ratio=limits.volumetric_ratio if softened else np.inf)
 
 
 def refined_levels(
@@ -342,7 +342,7 @@ def _interpolate_relative(x: PETSc.Vec, known: PETSc.Vec, start: CoarseStart, sy
     values.array[at] = known.array_r[at]
     start.prolongation.mult(values, own)
     fine = _relative_dofs(system)
-    fine = fine[shares.array_r[fine] > system.thresholds.whole_weight]
+    fine = fine[shares.array_r[fine] > 1.0 - system.thresholds.held_weight]
     x.array[fine] = own.array_r[fine]
 
 

@@ -111,7 +111,7 @@ class ProjectedNewton:
         right.array[fixed] = 0.0
         step.set(0.0)
         held.prepare(fixed)
-        self._linear += held.solve(right, step, Goal(rtol=self._thresholds.accurate))[0]
+        self._linear += held.solve(right, step, Goal(rtol=self._thresholds.coarse_tolerance))[0]
         step.array[fixed] = 0.0
         right.destroy()
         return step

@@ -114,7 +114,7 @@ class ConvexProgramme(Method):
 
     def _from_rest(self, models: list[VertexModel], counts: Counts) -> PETSc.Vec | None:
         """The displacement of bodies at rest on their supports; None where there is none."""
-        rtol = min(self.options.thresholds.accurate, self.options.tolerance)
+        rtol = min(self.options.thresholds.coarse_tolerance, self.options.tolerance)
         laws = [term.law for term in self.system.terms]
         rested = at_rest(self.context, laws, lambda _: models, rtol)
         if rested is None:

@@ -29,26 +29,25 @@ class Thresholds:
         nothing: part of a rigid motion, or net force along one beside the sum of all forces, that is rounding.
         rounding_safety: the sample of the rounding error is trusted within this factor.
         largest_rounding: a residual larger than this is no rounding.
-        energy_rounding: change of an energy, relative to it, that is rounding.
-        kink_jump: change of a traction near a kink, relative to the law's scale, that is no kink.
+        energy_rounding: change of an energy, or of a merit function or step of ``condensed``, relative to it, that is
+            rounding.
         loose: relative tolerance of a linear solve whose solution is to tell an active set.
-        accurate: the same of one whose solution is a start.
         margin: part of what is still allowed that one of several steps, or of several errors, may take.
-        coarse_tolerance: tolerance of a solution that is a start: on a coarser level, or while the pieces of the laws
-            still change.
+        coarse_tolerance: tolerance of what is a start only: on a coarser level, while the pieces of the laws still
+            change, of a step's linear solve.
         still: fraction of the residual; a step that changes it by less shows a line search that stalls.
         useless_steps: steps in a row that lower no residual, after which a solve ends; of 67 solves of hard cases that
             converged after more than five steps, two had more.
         few_steps: Newton steps of a start that finds an equilibrium at once or hardly ever.
         search_steps: Newton steps of all starts together, unless the body is held; hard cases took at most 589.
         most_changes: convex steps at most, and changes of the cells between kinks in one of them.
-        runaway: a displacement of so many times p0 L / E0 is a body that slides away.
+        runaway: a displacement of so many times p0 L / E0 is a body that slides away; a slip of so many times that at
+            rest is beyond every kink.
         flat: slope, relative to that at the start of a step, at which a line search ends.
         foundation: stiffness that keeps a matrix regular where laws have none.
         first_ramp: slip up to which the traction of a law of |u_t| grows from zero at first, relative to the largest
             slip: a free vertex may turn its direction there.
         least_slip: the largest slip is taken to be this at least.
-        broken_slip: slip beyond every kink, relative to the slip at rest.
         widest: relative width of the smoothing at which laws that push are nearly straight.
         narrowest: the last width of a continuation to the law itself.
         narrowing: factor from each width to the next, and of the ramp where a vertex becomes free.
@@ -60,7 +59,6 @@ class Thresholds:
         nested_from: unknowns from which a coarser level pays.
         inertia_plane: unknowns in the plane up to which a factorisation of the Hessian takes little of a run; in space
             those up to which no coarser level pays.
-        least_step: relative step at which ``condensed`` stops.
     """
 
     linear: LinearThresholds = field(default_factory=LinearThresholds)
@@ -71,9 +69,7 @@ class Thresholds:
     rounding_safety: float = 4.0
     largest_rounding: float = 1e-4
     energy_rounding: float = 1e-10
-    kink_jump: float = 1e-6
     loose: float = 1e-2
-    accurate: float = 1e-4
     margin: float = 0.5
     coarse_tolerance: float = 1e-4
     still: float = 1e-3
@@ -86,7 +82,6 @@ class Thresholds:
     foundation: float = 1e-8
     first_ramp: float = 1e-2
     least_slip: float = 1e-6
-    broken_slip: float = 1e6
     widest: float = 100.0
     narrowest: float = 1e-3
     narrowing: float = 0.5
@@ -96,7 +91,6 @@ class Thresholds:
     largest_dense: int = 5_000
     nested_from: int = 5_000
     inertia_plane: int = 50_000
-    least_step: float = 1e-14
 
 
 DEFAULT = Thresholds()

@@ -67,8 +67,9 @@ def _growth(law: Superpotential, thresholds: Thresholds) -> Directional:
     """H^∞: the limits of H' on both sides."""
     ends = np.array([-thresholds.infinite_displacement, thresholds.infinite_displacement])
     with np.errstate(over="ignore"):
-        minus, plus = law.convex.right(ends) * np.sign(ends)
-    return Directional(*(float(t) if t < thresholds.unbounded_traction else np.inf for t in (minus, plus)))
+        here, beyond = (law.convex.right(x) * np.sign(ends) for x in (ends, 2.0 * ends))
+    minus, plus = np.where(beyond > here, np.inf, here)
+    return Directional(float(minus), float(plus))
 
 
 def _majorised(part: Resistance, term: LawTerm, growth: Directional, xi: Array) -> Resistance:

@@ -120,7 +120,7 @@ class HeldPreconditioner:
         thresholds = self.settings.thresholds
         self._first_iterations = self._first_iterations or iterations
         self._outdated = failed or iterations > thresholds.slower * self._first_iterations + 5
-        rebuilt = self.settings.kind == "gamg" and self._factorised > thresholds.rebuilt
+        rebuilt = self.settings.kind == "gamg" and self._factorised > thresholds.slow
         if (failed or rebuilt or iterations > thresholds.slow) and self.settings.replaceable:
             self.settings, self._outdated = LinearSettings("lu", thresholds), True
 

@@ -101,7 +101,7 @@ class LinearSettings:
     def iterations(self) -> int:
         """Iterations of the Krylov method at most."""
         if self.kind == "mixed":
-            return self.thresholds.refinements
+            return self.thresholds.replaced_iterations
         return self.thresholds.replaced_iterations if self.replaceable else self.thresholds.krylov_iterations
 
     @property

@@ -137,7 +137,7 @@ class MixedMultigrid:
         thresholds = self._system.thresholds
         rtol = thresholds.mixed_margin * self.accuracy / self._ratio
         self.accuracy = thresholds.mixed_accuracy
-        most = thresholds.mixed_iterations
+        most = thresholds.krylov_iterations
         self._minres.setTolerances(rtol=max(rtol, thresholds.least_mixed_accuracy), atol=0.0, max_it=most)
         self._given.set(0.0)
         self._given.getNestSubVecs()[0].array[:] = x.array_r

@@ -14,21 +14,18 @@ class Thresholds:
         largest_direct: unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md).
         volumetric_ratio: λ/μ where dilatation is averaged, up to which displacements alone are the unknowns of
             geometric multigrid; 50 is that of ν = 0.4902 (docs/degree-2.md).
-        largest_rubber: unknowns of degree 1 up to which a start is solved directly above that ratio, by dimension.
-        softened_ratio: λ/μ of the levels that give a start where there are more.
+        largest_rubber: unknowns of degree 1 up to which a start is solved directly above that ratio, by dimension; where
+            there are more the start is that of a body of the ratio.
         mixed_accuracy: relative residual that a solve for displacements and pressures leaves.
         mixed_margin: factor of that residual, over λ/μ, to which the equations of displacements and pressures are
             solved.
-        mixed_iterations: iterations of that solve at most.
-        refinements: iterations at most of the Krylov method around it.
         least_mixed_accuracy: relative residual of its own equations that rounding allows.
         drift: change of a law's nodal stiffness, relative to an elastic one (about 1), up to which a Krylov method
             keeps its preconditioner.
         changed_held: part of the held unknowns that may change while algebraic multigrid keeps its preconditioner.
-        slow: iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much
-            as with it.
-        rebuilt: times that algebraic multigrid is made before a direct solver takes over where it can: most of its cost
-            is then in its setup (on cells 1000 times as long as high, ten times that of a factorisation).
+        slow: iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much as
+            with it; and times that algebraic multigrid is made: most of its cost is then in its setup (on cells 1000
+            times as long as high, ten times that of a factorisation).
         slower: factor of the first iterations from which a preconditioner is made anew.
         surplus: part of the relative tolerance at which a Krylov method ends though its goal is not reached.
         krylov_iterations: iterations of a Krylov method at most.
@@ -40,29 +37,22 @@ class Thresholds:
         solve_overhead: entries of a dense matrix that a product reads while a sparse solve begins.
         level_growth: factor by which unknowns grow from one level of a multigrid to the next, at least.
         held_weight: weight in the prolongation from which a coarse unknown is held with the fine one: of the unknowns
-            that move a vertex, one in space has 1/4 or more.
-        whole_weight: weights in the prolongation from which a relative displacement has all its coarse vertices on the
-            interface; with one of two missing they are 1/2.
+            that move a vertex, one in space has 1/4 or more; and what may be missing of all weights of a displacement.
         held_stiffness: diagonal of a held unknown, in units of an elastic stiffness (about 1): what the unknown moves
             is less than rounding.
         rounding: of the local components of a unit vector.
         infinite_displacement: a displacement beyond all scales.
-        unbounded_traction: a law's traction there that grows without bound.
     """
 
     largest_direct: Mapping[int, int] = field(default_factory=lambda: {2: 60_000, 3: 15_000})
     volumetric_ratio: float = 50.0
     largest_rubber: Mapping[int, int] = field(default_factory=lambda: {2: 500_000, 3: 15_000})
-    softened_ratio: float = 40.0
     mixed_accuracy: float = 1e-2
     mixed_margin: float = 0.05
-    mixed_iterations: int = 1_000
-    refinements: int = 20
     least_mixed_accuracy: float = 1e-13
     drift: float = 0.3
     changed_held: float = 0.1
     slow: int = 50
-    rebuilt: int = 30
     slower: float = 1.5
     surplus: float = 1e-2
     krylov_iterations: int = 2_000
@@ -74,11 +64,9 @@ class Thresholds:
     solve_overhead: float = 250_000.0
     level_growth: float = 3.0
     held_weight: float = 0.2
-    whole_weight: float = 0.9
     held_stiffness: float = 1e20
     rounding: float = 1e-12
     infinite_displacement: float = 1e100
-    unbounded_traction: float = 1e30
 
 
 DEFAULT = Thresholds()
