@@ -14,8 +14,8 @@ class Thresholds:
         largest_direct: unknowns up to which a direct solve is the faster one, by dimension (docs/benchmarks.md).
         volumetric_ratio: λ/μ where dilatation is averaged, up to which displacements alone are the unknowns of
             geometric multigrid; 50 is that of ν = 0.4902 (docs/degree-2.md).
-        largest_rubber: unknowns of degree 1 up to which a start is solved directly above that ratio, by dimension; where
-            there are more the start is that of a body of the ratio.
+        largest_rubber: unknowns of degree 1 up to which a start is solved directly above that ratio, by dimension;
+            where there are more the start is that of a body of the ratio.
         mixed_accuracy: relative residual that a solve for displacements and pressures leaves.
         mixed_margin: factor of that residual, over λ/μ, to which the equations of displacements and pressures are
             solved.
