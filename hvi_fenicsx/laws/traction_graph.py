@@ -127,15 +127,6 @@ class TractionGraph:
         forward = factors[:, None] > 0.0
         return _joined(_chosen(forward, against, along), _chosen(forward, along, against))
 
-    def times(self, weights: Array) -> TractionGraph:
-        """The tractions of a table with a row a vertex, multiplied.
-
-        Args:
-            weights: positive, (m,).
-        """
-        w = weights[:, None]
-        return TractionGraph(self.breaks, self.left * w, self.right * w, self.slopes * w)
-
     def remembering(self, memory: Array) -> TractionGraph:
         """A row a vertex, of bonds that have been so far: secants up to there, the graph beyond.
 
@@ -162,25 +153,6 @@ class TractionGraph:
         rest = np.where(places[:, 1:] > end[:, None], places[:, 1:], np.inf), near[:, 1:], far[:, 1:], after[:, 1:]
         columns = zip(first, (at_end, traction, *there), rest, strict=True)
         return _HalfLine(*(np.column_stack(column) for column in columns)).ordered()
-
-    def plus(self, other: TractionGraph) -> TractionGraph:
-        """The sum of two tables, row by row.
-
-        Args:
-            other: the other one, of the same rows.
-        """
-        return _joined(self.turned()._sum(other.turned()), self._sum(other))
-
-    def _sum(self, other: TractionGraph) -> _HalfLine:
-        places = np.sort(np.concatenate([self._ahead.places, other._ahead.places[:, 1:]], axis=1), axis=1)
-        places[:, 1:][places[:, 1:] == places[:, :-1]] = np.inf
-        columns = np.where(np.isfinite(places), places, 0.0).T
-        both = (self, other)
-        near, far, after = (
-            np.column_stack([sum(part(graph, x) for graph in both) for x in columns])
-            for part in (_left_limit, _right_limit, TractionGraph._after)
-        )
-        return _HalfLine(places, near, far, after).ordered()
 
     def row(self, i: int) -> TractionGraph:
         """The graph of one vertex.
@@ -369,14 +341,6 @@ def _taken(table: Array, columns: Integers) -> Array:
     if table.ndim == 1:
         return table[columns]
     return np.take_along_axis(table, columns[:, None], axis=1)[:, 0]
-
-
-def _left_limit(graph: TractionGraph, x: Array) -> Array:
-    return graph.traction(x, "left")
-
-
-def _right_limit(graph: TractionGraph, x: Array) -> Array:
-    return graph.traction(x, "right")
 
 
 def _outward(breaks: Array, slopes: Array, jumps: Array, start: float) -> _HalfLine:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..typing import Array, Mask
+from ..typing import Array
 from .base import Superpotential
 from .traction_graph import TractionGraph
 
@@ -63,30 +63,6 @@ class VertexLaws:
         low, high = self.memory[:, 0], self.memory[:, 1]
         inside = (x > low) & (x <= high) if side == "left" else (x >= low) & (x < high)
         return np.where(inside, self._secants(x) * x, found)
-
-    def interval(self, x: Array, near: float | Array = 0.0) -> tuple[Array, Array]:
-        """The tractions that the law allows: Clarke's subdifferential along the coordinate.
-
-        Args:
-            x: coordinates.
-            near: displacements up to this from a kink are on it, one or (m,).
-        """
-        size = np.abs(self.factors)
-        low, high = self.law.interval(self.factors * x, near * size)
-        ends = self.factors * low, self.factors * high
-        found = np.minimum(*ends), np.maximum(*ends)
-        if self.memory is None:
-            return found
-        x = self._on_ends(x, near)
-        low, high = self._memory[:, 0], self._memory[:, 1]
-        been = (low <= x) & (x <= high) & (low < high)
-        ends = self.traction(x, "left"), self.traction(x, "right")
-        return np.where(been, np.minimum(*ends), found[0]), np.where(been, np.maximum(*ends), found[1])
-
-    def slope(self, x: Array) -> Array:
-        """The slope of the traction off the kinks, the larger one at a break."""
-        found = self.factors**2 * self.law.derivatives(self.factors * x)[1]
-        return found if self.memory is None else np.where(self._inside(x), self._secants(x), found)
 
     def recoverable(self, x: Array, traction: Array) -> Array:
         """What the vertices give back on the way to zero: w j, or the triangle under the secant with memory.
@@ -147,17 +123,6 @@ class VertexLaws:
         low, high, low_traction, high_traction = self._memory.T
         end, there = np.where(x < 0.0, low, high), np.where(x < 0.0, low_traction, high_traction)
         return np.divide(there, end, out=np.zeros_like(x), where=end != 0.0)
-
-    def _inside(self, x: Array) -> Mask:
-        """Whether bonds are where they have been, and at no end of that."""
-        low, high = self._memory[:, 0], self._memory[:, 1]
-        return np.asarray((x > low) & (x < high))
-
-    def _on_ends(self, x: Array, near: float | Array) -> Array:
-        """Coordinates; where they are but for rounding as far as the bonds have been, that."""
-        for end in (self._memory[:, 0], self._memory[:, 1]):
-            x = np.where((end != 0.0) & (np.abs(x - end) <= near), end, x)
-        return x
 
     def _reached(self, x: Array, traction: Array) -> Array:
         """The memory once the vertices have been at x: both sides of an even law remember the same."""
