@@ -20,16 +20,16 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LIMITS = {
-    "lines of code": 43900,
-    "tokens": 515000,
-    "files": 560,
-    "lines of the largest room": 5570,
+    "lines of code": 41000,
+    "tokens": 476000,
+    "files": 465,
+    "lines of the largest room": 4250,
     "flat modules": 12,
-    "tuning numbers": 660,
-    "class names used twice": 43,
-    "lines of the longest function": 50,
-    "floors": 17,
-    "lines of tests": 30600,
+    "tuning numbers": 450,
+    "class names used twice": 38,
+    "lines of the longest function": 46,
+    "floors": 16,
+    "lines of tests": 28800,
     "lines of benchmarks": 2600,
 }
 """They go down with the house, never up without a reason that is written beside."""

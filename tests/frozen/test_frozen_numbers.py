@@ -13,6 +13,8 @@ FAST = {
     "paths": ("drop, 4 vertices", "block up to slide", "two arms, pulled apart"),
 }
 """A few seconds in all."""
+WHOLE = ("curved", "ranks")
+"""Sets of which all cases are in the long tier; of others those that are quick."""
 LEFT_TO_OTHERS = ("verification",)
 """Sets that have a test of their own, against what others found."""
 
@@ -25,7 +27,11 @@ def chosen() -> list[object]:
         for case in members:
             if case.name in FAST.get(group, ()):
                 found.append(pytest.param(case, id=f"{group}: {case.name}"))
-            elif group not in LEFT_TO_OTHERS and known.get(case.name, {}).get("seconds", QUICK) < QUICK:
+            elif (
+                case.name in known
+                and group not in LEFT_TO_OTHERS
+                and (group in WHOLE or known[case.name]["seconds"] < QUICK)
+            ):
                 found.append(pytest.param(case, id=f"{group}: {case.name}", marks=pytest.mark.long))
     return found
 
