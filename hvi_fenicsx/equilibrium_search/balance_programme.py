@@ -195,7 +195,7 @@ class BalanceTest:
             cut: whether to be content with less of a proof, asked at each step of the programme.
         """
         ends = cell.low, cell.high
-        split = Split.of(self._problem, self._relaxation.curvature(cell, self._thresholds.part))
+        split = Split.of(self._problem, self._relaxation.curvature(cell, self._problem.thresholds.lowest.parts[0]))
         if not np.isfinite(split.short):
             return Look(cell=cell, guide=None)
         best, guide = self._best(split, ends, cut)
@@ -224,7 +224,7 @@ class BalanceTest:
                 best = proof
             value = programme.value(here)
             near = value < 0.0 and here.residual < limits.settled and value - proof.total < limits.near * -value
-            still = step > limits.late and abs(proof.total - before) < limits.still * abs(before)
+            still = step > limits.first and abs(proof.total - before) < limits.still * abs(before)
             if proof.excludes or near or still:
                 break
             before = proof.total

@@ -162,7 +162,7 @@ class Equilibria:
         start = begun(coarse, limits.coarse_gap, stop, report)
         if start is None:
             return wanted
-        for _ in range(limits.most_searches):
+        for _ in range(self._thresholds.cells.most_rounds):
             if stop():
                 break
             size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
@@ -180,7 +180,7 @@ class Equilibria:
 
     def _check_same(self, x: Array) -> None:
         """Refuse points that differ from rank to rank. Collective."""
-        comm, allowed = self._prepared.system.comm, self._thresholds.same_on_ranks * np.max(np.abs(x), initial=0.0)
+        comm, allowed = self._prepared.system.comm, self._thresholds.points.accuracy * np.max(np.abs(x), initial=0.0)
         same = np.max(np.abs(comm.bcast(x) - x), initial=0.0) <= allowed
         if not all(agree(comm, bool(same))):
             raise SolverError("the ranks found different equilibria; run on one")

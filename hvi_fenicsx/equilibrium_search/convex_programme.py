@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..typing import Array, Integers
-from .arcs import ArcTable
+from .arcs import ROUNDING, ArcTable
 from .thresholds import DEFAULT, ProgrammeThresholds
 
 
@@ -123,7 +123,7 @@ class _Programme:
     def proximal(self, found: _Iterate) -> _Iterate:
         """The same with a proximal term, which shrinks where the states settle."""
         best, least, weight = found, self._objective(found.x), 1.0
-        for _ in range(self._thresholds.most_proximal):
+        for _ in range(self._thresholds.most_steps):
             added = weight * self._scale
             matrix, force = self._a + np.diag(added), self._b + added * best.x
             near = _Programme(matrix, force, self._chains, self._thresholds, self._cut)
@@ -148,7 +148,7 @@ class _Programme:
 
     def _stationary(self, x: Array) -> bool:
         largest = float(np.max(np.abs(self._b), initial=1e-300))
-        return bool(np.max(np.abs(self._residual(x)), initial=0.0) <= self._thresholds.rounding * largest)
+        return bool(np.max(np.abs(self._residual(x)), initial=0.0) <= ROUNDING * largest)
 
     def bounded(self, found: _Iterate) -> Optimum:
         """The point with a bound that allows for its residual r and for rounding.

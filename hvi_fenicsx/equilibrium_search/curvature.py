@@ -26,7 +26,7 @@ def kernel(problem: ScalarProblem) -> Array:
         problem: the problem with S.
     """
     values, vectors = eigh(problem.stiffness)
-    return np.asarray(vectors[:, values <= problem.thresholds.bounds.zero * max(float(values[-1]), 0.0)])
+    return np.asarray(vectors[:, values <= problem.thresholds.points.zero * max(float(values[-1]), 0.0)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +143,7 @@ class CurvatureShare:
         """D, (n + m,): in proportion to the weights, but no more than is needed."""
         added = np.zeros(len(weights))
         left = undecided[~self._moved(free)[undecided]]
-        for _ in range(self._problem.thresholds.bounds.most_rounds):
+        for _ in range(self._problem.thresholds.cells.most_rounds):
             if not left.size:
                 break
             inverse = self._inverse(matrix - np.diag(self._problem.diagonal(added)), free)
@@ -209,5 +209,5 @@ class CurvatureShare:
         if not rigid.shape[1]:
             return rigid
         values, vectors = np.linalg.eigh(rigid.T @ along @ rigid)
-        zero = self._problem.thresholds.bounds.zero
+        zero = self._problem.thresholds.points.zero
         return np.asarray(rigid @ vectors[:, values <= zero * self._scale])

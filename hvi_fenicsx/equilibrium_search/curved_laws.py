@@ -35,7 +35,7 @@ class CurvedLaws:
         """
         near, start, best, limits = self.near, x, None, self.near.thresholds.points
         size = float(np.max(np.abs(near.force), initial=0.0)) or 1.0
-        for _ in range(limits.newton_steps):
+        for _ in range(near.thresholds.programmes.most_steps):
             force, allowed = near.force - near.stiffness @ x, self.subdifferential(x)
             rest = force - np.clip(force, allowed.low, allowed.high)
             missing = float(np.max(np.abs(rest), initial=0.0))
@@ -88,7 +88,7 @@ class CurvedLaws:
         try:
             step[free] = np.linalg.solve(matrix, rest[free])
         except np.linalg.LinAlgError:
-            step[free] = np.linalg.lstsq(matrix, rest[free], rcond=self.near.thresholds.points.singular)[0]
+            step[free] = np.linalg.lstsq(matrix, rest[free], rcond=None)[0]
         return step
 
     def subdifferential(self, x: Array) -> Subdifferential:

@@ -117,7 +117,7 @@ class DeflatedNewton:
         limits = problem.thresholds.systematic
         away = np.array([self._parameters(x) for x in known]).reshape(-1, problem.size)
         s = s + size * np.random.default_rng(attempt).uniform(-1.0, 1.0, problem.size)
-        for _ in range(limits.newton_steps):
+        for _ in range(problem.thresholds.programmes.most_steps):
             x, t, dx, dt = self._graphs.at(s)
             rest = problem.stiffness @ x + t - problem.force
             if np.max(np.abs(rest)) <= limits.accuracy * self._size:

@@ -60,7 +60,7 @@ class ElasticRadius:
         difference = _Difference(self._problem, cell, forces)
         low, high = product(self._motions, *(end[self._pivots] - y[self._pivots] for end in (cell.low, cell.high)))
         low, high = cell.low - y - high, cell.high - y - low
-        for _ in range(limits.radius_passes):
+        for _ in range(limits.force_passes):
             low = np.where(self._alone, np.maximum(low, first - own), low)
             high = np.where(self._alone, np.minimum(high, last - own), high)
             energy = difference.energy(low, high, self._moved)

@@ -63,7 +63,7 @@ class LengthNewton:
         """
         x = self._programme.admissible(start)
         value = self._programme.value(x)
-        for _ in range(self._limits.newton_steps):
+        for _ in range(self._limits.most_steps):
             found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
             if found is None:
                 break

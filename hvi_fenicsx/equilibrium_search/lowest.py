@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import SolverError
 from ..typing import Array
 from . import motions
-from .arcs import on_interval
+from .arcs import ROUNDING, on_interval
 from .boxes import Box, clipped, fresh_box
 from .convex_programme import never
 from .curvature import Curvature
@@ -193,7 +193,7 @@ class LowestSearch:
 
     @property
     def _allowed(self) -> float:
-        return max(self._thresholds.share_used * self.gap * self._size, self._thresholds.rounding * self._parts)
+        return max(self._thresholds.share_used * self.gap * self._size, ROUNDING * self._parts)
 
     @property
     def _parts(self) -> float:
@@ -232,7 +232,7 @@ class LowestSearch:
         heapq.heappush(self.waiting, (found.bound, next(self._numbers), found))
 
     def _bounded(self, box: Box) -> Box | None:
-        for round_ in range(self._thresholds.most_rounds):
+        for round_ in range(self.problem.thresholds.cells.most_rounds):
             before = box.bound
             for part in self._thresholds.parts:
                 if self.cut():
@@ -275,7 +275,7 @@ class LowestSearch:
 
     def _radius(self, box: Box) -> float:
         """How far lower points are from the relaxation's minimiser, in the norm of its matrix."""
-        return math.sqrt(2.0 * max(self.upper - box.value, 0.0)) * (1.0 + self._thresholds.widened)
+        return math.sqrt(2.0 * max(self.upper - box.value, 0.0)) * (1.0 + self.problem.thresholds.cells.widened_radius)
 
     def _closed(self, box: Box) -> bool:
         return box.bound >= self.upper - self._allowed

@@ -27,7 +27,7 @@ def shapes(problem: ScalarProblem, kernel: Array) -> Array:
     with_law = np.array([c != FREE for c in problem.chains[: problem.size]], dtype=np.bool_)
     with_law[problem.lengths.members] = True
     columns, sizes, _ = np.linalg.svd(np.where(with_law[:, None], kernel, 0.0), full_matrices=False)
-    return np.asarray(columns[:, sizes > problem.thresholds.bounds.moved])
+    return np.asarray(columns[:, sizes > problem.thresholds.points.accuracy])
 
 
 def span(moved: Array, low: Array, high: Array, widened: float) -> tuple[Array, Array]:

@@ -86,7 +86,7 @@ class Relaxation:
             high: of the box, (n + m,).
         """
         n = self.problem.size
-        return motions.span(self._share.shapes, low[:n], high[:n], self._thresholds.widened)
+        return motions.span(self._share.shapes, low[:n], high[:n], self.problem.thresholds.cells.widened)
 
     @cached_property
     def joints(self) -> Array:

@@ -235,7 +235,7 @@ def _own_gap(problem: ScalarProblem, wanted: Wanted) -> float:
     if not problem.error or wanted.start is None:
         return wanted.gap
     size, limits = abs(wanted.start.energy) or 1.0, problem.thresholds.lowest
-    return max(wanted.gap - limits.sides * problem.error / size, limits.own_gap * wanted.gap)
+    return max(wanted.gap - limits.sides * problem.error / size, limits.error_share * wanted.gap)
 
 
 def _begin(search: LowestSearch, known: Start | None) -> None:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ..typing import Array
+from .arcs import ROUNDING
 from .convex_programme import minimise, never
 from .deflation import DeflatedNewton
 from .length_newton import LengthNewton
@@ -176,13 +177,13 @@ def descend(
         cut: whether to end where it is, since the search stops.
     """
     energy, limits = problem.energy(x), problem.thresholds.descent
-    for _ in range(limits.most_steps):
+    for _ in range(problem.thresholds.programmes.most_steps):
         if cut():
             break
         found = _minimiser(problem, low, high, x, cut)
         after = problem.energy(found)
         fall, size = energy - after, problem.energy_size(x)
-        if not fall > limits.rounding * size:
+        if not fall > ROUNDING * size:
             break
         x, energy = found, after
         if energy - goal > limits.reach * fall or (len(problem.lengths) and fall <= limits.slow * size):

@@ -39,10 +39,8 @@ class ProgrammeThresholds:
     """How convex programmes are solved.
 
     Attributes:
-        most_steps: state changes before a proximal term is added.
-        most_proximal: proximal steps before the programme is given up; the bound holds for any point.
-        rounding: a residual of this size, relative to the forces, is rounding.
-        newton_steps: Newton steps with laws of lengths; the bound holds for any point.
+        most_steps: of each iteration: state changes before a proximal term is added, proximal steps, steps of Newton's
+            method and of a descent; bounds hold for any point.
         step_shares: shares of such a step that are tried.
         short: a step whose displacements and forces are below this share of all changes the energy by its square: the
             last.
@@ -53,9 +51,6 @@ class ProgrammeThresholds:
     """
 
     most_steps: int = 40
-    most_proximal: int = 60
-    rounding: float = 1e-13
-    newton_steps: int = 60
     step_shares: Sequence[float] = tuple(0.5**k for k in range(16))
     short: float = 1e-8
     settled: float = 1e-15
@@ -72,23 +67,19 @@ class PointThresholds:
             largest.
         zero: eigenvalues below this share of the largest are zero.
         same: points nearer than this share of the displacements are one.
-        newton_steps: Newton steps of one point of curved laws.
         faster: Newton's method goes on in a balance that is good enough while each step leaves less than this share of
             the rest; at a fold, where two points are one, a step leaves a quarter, where three are one 0.3, and never
             more than 1/e.
         longest: way from the polylines' point, relative to its displacements, beyond which a point is another one.
         roundings: rounding errors of forces, in machine epsilons for each unknown and each part of their sizes.
-        singular: singular values below this share of the largest are zero where a matrix cannot be factorised.
     """
 
     accuracy: float = 1e-9
     zero: float = 1e-10
     same: float = 1e-7
-    newton_steps: int = 30
     faster: float = 0.5
     longest: float = 0.1
     roundings: float = 64.0
-    singular: float = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,16 +87,12 @@ class DescentThresholds:
     """How the energy is lowered.
 
     Attributes:
-        most_steps: convex programmes of one descent.
         reach: falls as large as the last one with which an energy is reached at most.
         slow: where laws act on lengths, a fall of the energy below this share of its parts is the last.
-        rounding: a fall of the energy below this share of its parts is none.
     """
 
-    most_steps: int = 60
     reach: float = 10.0
     slow: float = 1e-12
-    rounding: float = 1e-13
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +110,6 @@ class SystematicThresholds:
         same: where points are not exact, or were made so, those nearer than this share of the displacements are one.
         vectors: up to so many a proof that no point is missed may come to its end soon.
         most_vain: attempts in a row to find a new point, where a proof goes on after them.
-        newton_steps: Newton steps of one attempt.
         accuracy: residual of a root, relative to the largest force.
         longest: how much longer or shorter a step becomes by deflation at most.
         least_weight: weight of a displacement that meets no stiffness, over the largest; so a flat piece of its law has
@@ -140,7 +126,6 @@ class SystematicThresholds:
     same: float = 1e-4
     vectors: int = 8
     most_vain: int = 100
-    newton_steps: int = 40
     accuracy: float = 1e-11
     longest: float = 10.0
     least_weight: float = 1e-12
@@ -151,15 +136,11 @@ class BoundThresholds:
     """How the energy is bounded from below on a box.
 
     Attributes:
-        zero: eigenvalues of S below this share of the largest one are zero.
-        most_rounds: how often what some unknowns do not need of the curvature is given to the others.
         spared: share of the curvature along rigid motions that S - D does not need, which is not lent.
         most_motions: rigid motions of unknowns with laws along which curvature is lent; the parts of several multiply.
         most_parts: parts of the interval of a rigid motion's share that are worth the curvature along it.
         tight: an envelope below its law by less than this share of the energy's parts is tight.
         least_weight: share of the weights of D that does not follow from where envelopes were not tight.
-        moved: a motion whose part on the unknowns with laws is smaller than this moves none of them.
-        widened: relative widening of the intervals of motions' shares, for rounding.
         growth: behind the laws' joints, parts of the interval of a share end this many times farther away than they
             begin.
         middle: where the interval of a share is divided else, between its ends.
@@ -167,15 +148,11 @@ class BoundThresholds:
         slack: energy, relative to its parts, that is added to the level for what the relaxation's residual could hide.
     """
 
-    zero: float = 1e-10
-    most_rounds: int = 4
     spared: float = 0.98
     most_motions: int = 1
     most_parts: int = 64
     tight: float = 1e-14
     least_weight: float = 0.1
-    moved: float = 1e-9
-    widened: float = 1e-12
     growth: float = 8.0
     middle: tuple[float, float] = (0.2, 0.8)
     most_forces: int = 24
@@ -189,41 +166,31 @@ class LowestThresholds:
     Attributes:
         parts: shares of the largest curvature, in turn: the first leaves convexity to tighten with, the last bounds
             best.
-        most_rounds: how often a box is tightened and bounded before it is divided.
         worthwhile: a round that closes less than this share of a box's gap is the last.
         most_skipped: boxes from which no descent is made, between two from which one is.
         lost: share of a box's gap that the chords of rigid motions may take off.
-        widened: relative widening of radii, for rounding.
         share_used: share of the allowed gap that a search uses: so that rounding lifts no told gap above it.
-        rounding: energies that differ by less than this share of their parts are equal.
         one_point: energies that differ by less than this share of their parts are those of one point.
         most_boxes: boxes that are bounded for the gap where what was asked for is not proven.
         sides: how often the gap counts the difference of energies of laws and their polylines: on both sides, and some
             more.
-        own_gap: the least share of the gap that a search may leave where laws are curved.
         coarse_gap: gap of the first search where laws are curved, from which the error of their polylines is chosen.
         error_share: share of the gap that this error is aimed at,
         most_share: and that it may take, on each side.
-        most_searches: first searches, each in the region that the one before has left.
         shorter: the next one is made while some side of the region shrinks to this share.
     """
 
     parts: Sequence[float] = (0.9, 0.999)
-    most_rounds: int = 6
     worthwhile: float = 0.15
     most_skipped: int = 10
     lost: float = 0.25
-    widened: float = 1e-9
     share_used: float = 0.999
-    rounding: float = 1e-13
     one_point: float = 1e-11
     most_boxes: int = 50
     sides: float = 2.1
-    own_gap: float = 0.05
     coarse_gap: float = 1e-3
     error_share: float = 0.05
     most_share: float = 0.4
-    most_searches: int = 6
     shorter: float = 0.5
 
 
@@ -247,7 +214,6 @@ class CellThresholds:
         rigid: eigenvalues of S below this share of the largest are those of rigid motions.
         same_share: shares of a rigid motion that are this near to 0, 1 or -1 are these numbers.
         widened_radius: relative widening of the radius, for rounding and for the residual of y.
-        radius_passes: passes over what elastic parts differ by from those of a point.
         wide: intervals of pivots that are wider than this many times the largest joint are divided in growing parts,
         ratio: if their ends differ by this factor at least.
         off_end: a place between joints is at least this share of the interval from its ends.
@@ -270,7 +236,6 @@ class CellThresholds:
     rigid: float = 1e-11
     same_share: float = 1e-9
     widened_radius: float = 1e-9
-    radius_passes: int = 8
     wide: float = 30.0
     ratio: float = 100.0
     off_end: float = 0.2
@@ -284,12 +249,10 @@ class BalanceThresholds:
     """How the weights of a cell's balance are looked for.
 
     Attributes:
-        part: share of the largest curvature.
         first: steps of the programme before its weights are tried,
         every: and between two trials.
         near: the proof is as good as it can be if it is this near to the programme's value.
         still: it is so, too, if it changes by less than this share, late.
-        late: steps after which this counts.
         settled: residual at which the programme's value counts.
         roundings: rounding errors of a sum, in machine epsilons for each unknown and each part of its size.
         most_arcs: arcs of one law of which points are taken; of more, every second, or third, ...
@@ -306,12 +269,10 @@ class BalanceThresholds:
         largest: changes that are larger are rounding.
     """
 
-    part: float = 0.9
     first: int = 11
     every: int = 3
     near: float = 0.1
     still: float = 1e-3
-    late: int = 12
     settled: float = 1e-4
     roundings: float = 4.0
     most_arcs: int = 12
@@ -342,7 +303,6 @@ class Thresholds:
         balance: of its test by a weighed balance.
         bounds: of the energy on boxes.
         lowest: of the search for the lowest energy.
-        same_on_ranks: points of two ranks nearer than this share of the displacements are one.
     """
 
     polylines: PolylineThresholds = field(default_factory=PolylineThresholds)
@@ -354,7 +314,6 @@ class Thresholds:
     balance: BalanceThresholds = field(default_factory=BalanceThresholds)
     bounds: BoundThresholds = field(default_factory=BoundThresholds)
     lowest: LowestThresholds = field(default_factory=LowestThresholds)
-    same_on_ranks: float = 1e-9
 
 
 DEFAULT = Thresholds()
