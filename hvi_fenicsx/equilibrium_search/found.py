@@ -28,14 +28,12 @@ class Start:
         energy: there.
         low: of a box that holds all points of lower energy, (n + m,).
         high: of that box, (n + m,).
-        bound: no point has a lower energy of the laws themselves.
     """
 
     x: Array
     energy: float
     low: Array
     high: Array
-    bound: float
 
     @property
     def reach(self) -> Array:

@@ -82,43 +82,27 @@ class LowestSearch:
         self._forces = ForceIntervals(self.problem)
         self._in_vain = self._next_descent = 0
 
-    def start(self, points: Iterable[Array] = ()) -> None:
-        """Bound the whole problem.
+    def start(self, points: Iterable[Array] = (), region: tuple[Array, Array] | None = None) -> None:
+        """Bound the whole problem, or a box of it.
 
         Args:
             points: known points of low energy, each (n,).
+            region: the ends of a box that is known to hold all lower points, (n + m,) each; None: none is known.
 
         Raises:
             SolverError: the energy is not bounded from below, or this cannot be shown.
             Cut: the search stops before this is known.
         """
-        problem = self.problem
-        far = problem.far
-        low, high = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
-        self._low, self._high = low, high
+        problem, far = self.problem, self.problem.far
+        whole = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
+        self._low, self._high = whole if region is None else region
         self.x = self._inside(np.zeros(problem.size))
         for x in (self.x, *points):
             self._try(self._inside(x))
         first, curvature = self._first_relaxation()
-        if self._far(first.x):
+        if region is None and self._far(first.x):
             raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
         self._enter_level_set(first, curvature)
-
-    def start_within(self, low: Array, high: Array, point: Array) -> None:
-        """Bound the problem in a box that is known to hold all lower points.
-
-        Args:
-            low: of the box, (n + m,).
-            high: of the box, (n + m,).
-            point: of low energy, (n,).
-
-        Raises:
-            SolverError: no smaller box was found.
-            Cut: the search stops before one is found.
-        """
-        self._low, self._high = low, high
-        self._try(self._inside(point))
-        self._enter_level_set(*self._first_relaxation())
 
     def _first_relaxation(self) -> tuple[Box, Curvature]:
         """The relaxation on the region."""

@@ -114,7 +114,7 @@ def _all(task: Task) -> Found:
     few = False  # a few cells often are all
     if task.saved is None:
         search.start()
-        few = search.run(lambda: search.cells >= task.first_cells or task.stop(), tell)
+        few = search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell)
     below = None if few else bounded(task, [p.x for p in search.points])
     if below is not None:
         search.enter(below.x)
@@ -206,7 +206,7 @@ def lowest(task: Task) -> Found:
     search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted), cut=task.stop)
     try:
         if saved is None:
-            _begin(search, task.wanted.start)
+            _start(search, task.wanted.start)
         else:
             boxes = (saved[name] for name in ("low", "high", "weights", "bound"))
             search.resume(zip(*boxes, strict=True), saved["x"][0])
@@ -238,13 +238,6 @@ def _own_gap(problem: ScalarProblem, wanted: Wanted) -> float:
     return max(wanted.gap - limits.sides * problem.error / size, limits.error_share * wanted.gap)
 
 
-def _begin(search: LowestSearch, known: Start | None) -> None:
-    if known is None:
-        search.start()
-    else:
-        search.resume([(known.low, known.high, np.zeros(len(search.problem.chains)), known.bound)], known.x)
-
-
 def begun(
     problem: ScalarProblem,
     gap: float,
@@ -263,12 +256,20 @@ def begun(
     """
     search = LowestSearch(problem=problem, gap=gap, cut=stop)
     try:
-        search.start() if known is None else search.start_within(known.low, known.high, known.x)
+        _start(search, known)
     except (SolverError, Cut):
         return None
     search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {counted(now.boxes, 'box', 'boxes')}"))
     low, high = search.region
-    return Start(x=search.x, energy=search.upper, low=low, high=high, bound=search.progress().lower - problem.error)
+    return Start(x=search.x, energy=search.upper, low=low, high=high)
+
+
+def _start(search: LowestSearch, known: Start | None) -> None:
+    """Bound the whole problem, or what an earlier search has left of it."""
+    if known is None:
+        search.start()
+    else:
+        search.start([known.x], (known.low, known.high))
 
 
 def _proof(search: LowestSearch, wanted: Wanted) -> Found:
@@ -346,9 +347,3 @@ class Task:
     def most_boxes(self) -> int:
         """Boxes that are bounded for the gap where what was asked for is not proven."""
         return self.problem.thresholds.lowest.most_boxes
-
-    @property
-    def first_cells(self) -> int:
-        """Cells for all points that are looked at first: of many vectors each takes long and tells little."""
-        few = self.problem.thresholds.systematic.vectors
-        return max(self.most_boxes * few // max(len(self.problem.lengths), few), 1)

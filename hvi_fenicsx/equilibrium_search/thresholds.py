@@ -108,7 +108,6 @@ class SystematicThresholds:
         most_points: points from which further ones are looked for, one after the other.
         failures: attempts without a new point after which a start is given up.
         same: where points are not exact, or were made so, those nearer than this share of the displacements are one.
-        vectors: up to so many a proof that no point is missed may come to its end soon.
         most_vain: attempts in a row to find a new point, where a proof goes on after them.
         accuracy: residual of a root, relative to the largest force.
         longest: how much longer or shorter a step becomes by deflation at most.
@@ -124,7 +123,6 @@ class SystematicThresholds:
     most_points: int = 100
     failures: int = 3
     same: float = 1e-4
-    vectors: int = 8
     most_vain: int = 100
     accuracy: float = 1e-11
     longest: float = 10.0
