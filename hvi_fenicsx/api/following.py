@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..load_paths.following import Control, PathRun
 from ..model import Model, PathTable, SolverTable
 from ..paths.load_path import LoadPath
-from ..report.path_reader import PathResult
+from ..report.searches import PathResult
 from ..results import ResultFolder, path_files
 from ..results.output_folder import existing
 from ..runtime import log
@@ -108,7 +108,7 @@ class ModelPath(LoadPath):
 
     def plot(self) -> Figure | None:
         """Force over displacement of the driven part, as a matplotlib figure; None where no part is driven."""
-        from ..report.pictures import path_picture
+        from ..report.pictures import path as path_picture
 
         shown = self._as_read()
         return None if shown.driven is None else path_picture.make(shown)

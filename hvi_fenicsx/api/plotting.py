@@ -8,7 +8,7 @@ from types import MethodType
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from ..report.pictures.xserver import XServer
+from ..report.pictures.xserver import x_server
 from ..report.reader import Result
 from ..results import gathering
 from ..runtime.mpi import on_root
@@ -40,13 +40,12 @@ def draw(solution: Solution, picture: str) -> Figure | None:
 
 def _figure(result: Result, wanted: str) -> Figure:
     """Draw on rank 0."""
-    with XServer(wanted=result.body.dimension == 3) as server:
-        from ..report.pictures.drawings import drawings  # loads the plotting library while the server starts
+    from ..report.pictures.registry import drawings
 
-        server.wait()
-        known = {drawing.path.stem: drawing for drawing in drawings(result)}
-        if wanted not in known:
-            raise InputError(f"plot: there is no picture {wanted!r} of this solution; there are: {', '.join(known)}")
+    known = {drawing.path.stem: drawing for drawing in drawings(result)}
+    if wanted not in known:
+        raise InputError(f"plot: there is no picture {wanted!r} of this solution; there are: {', '.join(known)}")
+    with x_server(wanted=known[wanted].rendered):
         figure = known[wanted].make()
     # A figure that pyplot did not make has no other way to show itself in a notebook.
     figure._repr_png_ = MethodType(_png, figure)  # type: ignore[attr-defined]

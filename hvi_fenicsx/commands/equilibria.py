@@ -12,8 +12,8 @@ from .. import console, results
 from ..equilibrium_search.bodies import Equilibria
 from ..equilibrium_search.found import Clock, Found, Saved, certified_in_words, counted
 from ..errors import ExitCode, NotWrittenError
-from ..report.html import equilibria_page
-from ..report.pictures import equilibria as picture
+from ..report import page
+from ..report.pictures.draw import draw as draw_pictures
 from ..results.whole import made, picture_process, write_whole
 from ..runtime import journal
 from ..runtime.mpi import on_root, time_over
@@ -132,8 +132,8 @@ def _reporter() -> Callable[[str], None]:
 def _picture_and_page(folder: Path, *, draw: bool) -> None:
     """From the other files; that one cannot be made costs a line. Rank 0 only."""
     if draw:
-        made("picture", LOG.info, lambda: picture.draw(folder))
-    made("report", LOG.info, lambda: equilibria_page.write(folder))
+        made("picture", LOG.info, lambda: draw_pictures(folder))
+    made("report", LOG.info, lambda: page.write_equilibria(folder))
 
 
 def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> ExitCode:

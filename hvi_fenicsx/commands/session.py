@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from .. import console, results
 from ..model import Model, dump_scene, read_scene
-from ..report.html.render import NAME as PAGE
+from ..report.page import NAME as PAGE
 from ..results.folder import inputs_of, read_finished
 from ..results.output_folder import existing
 from ..runtime import log, terminal

@@ -48,11 +48,7 @@ class BodyMesh:
     @cached_property
     def volumes(self) -> Array:
         """Area (m²) or volume (m³) of each cell, (c,)."""
-        return np.abs(self._signed)
-
-    @cached_property
-    def _signed(self) -> Array:
-        return self.signed_volumes(self.points)
+        return np.abs(self._signed_volumes(self.points))
 
     def kept(self, points: Array) -> Array:
         """The part of its area or volume that each piece keeps where its vertices are elsewhere.
@@ -60,40 +56,36 @@ class BodyMesh:
         Args:
             points: where they are, m, (n, 3).
         """
-        moved = np.sign(self._signed) * self.signed_volumes(points)
+        moved = np.sign(self._signed_volumes(self.points)) * self._signed_volumes(points)
         return np.asarray(np.bincount(self.pieces, moved) / np.bincount(self.pieces, self.volumes))
 
-    def signed_volumes(self, points: Array) -> Array:
-        """Area (m²) or volume (m³) of each cell, (c,); it changes its sign where a cell is turned inside out.
-
-        Args:
-            points: where the vertices are, m, (n, 3).
-        """
+    def _signed_volumes(self, points: Array) -> Array:
+        """Area (m²) or volume (m³) of each cell, (c,); it changes its sign where a cell is turned inside out."""
         first, *others = self.cells.T
-        d = self.dimension
-        sides = [[points[:, i][other] - points[:, i][first] for i in range(d)] for other in others]
-        if d == 2:
-            (a, b), (c, e) = sides
-            return np.asarray((a * e - b * c) / 2)
-        return np.asarray(np.sum(np.cross(sides[0], sides[1], axis=0) * sides[2], axis=0) / 6)
+        sides = [points[other] - points[first] for other in others]
+        crossed = np.cross(sides[0], sides[1])
+        return np.asarray(crossed[:, 2] / 2 if self.dimension == 2 else np.sum(crossed * sides[2], axis=1) / 6)
 
     @cached_property
     def pieces(self) -> Integers:
         """The number of the piece that each cell is in, (c,): pieces share no vertex."""
-        if self._has_one_surface():
-            return np.zeros(len(self.cells), dtype=np.int64)
-        return _joined(self.cells)[self.cells[:, 0]]
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
 
-    def _has_one_surface(self) -> bool:
-        """Whether all of the boundary hangs together; then so does the body, and nobody need ask its cells."""
-        if self.dimension == 2:
-            return len(self.outline) == 1
-        return len(np.unique(_joined(self.boundary)[self.outermost])) == 1
+        first, *others = self.cells.T
+        ends = np.tile(first, len(others)), np.concatenate(others)
+        graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(self.points),) * 2)
+        return np.unique(connected_components(graph, directed=False)[1][first], return_inverse=True)[1]
 
     @property
     def boundary(self) -> Integers:
         """Facets of one cell only (k, 2|3); counterclockwise seen from outside, in the plane the body on their left."""
         return self._skin[0]
+
+    @property
+    def behind(self) -> Integers:
+        """The cell of each facet of the boundary, (k,)."""
+        return self._skin[1]
 
     @cached_property
     def outline(self) -> list[Integers]:
@@ -105,27 +97,55 @@ class BodyMesh:
         """The vertices of the boundary, ascending, (m,): what a picture shows lies between them."""
         return np.unique(self.boundary)
 
-    @property
-    def behind(self) -> Integers:
-        """The cell of each facet of the boundary, (k,)."""
-        return self._skin[1]
-
     @cached_property
     def _skin(self) -> tuple[Integers, Integers]:
         d = self.dimension
         facets = np.concatenate([np.delete(self.cells, i, axis=1) for i in range(d + 1)])
-        alone = _alone(_keys(facets, len(self.points)))
-        opposite = self.cells.T.ravel()[alone]
-        return _outward(self.points, facets[alone], opposite), alone % len(self.cells)
+        _, first, count = np.unique(self._keys(facets), return_index=True, return_counts=True)
+        alone = np.sort(first[count == 1])
+        inner = self.points[self.cells.T.ravel()[alone]] - self.points[facets[alone, 0]]
+        inward = np.einsum("ki,ki->k", self._area_vectors(facets[alone]), inner) > 0.0
+        return np.where(inward[:, None], facets[alone, ::-1], facets[alone]), alone % len(self.cells)
+
+    def _area_vectors(self, facets: Integers) -> Array:
+        """The normals (k, 3) of facets, as long as their lengths or areas; to the right of an edge in the plane."""
+        first, *others = (self.points[corner] for corner in facets.T)
+        if len(others) == 1:
+            return np.asarray(np.cross(others[0] - first, [0.0, 0.0, 1.0]))
+        return np.asarray(np.cross(others[0] - first, others[1] - first) / 2)
+
+    def sizes(self, facets: Integers) -> Array:
+        """The length or the area of facets, m or m², (k,)."""
+        return np.asarray(np.linalg.norm(self._area_vectors(facets), axis=1))
+
+    def normals(self, facets: Integers) -> Array:
+        """Outward unit normals at the vertices of facets of the boundary; zero at others, (n, 3)."""
+        summed, vectors = np.zeros(self.points.shape), self._area_vectors(facets)
+        if self.dimension == 2:  # long edges turn the normal no more than short ones
+            vectors = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+        for corner in facets.T:
+            np.add.at(summed, corner, vectors)
+        return np.asarray(summed / np.maximum(np.linalg.norm(summed, axis=1), np.finfo(float).tiny)[:, None])
+
+    def mean_normal(self, facets: Integers) -> Array:
+        """The mean outward normal of facets, (3,): 1 long where they are plane, 0 where they close on themselves."""
+        vectors = self._area_vectors(facets)
+        return np.asarray(vectors.sum(axis=0) / (np.linalg.norm(vectors, axis=1).sum() or 1.0))
 
     def among(self, facets: Integers) -> Mask:
         """Which facets of the boundary are among these facets (j, 2|3), whatever the order of their vertices; (k,)."""
-        count = len(self.points)
-        return np.asarray(np.isin(_keys(self.boundary, count), _keys(facets, count)))
+        return np.asarray(np.isin(self._keys(self.boundary), self._keys(facets)))
 
     def oriented(self, facets: Integers) -> Integers:
         """These facets (j, 2|3) as they are in the boundary; those inside of the body are left out."""
         return np.asarray(self.boundary[self.among(facets)])
+
+    def _keys(self, facets: Integers) -> Integers:
+        """One number for each set of corners, (k,)."""
+        key = np.zeros(len(facets), dtype=np.int64)
+        for column in np.sort(facets, axis=1).T:
+            key = key * len(self.points) + column
+        return key
 
     def moving(self) -> BodyMesh:
         """The body that the escape mode moves, one of several: it leaves a point or an axis at rest, but no cell."""
@@ -140,58 +160,18 @@ class BodyMesh:
 
 def body_mesh(arrays: SolutionArrays) -> BodyMesh:
     """The body of a solution."""
+    fields = (arrays.displacement, arrays.escape_mode)
+    displacement, escape_mode = (None if field is None else _in_space(field) for field in fields)
+    stress = None if arrays.von_mises is None else arrays.von_mises.astype(np.float64)
     return BodyMesh(
         points=_in_space(arrays.points),
         cells=arrays.cells,
-        displacement=None if arrays.displacement is None else _in_space(arrays.displacement),
-        escape_mode=None if arrays.escape_mode is None else _in_space(arrays.escape_mode),
-        von_mises=None if arrays.von_mises is None else arrays.von_mises.astype(np.float64),
+        displacement=displacement,
+        escape_mode=escape_mode,
+        von_mises=stress,
     )
-
-
-def _joined(simplices: Integers) -> Integers:
-    """The number of what each vertex hangs together with by edges, triangles or cells (k, 2|3|4), (n,)."""
-    from scipy.sparse import coo_array  # a tenth of a second, which most plane bodies need not wait for
-    from scipy.sparse.csgraph import connected_components
-
-    first, *others = simplices.T
-    ends = np.tile(first, len(others)), np.concatenate(others)
-    graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(int(simplices.max()) + 1,) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _in_space(vectors: Array) -> Array:
     """Vectors (n, d) with zeros for what they lack of three components."""
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
-
-
-def _outward(points: Array, facets: Integers, opposite: Integers) -> Integers:
-    """Facets turned so that the opposite corner of their cell is behind them."""
-    corner = points[facets[:, 0]]
-    sides = [points[facets[:, i]] - corner for i in range(1, facets.shape[1])]
-    if len(sides) == 1:  # the way out of the page makes a triangle of an edge
-        sides.append(np.broadcast_to([0.0, 0.0, 1.0], corner.shape))
-    inward = np.einsum("ki,ki->k", np.cross(sides[0], sides[1]), points[opposite] - corner) > 0.0
-    return np.where(inward[:, None], facets[:, ::-1], facets)
-
-
-def _alone(keys: Integers) -> Integers:
-    """The places of the keys that no other equals, ascending; found by value, since argsort takes twice as long."""
-    ordered = np.sort(keys)
-    differs = np.ones(len(keys) + 1, dtype=np.bool_)
-    differs[1:-1] = ordered[1:] != ordered[:-1]
-    single = ordered[differs[1:] & differs[:-1]]
-    near = np.minimum(np.searchsorted(single, keys), len(single) - 1)
-    return np.flatnonzero(single[near] == keys)
-
-
-def _keys(facets: Integers, count: int) -> Integers:
-    """One number for each set of corners, (k,); by columns, since numpy sorts many short rows slowly."""
-    columns = [facets[:, i] for i in range(facets.shape[1])]
-    for last in range(len(columns) - 1, 0, -1):
-        for i in range(last):
-            columns[i], columns[i + 1] = np.minimum(*columns[i : i + 2]), np.maximum(*columns[i : i + 2])
-    key = columns[0]
-    for column in columns[1:]:
-        key = key * count + column
-    return key

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,31 +25,45 @@ from .solution_arrays import SolutionArrays
 if TYPE_CHECKING:
     from ..laws import Superpotential
 
-T = TypeVar("T")
 FAR = 10.0
 """A body that was not certified, and moved by so many times its size, is on its way off."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """A finished result.
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """What every finished folder has.
 
     Attributes:
         folder: where it was read from.
         scene: what ``scene.toml`` says.
         summary: what ``summary.json`` says.
-        arrays: what ``solution.npz`` holds.
     """
 
     folder: Path
     scene: Mapping[str, Any]
     summary: Mapping[str, Any]
-    arrays: SolutionArrays
 
     @property
     def title(self) -> str:
-        """The scene's title."""
-        return title_of(self.scene)
+        """The scene's title, for headings."""
+        return str(self.scene.get("title") or "untitled")
+
+    @property
+    def reason(self) -> str:
+        """How it ended, as the beginning of a sentence."""
+        reason = str(self.summary["reason"])
+        return f"{reason[:1].upper()}{reason[1:]}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result(Finished):
+    """A finished result.
+
+    Attributes:
+        arrays: what ``solution.npz`` holds.
+    """
+
+    arrays: SolutionArrays
 
     @cached_property
     def body(self) -> BodyMesh:
@@ -134,6 +148,11 @@ class Result:
                 found.append((part, key, value))
         return found
 
+    @property
+    def with_laws(self) -> bool:
+        """Whether a law acts on any part of Γc."""
+        return any(role["laws"] for part in self.parts for role in self.roles(part.name))
+
     def between_bodies(self, part: str) -> bool:
         """Whether a part is where two bodies meet.
 
@@ -201,29 +220,31 @@ class Result:
         return [law for role in self.roles(part) for law in role["laws"] if law["direction"] == direction]
 
 
-def title_of(scene: Mapping[str, Any]) -> str:
-    """The title of a scene, for headings.
-
-    Args:
-        scene: its tables.
-    """
-    return str(scene.get("title") or "untitled")
-
-
 def read(folder: Path) -> Result:
     """Read a result folder.
 
     Raises:
         ResultError: no result is there, or its files are damaged.
     """
-    scene = _read(folder / "scene.toml", lambda text: dict(tomllib.loads(text)))
-    summary = _read(folder / "summary.json", lambda text: dict(json.loads(text)))
-    return Result(folder, scene, summary, solution_arrays.load(folder / solution_arrays.FILE))
+    scene, summary = _told(folder / "scene.toml", read_toml), _told(folder / "summary.json", read_json)
+    arrays = solution_arrays.load(folder / solution_arrays.FILE)
+    return Result(folder=folder, scene=scene, summary=summary, arrays=arrays)
 
 
-def _read(path: Path, parse: Callable[[str], T]) -> T:
+def read_json(path: Path) -> dict[str, Any]:
+    """The entries of a file."""
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a file."""
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def _told(path: Path, read: Callable[[Path], dict[str, Any]]) -> dict[str, Any]:
+    """Read a file, or say in one line why it cannot be read."""
     try:
-        return parse(path.read_text(encoding="utf-8"))
+        return read(path)
     except OSError as error:
         raise ResultError(f"{path}: {error.strerror or error}; this is no finished result folder") from None
     except (ValueError, KeyError, TypeError) as error:

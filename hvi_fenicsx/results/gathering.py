@@ -37,7 +37,11 @@ def result(solution: Solution) -> Result | None:
     solved = solution.solve_result
     stress = None if solved is None else stress_of_parts(solution.problem.bulk, solved.u)
     arrays, record = solution_arrays(solution, stress), summary(solution)
-    return None if arrays is None else Result(Path("."), {"title": solution.scene.title}, record, arrays)
+    return (
+        None
+        if arrays is None
+        else Result(folder=Path("."), scene={"title": solution.scene.title}, summary=record, arrays=arrays)
+    )
 
 
 def solution_arrays(solution: Solution, stress: Array | None = None) -> SolutionArrays | None:

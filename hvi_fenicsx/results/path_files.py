@@ -13,7 +13,8 @@ from ..load_paths.following import PathRun
 from ..model import dump_scene
 from ..paths.load_path import LoadPath
 from ..paths.state import End, Event
-from ..report.html import path_page
+from ..report import page
+from ..report.pictures.draw import draw as draw_pictures
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..workflow import unsolved
@@ -122,11 +123,9 @@ def _write_on_root(
 def _write_from_files(folder: ResultFolder, path: LoadPath, tell: Callable[[str], None], *, draw: bool) -> None:
     """Picture and page; that one cannot be made costs a line. Rank 0 only."""
     if path.rows and draw:
-        from ..report.pictures import path_picture  # loads the plotting library
-
-        made("picture", tell, lambda: path_picture.draw(folder.work))
+        made("picture", tell, lambda: draw_pictures(folder.work))
     if path.rows:
-        made("report", tell, lambda: path_page.write(folder.work))
+        made("report", tell, lambda: page.write_path(folder.work))
 
 
 def _outcome(path: LoadPath) -> dict[str, Any]:

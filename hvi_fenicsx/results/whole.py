@@ -11,9 +11,8 @@ from typing import Any
 
 from ..model import dump_scene
 from ..problem.cell_stress import stress_of_parts
-from ..report import solution_arrays
+from ..report import page, solution_arrays
 from ..report.errors import ReportError
-from ..report.html import render
 from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime import writing
 from ..runtime.mpi import is_processor_free, on_root
@@ -65,7 +64,7 @@ class BegunResult:
             record["time"] = self.timer.report()
             on_root(comm, lambda: write_record(work, record))
             if report:
-                on_root(comm, lambda: made("report", self.tell, lambda: render.write(work)))
+                on_root(comm, lambda: made("report", self.tell, lambda: page.write(work)))
         record["time"] = self.timer.report()
         on_root(comm, lambda: write_record(work, record))
         return record

@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from ..errors import NotWrittenError
 from ..model import Model
+from ..report import page
 from ..report.errors import ReportError
-from ..report.html import study_page
 from ..results.folder import inputs_of
 from ..results.output_folder import Existing, OutputFolder, placed
 from ..runtime import writing
@@ -118,7 +118,7 @@ def fill(output: OutputFolder, study: Study, scene: Model, store: Store) -> list
     write_json(work / MARKS["study"], study.as_data())
     warnings = []
     try:
-        study_page.write(work)
+        page.write_study(work)
     except ReportError as error:  # it costs a line, not the study
         warnings.append(str(error))
     return [*warnings, *output.move_in(inputs_of(scene, output.target), store.listed())]

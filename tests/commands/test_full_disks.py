@@ -14,7 +14,7 @@ from scenes import model, quadratic_linear
 
 from hvi_fenicsx import InputError, read_scene, solve
 from hvi_fenicsx.errors import NotWrittenError
-from hvi_fenicsx.report.pictures import equilibria
+from hvi_fenicsx.report.pictures import draw
 from hvi_fenicsx.runtime import processes
 
 BAR = ROOT / "demos" / "glued_bar.toml"
@@ -85,7 +85,7 @@ def test_a_search_names_the_file_in_the_folder_of_its_equilibrium(scene: Path, t
         room_for(10_000),
         pytest.raises(NotWrittenError, match=r"equilibria\.png could not be written: File too large"),
     ):
-        equilibria.draw(out)
+        draw.draw(out)
 
 
 def test_a_folder_that_is_made_for_a_path_goes_where_nothing_can_be_written(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from damage import grid, msh
 from runs import command, hvi, summary, write_scene
 from scenes import model, quadratic_linear
 
+from hvi_fenicsx.report import page
 from hvi_fenicsx.report.errors import ResultError
-from hvi_fenicsx.report.html import render
 from hvi_fenicsx.results.output_folder import OutputFolder
 
 TABLE = model(2, friction=quadratic_linear(1e3))
@@ -110,7 +110,7 @@ def test_a_file_that_the_manifest_lists_without_its_hash_is_not_trusted(name: st
 
 def test_a_page_that_is_made_again_leaves_the_result_whole(copy: Path) -> None:
     (copy / "r" / "report.html").unlink()
-    render.write(copy / "r")
+    page.write(copy / "r")
     assert "finished already" in run(copy / "square.toml", copy / "r", "--resume").stdout
 
 
@@ -121,7 +121,7 @@ def test_a_page_that_could_not_be_written_is_not_recommended(
         raise ResultError("no page today")
 
     assert "open report.html there" in run(scene, tmp_path / "r").stdout
-    monkeypatch.setattr(render, "write", refused)
+    monkeypatch.setattr(page, "write", refused)
     done = run(scene, tmp_path / "s")
     assert done.returncode == 0
     assert "no page today" in done.stdout

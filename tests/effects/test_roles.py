@@ -27,8 +27,8 @@ from hvi_fenicsx.effects import (
 )
 from hvi_fenicsx.laws import Exponential, PolylineLaw, TractionGraph
 from hvi_fenicsx.report import reader
-from hvi_fenicsx.report.pictures import loads_supports
-from hvi_fenicsx.report.pictures.scene_legend import touches
+from hvi_fenicsx.report.pictures import sides
+from hvi_fenicsx.report.pictures.sides import touches
 
 OWN = '''
 import ufl
@@ -149,7 +149,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_users_effects_are_drawn(folder: Path) -> None:
     found = reader.read(folder / "r")
-    (held,), loaded = loads_supports.held_sides(found), loads_supports.loaded_sides(found)
+    (held,), loaded = sides.held_sides(found), sides.loaded_sides(found)
     assert (held.side.part, held.rolling) == ("wall", True)
     assert {load.side.part for load in loaded} == {"pull", "press"}
     pull = next(load for load in loaded if load.side.part == "pull")

@@ -24,7 +24,7 @@ from scenes import model as scene_table
 from scenes import quadratic_linear
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.report.pictures import loads_supports
+from hvi_fenicsx.report.pictures import sides
 from hvi_fenicsx.report.pictures.regions import regions
 from hvi_fenicsx.report.reader import Result
 from hvi_fenicsx.results import gathering
@@ -118,7 +118,7 @@ def test_a_load_may_be_a_formula_a_function_or_ufl(body: hvi.Body) -> None:
     found.append(hvi.solve(hvi.Model(body, [*others, hvi.Pressure("press", 1e6 * (1 + x[0]))]), estimate=False))
     for solution in found:
         assert solution.energy == pytest.approx(found[0].energy, rel=1e-11)
-        shown = {load.side.part: load for load in loads_supports.loaded_sides(as_read(solution))}
+        shown = {load.side.part: load for load in sides.loaded_sides(as_read(solution))}
         at = solution.problem.points[shown["press"].side.vertices]  # on one rank vertices are numbered alike
         np.testing.assert_allclose(shown["press"].traction[:, 1], -1e6 * (1 + at[:, 0]), rtol=1e-9)
         np.testing.assert_allclose(shown["press"].traction[:, [0, 2]], 0.0, atol=1e-6)
@@ -129,7 +129,7 @@ def as_read(solution: hvi.Solution) -> Result:
     """A solution as pictures read it from its folder."""
     arrays = gathering.solution_arrays(solution)
     assert arrays is not None
-    return Result(Path("."), {}, summary(solution), arrays)
+    return Result(folder=Path("."), scene={}, summary=summary(solution), arrays=arrays)
 
 
 def test_gaps_and_prescribed_values_may_be_functions(body: hvi.Body) -> None:

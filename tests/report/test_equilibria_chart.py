@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from hvi_fenicsx.report.equilibria_reader import EquilibriaResult
-from hvi_fenicsx.report.pictures import equilibria_chart
+from hvi_fenicsx.report.pictures import equilibria
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, VERMILION
+from hvi_fenicsx.report.searches import EquilibriaResult
 
 
 def search(folder: Path, energies: list[float]) -> EquilibriaResult:
@@ -34,19 +34,19 @@ def search(folder: Path, energies: list[float]) -> EquilibriaResult:
 
 def test_a_vertex_has_the_colour_of_the_law_that_is_broken(tmp_path: Path) -> None:
     """It had that of the law along the contact part, whatever the one across it was on."""
-    fig = equilibria_chart.make(search(tmp_path, [-2.0]))
+    fig = equilibria.make(search(tmp_path, [-2.0]))
     (strip,) = fig.axes[1].images
     colours = np.asarray(strip.get_array())[0]
     assert np.allclose(colours, [to_rgb(c) for c in (BLUE, ORANGE, ORANGE, VERMILION)])
 
 
 def test_energies_are_in_a_unit_that_suits_and_the_legend_has_what_is_there(tmp_path: Path) -> None:
-    fig = equilibria_chart.make(search(tmp_path, [-2.0, -1.9993]))
+    fig = equilibria.make(search(tmp_path, [-2.0, -1.9993]))
     assert fig.axes[0].get_xlabel() == "µJ above the lowest found,\n−2 J"
     assert {text.get_text() for text in fig.legends[0].get_texts()} >= {"minimiser", "saddle", "on a kink or drop"}
 
 
 def test_one_equilibrium_is_at_zero(tmp_path: Path) -> None:
-    fig = equilibria_chart.make(search(tmp_path, [-2.0]))
+    fig = equilibria.make(search(tmp_path, [-2.0]))
     assert [float(tick) for tick in fig.axes[0].get_xticks()] == [0.0]
     assert "saddle" not in [text.get_text() for text in fig.legends[0].get_texts()]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from hvi_fenicsx.report import rounding, units
-from hvi_fenicsx.report.pictures.legend import ticks
 
 
 @pytest.mark.parametrize(
@@ -21,11 +20,6 @@ def test_a_number_has_neither_a_hyphen_nor_a_letter(value: float, digits: int, t
 )
 def test_a_percentage_has_two_digits_or_all_before_the_point(share: float, text: str) -> None:
     assert units.percent(share) == text
-
-
-def test_a_bar_of_nothing_has_one_number() -> None:
-    assert list(ticks((0.0, 0.0), 4).tick_values(0.0, 1.0)) == [0.0]
-    assert len(ticks((0.0, 3.0), 4).tick_values(0.0, 3.0)) > 2
 
 
 def test_a_force_that_is_rounding_beside_the_largest_is_zero() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from hvi_fenicsx.report.path_reader import PathResult
-from hvi_fenicsx.report.pictures.path_picture import make
+from hvi_fenicsx.report.pictures.path import make
+from hvi_fenicsx.report.searches import PathResult
 
 EVENTS = ("start", "kink", "fold", "jump", "turn", "fold", "end")
 

@@ -16,7 +16,7 @@ import pytest
 from runs import ROOT, hvi, summary
 
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.report.html import render, study_page
+from hvi_fenicsx.report import page as pages
 from hvi_fenicsx.report.units import number
 
 PUSHED = ROOT / "demos" / "pushed_block.toml"
@@ -99,7 +99,7 @@ def test_nothing_comes_from_elsewhere_and_pictures_are_whole(held: Path, tmp_pat
     folder = shutil.copytree(held, tmp_path / "copy")
     for name in ("contact.png", "body.png", "scene.png", "own.png"):
         (folder / name).write_bytes(PIXEL)
-    page = Page(render.write(folder))
+    page = Page(pages.write(folder))
     sources = page.all("img", "src")
     assert [base64.b64decode(s.removeprefix("data:image/png;base64,")) for s in sources] == 4 * [PIXEL]
     everything = [value or "" for _, found in page.tags for key, value in found.items() if key in ("src", "href")]
@@ -132,7 +132,7 @@ def changed(held: Path, folder: Path, **entries: Any) -> Path:
     shutil.copytree(held, folder)
     record = {**summary(held), **entries}
     (folder / "summary.json").write_text(json.dumps(record), encoding="utf-8")
-    return render.write(folder)
+    return pages.write(folder)
 
 
 def test_an_estimate_and_ranks_are_told(held: Path, tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_a_damaged_folder_is_refused(held: Path, tmp_path: Path, name: str) -> N
     folder = shutil.copytree(held, tmp_path / "copy")
     (folder / name).write_text("{ not", encoding="utf-8")
     with pytest.raises(HviError, match=re.escape(name)):
-        render.write(folder)
+        pages.write(folder)
 
 
 @pytest.mark.parametrize(
@@ -182,10 +182,10 @@ def test_a_study_has_its_page(tmp_path: Path) -> None:
     text = json.dumps({**record, "quantities": {"u_t_l2": "u_t on Γc, L2"}})
     (tmp_path / "study.json").write_text(text, encoding="utf-8")
     (tmp_path / "time.png").write_bytes(PIXEL)
-    page = Page(study_page.write(tmp_path))
+    page = Page(pages.write_study(tmp_path))
     assert "10 % costs 2 s." in page.text
     assert "A & B: what accuracy costs" in page.text
     assert len(page.all("img", "src")) == 1
     (tmp_path / "study.json").write_text("[", encoding="utf-8")
     with pytest.raises(HviError, match="study"):
-        study_page.write(tmp_path)
+        pages.write_study(tmp_path)

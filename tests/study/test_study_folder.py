@@ -18,8 +18,8 @@ from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.errors import ExitCode
+from hvi_fenicsx.report import page
 from hvi_fenicsx.report.errors import ResultError
-from hvi_fenicsx.report.html import study_page
 from hvi_fenicsx.results.output_folder import OutputFolder
 from hvi_fenicsx.study.errors import NORMS
 from hvi_fenicsx.study.measure import Measurement, NoReferenceError, Store
@@ -98,7 +98,7 @@ def test_a_page_that_cannot_be_written_costs_a_line(copy: Path, monkeypatch: pyt
     def refused(folder: Path) -> Path:
         raise ResultError("no page today")
 
-    monkeypatch.setattr(study_page, "write", refused)
+    monkeypatch.setattr(page, "write_study", refused)
     done = study(copy, "--resume")
     assert done.returncode == 0
     assert "warning: no page today" in done.stdout

@@ -1,8 +1,7 @@
-"""``python3 -m hvi_fenicsx.report.pictures FOLDER``: draw a result folder's pictures into it and print their names.
+"""``python3 -m hvi_fenicsx.report.pictures FOLDER``: draw the pictures of a finished folder into it, print their names.
 
-There are as many processes as processors, each with its share of the pictures. One that ends takes the picture with it
-that it was drawing; another one draws the rest of its share. Exit code 0, or 1 with a message for each picture that
-failed; the others are there even so.
+Each picture has a process of its own, as many at a time as there are processors: one that dies takes its picture with
+it and no other. Exit code 0, or 1 with a message for each picture that failed; the others are there even so.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -24,27 +22,14 @@ from typing import TYPE_CHECKING, NoReturn
 from ...errors import HviError, NotWrittenError
 from ...runtime import processes, writing
 from ..errors import PictureError
-from ..reader import Result, read
 from .draw import COMPLAINT, TOLD, WHEN_TOLD
-from .xserver import XServer
+from .xserver import x_server
 
 if TYPE_CHECKING:
-    from .drawings import Drawing
+    from .registry import Drawing
 
-
-@dataclass(frozen=True)
-class Running:
-    """A process that draws one picture after the other, and says of each that it is done, or why it failed.
-
-    Attributes:
-        drawings: what is drawn, in this order.
-        process: that draws them.
-        connection: on which it answers.
-    """
-
-    drawings: Sequence[Drawing]
-    process: BaseProcess
-    connection: Connection
+Running = tuple["Drawing", BaseProcess, Connection]
+"""A drawing, the process that makes it, and what this says in the end: None, or why it failed."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.when_told is not None and not _told(options.when_told):
         return 1
     try:
-        failures = draw_all(read(options.folder))
+        failures = draw_all(options.folder)
     except HviError as error:
         failures = [error]
     for failure in failures:
@@ -75,14 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _told(dimension: int) -> bool:
     """Load what draws, and wait; whether there is something to draw."""
-    from . import drawings  # noqa: F401 (loads matplotlib)
+    from . import bodies, contact  # noqa: F401 (loads matplotlib)
 
     if dimension == 3:
-        import scipy.ndimage
-        import scipy.sparse.csgraph  # noqa: F401
-
         with contextlib.suppress(ModuleNotFoundError):  # each picture will say what it lacks
-            import pyvista  # noqa: F401
+            from . import space  # noqa: F401
     return sys.stdin.readline() == TOLD
 
 
@@ -91,86 +73,71 @@ def _terminated(*_: object) -> NoReturn:
     raise SystemExit(128 + signal.SIGTERM)
 
 
-def draw_all(result: Result) -> list[HviError]:
-    """Draw the pictures of a result side by side and print the names of those that are there.
+def draw_all(folder: Path) -> list[HviError]:
+    """Draw the pictures of a folder side by side and print the names of those that are there.
 
     Returns:
         What went wrong with the others.
 
     Raises:
+        ResultError: the folder is damaged.
         PictureError: there is nothing to draw.
     """
-    arrays = result.arrays
-    if arrays.displacement is None and arrays.escape_mode is None and not arrays.parts:
-        raise PictureError(f"{result.folder}: there is nothing to draw, neither a displacement nor a part of Γc")
-    with XServer(wanted=result.body.dimension == 3) as server:
-        from .drawings import drawings  # loads the plotting library while the server starts
+    from .registry import drawings_of  # loads the plotting library
 
-        found = list(drawings(result))
-        _ = result.body.pieces  # which pictures need, as they do the boundary: once, for all processes that draw
-        server.wait()
+    found = drawings_of(folder)
+    with x_server(wanted=any(drawing.rendered for drawing in found)):
         gc.freeze()  # the processes share what is there; a collection in one of them would copy it
-        shares = min(len(found), os.cpu_count() or 1)
-        running = [_started(found[i::shares]) for i in range(shares)]
-        return [failure for one in running for failure in _ended(one)]
+        at_once = os.cpu_count() or 1
+        batches = (found[start : start + at_once] for start in range(0, len(found), at_once))
+        return [failure for batch in batches for failure in _drawn(batch)]
 
 
-def _started(drawings: Sequence[Drawing]) -> Running:
-    context = multiprocessing.get_context("fork")
-    receiving, sending = context.Pipe(duplex=False)
-    process = context.Process(target=_drawn, args=(drawings, sending), daemon=True)
-    process.start()
-    sending.close()
-    return Running(drawings, process, receiving)
-
-
-def _drawn(drawings: Sequence[Drawing], connection: Connection) -> None:
-    """In a process of its own."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    for drawing in drawings:
-        connection.send(_fault(drawing))
-
-
-def _fault(drawing: Drawing) -> HviError | None:
-    """Draw one picture; what went wrong, if anything did."""
-    from .style import save
-
-    try:
-        save(drawing.make(), drawing.path, drawing.caption)
-    except NotWrittenError as error:
-        return error
-    except ModuleNotFoundError as error:
-        return _failed(drawing, f"needs the package {error.name}, which is not installed here")
-    except Exception as error:  # whatever it is, it is reported in one line
-        return _failed(drawing, str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}")
-    return None
-
-
-def _failed(drawing: Drawing, why: str) -> PictureError:
-    return PictureError(f"{drawing.path.name}: {why}")
-
-
-def _ended(one: Running) -> Iterator[HviError]:
-    """Wait for the pictures of a process; what went wrong with them."""
-    for place, drawing in enumerate(one.drawings):
+def _drawn(batch: Sequence[Drawing]) -> Iterator[HviError]:
+    """Draw pictures side by side; what went wrong with them."""
+    for drawing, process, connection in [_started(drawing) for drawing in batch]:
         try:
-            failure = one.connection.recv()
+            failure = connection.recv()
         except EOFError:
-            one.process.join()
-            advice = _ADVICE if drawing.rendered else ""
-            yield _failed(drawing, f"the drawing process ended with {_reason(one.process.exitcode)}{advice}")
-            if rest := one.drawings[place + 1 :]:
-                yield from _ended(_started(rest))
-            return
+            process.join()
+            code = process.exitcode or 0
+            reason = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+            failure = _failed(drawing, f"the drawing process ended with {reason}{_ADVICE * drawing.rendered}")
+        process.join()
         if failure is None:
             print(drawing.path.name, flush=True)
         else:
             yield failure
-    one.process.join()
 
 
-def _reason(code: int | None) -> str:
-    return signal.Signals(-code).name if code is not None and code < 0 else f"exit code {code}"
+def _started(drawing: Drawing) -> Running:
+    context = multiprocessing.get_context("fork")
+    receiving, sending = context.Pipe(duplex=False)
+    process = context.Process(target=_draw, args=(drawing, sending), daemon=True)
+    process.start()
+    sending.close()
+    return drawing, process, receiving
+
+
+def _draw(drawing: Drawing, connection: Connection) -> None:
+    """Draw one picture in a process of its own; say what went wrong, if anything did."""
+    from .style import save
+
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    failure: HviError | None = None
+    try:
+        save(drawing.make(), drawing.path, drawing.caption)
+    except NotWrittenError as error:
+        failure = error
+    except ModuleNotFoundError as error:
+        failure = _failed(drawing, f"needs the package {error.name}, which is not installed here")
+    except Exception as error:  # whatever it is, it is reported in one line
+        failure = _failed(drawing, str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}")
+    connection.send(failure)
+
+
+def _failed(drawing: Drawing, why: str) -> PictureError:
+    return PictureError(f"{drawing.path.name}: {why}")
 
 
 _ADVICE = "; VTK draws on a display: unset DISPLAY and install Xvfb, or use a VTK from 9.4 on"

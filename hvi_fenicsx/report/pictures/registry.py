@@ -1,16 +1,19 @@
-"""Which pictures there are. Add one as a module of ``kinds`` with a function under :func:`picture`.
-
-The function draws a figure of a result, and one of a part of Γc too where the picture is one of a part.
-"""
+"""Which pictures there are of a result. Add one as a function under :func:`picture`, here beside the others."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ..reader import Result
+from .. import searches
+from ..errors import PictureError
+from ..reader import Result, read
+from . import equilibria
+from . import path as path_picture
 
 Maker = Callable[..., Figure]
 
@@ -22,20 +25,33 @@ class Picture:
     Attributes:
         name: of its file, without the ending.
         caption: what a reader sees under it; ``{part}`` stands for the part.
-        dimension: of the bodies that it draws, 2 or 3.
         wanted: whether a result has what it draws.
         of_part: whether there is one for each part of Γc.
-        rendered: whether VTK draws for it.
-        make: draws it.
+        make: draws it, of a result, and of a part of Γc too.
     """
 
     name: str
     caption: str
-    dimension: int
     wanted: Callable[[Result], bool]
     of_part: bool
-    rendered: bool
     make: Maker
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture of one result.
+
+    Attributes:
+        path: where it goes.
+        caption: what a reader sees under it.
+        make: draws it.
+        rendered: whether VTK may draw for it.
+    """
+
+    path: Path
+    caption: str
+    make: Callable[[], Figure]
+    rendered: bool = False
 
 
 PICTURES: list[Picture] = []
@@ -43,37 +59,59 @@ PICTURES: list[Picture] = []
 
 
 def picture(
-    name: str,
-    *,
-    caption: str,
-    dimension: int,
-    wanted: Callable[[Result], bool] = lambda result: True,
-    of_part: bool = False,
-    rendered: bool = False,
+    name: str, *, caption: str, wanted: Callable[[Result], bool] = lambda result: True, of_part: bool = False
 ) -> Callable[[Maker], Maker]:
     """Register the function below as a kind of picture.
 
     Args:
         name: of its file, without the ending; that of the part follows where there are several.
         caption: what a reader sees under it; ``{part}`` stands for the part.
-        dimension: of the bodies that it draws, 2 or 3.
         wanted: whether a result has what it draws.
         of_part: whether there is one for each part of Γc.
-        rendered: whether VTK draws for it.
     """
 
     def register(make: Maker) -> Maker:
-        PICTURES.append(
-            Picture(
-                name=name,
-                caption=caption,
-                dimension=dimension,
-                wanted=wanted,
-                of_part=of_part,
-                rendered=rendered,
-                make=make,
-            )
-        )
+        PICTURES.append(Picture(name=name, caption=caption, wanted=wanted, of_part=of_part, make=make))
         return make
 
     return register
+
+
+def drawings_of(folder: Path) -> list[Drawing]:
+    """What there is to draw of a finished folder, of whatever kind it is.
+
+    Raises:
+        ResultError: the folder is damaged.
+        PictureError: there is nothing to draw.
+    """
+    if (folder / "equilibria.csv").exists():
+        search = searches.read_equilibria(folder)
+        return [Drawing(folder / equilibria.NAME, equilibria.CAPTION, partial(equilibria.make, search))]
+    if (folder / "path.csv").exists():
+        path = searches.read_path(folder)
+        drawn = path.driven is not None
+        return [Drawing(folder / path_picture.NAME, path_picture.CAPTION, partial(path_picture.make, path))] * drawn
+    result = read(folder)
+    arrays = result.arrays
+    if arrays.displacement is None and arrays.escape_mode is None and not arrays.parts:
+        raise PictureError(f"{folder}: there is nothing to draw, neither a displacement nor a part of Γc")
+    _ = result.body.boundary  # which pictures need: once, for all processes that draw
+    return list(drawings(result))
+
+
+def drawings(result: Result) -> Iterator[Drawing]:
+    """What there is to draw of a result."""
+    from . import bodies, contact  # noqa: F401 (registers them)
+
+    for kind in sorted(PICTURES, key=lambda kind: kind.name):
+        if not kind.wanted(result):
+            continue
+        if not kind.of_part:
+            rendered = result.body.dimension == 3
+            yield Drawing(result.folder / f"{kind.name}.png", kind.caption, partial(kind.make, result), rendered)
+            continue
+        alone = len(result.parts) == 1
+        for part in result.parts:
+            path = result.folder / f"{kind.name if alone else f'{kind.name}_{part.name}'}.png"
+            caption = kind.caption.replace("{part}", "the contact part" if alone else f"“{part.name}”")
+            yield Drawing(path, caption, partial(kind.make, result, part))

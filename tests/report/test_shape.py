@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hvi_fenicsx.report.body_mesh import BodyMesh
-from hvi_fenicsx.report.pictures.deformed import deform, undeformed
+from hvi_fenicsx.report.pictures.shape import deform, undeformed
 
 LENGTH = 0.19
 
@@ -49,4 +49,4 @@ def test_a_small_piece_beside_a_large_one_is_not_crushed() -> None:
     assert deform(BodyMesh(points=points[:4], cells=halves, displacement=u[:4]), []).factor == 100.0
     shape = deform(body, [])
     assert shape.factor == 20.0
-    assert np.abs(body.signed_volumes(shape.points))[2:].sum() == pytest.approx(0.8 * 0.01)
+    assert body.kept(shape.points).min() == pytest.approx(0.8)

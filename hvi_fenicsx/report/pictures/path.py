@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
 from ...typing import Array, Mask
-from ..path_reader import PathResult, read
+from ..searches import PathResult
 from ..units import Unit, number, unit_for
-from .style import BLUE, GREEN, GREY, HEADING, INK, PURPLE, VERMILION, area, figure, save, titled
+from .style import BLUE, GREEN, GREY, HEADING, INK, PURPLE, VERMILION, area, figure, titled
 
 NAME = "path.png"
-_CAPTION = (
+CAPTION = (
     "The load path: force (under a moment the load factor) over mean displacement of the driven part. Solid: stable; "
     "dashed: unstable, which a test cannot hold; dotted: jumps; dots: events on the way, some where they are many."
 )
@@ -29,22 +28,6 @@ _SHORT = 1e-3
 """Stretches that are shorter, in parts of the picture, are not seen."""
 _ABOVE = 11.0
 """Points: the peak's mark stands so high above its point, which a turn or the end may have, too."""
-
-
-def draw(folder: Path) -> Path | None:
-    """Draw the picture of a finished load path into its folder; None where no part is driven. Rank 0 only.
-
-    Args:
-        folder: of the path.
-
-    Raises:
-        ResultError: no load path is there, or its files are damaged.
-    """
-    result = read(folder)
-    if result.driven is None:
-        return None
-    save(make(result), folder / NAME, _CAPTION)
-    return folder / NAME
 
 
 def make(result: PathResult) -> Figure:

@@ -1,4 +1,4 @@
-"""The deformed body, magnified, and what acts on its contact parts, as points: the same in the plane and in space."""
+"""Where a picture draws the vertices of a body: displaced, magnified, stretched where it is thin; or on its way off."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ from ..contact_part import ContactPart
 from ..reader import Result
 from ..units import round_below, times
 
-VISIBLE = 0.08
-"""How large the largest displacement is drawn, of the body's size."""
-NEAR = 0.3
-"""Gaps larger than this, magnified, of the body's size, are the body's own shape."""
+VISIBLE = 0.1
+"""The largest displacement is drawn up to this part of the body's size, and the way of an escape three times as far."""
 KEPT = 0.75
 """A small body beside a large one is drawn with this part of its area or volume, at least."""
-THIN, DRAWN = 1 / 40, 1 / 15
-"""A plane body whose height is a smaller part of its length is drawn higher (or wider), up to the second part."""
+DRAWN = 1 / 15
+"""A plane body whose height is a smaller part of its length is drawn higher (or wider), up to this part."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ class DeformedBody:
 
     body: BodyMesh
     displacement: Array
-    factor: float
+    factor: float = 1.0
     stretch: Array = field(default_factory=lambda: np.ones(3))
 
     @cached_property
@@ -53,8 +51,6 @@ class DeformedBody:
     @property
     def as_drawn(self) -> BodyMesh:
         """The body at rest as it is drawn, with its escape mode drawn alike."""
-        if not self.stretched:
-            return self.body  # which knows its boundary already
         mode = self.body.escape_mode
         return replace(self.body, points=self.at_rest, escape_mode=None if mode is None else mode * self.stretch)
 
@@ -81,7 +77,6 @@ class PartGeometry:
 
     Attributes:
         part: the part.
-        vertices: its vertices in the body, (m,).
         facets: its facets in the body, looking outwards, (k, 2) or (k, 3).
         row: of each vertex of the body its row in the part's table, (n,); 0 off the part.
         obstacle: the unit vector (3,) towards a flat obstacle; None where the gap is along the part's normals.
@@ -89,20 +84,17 @@ class PartGeometry:
     """
 
     part: ContactPart
-    vertices: Integers
     facets: Integers
     row: Integers
     obstacle: Array | None
     between_bodies: bool = False
 
-    def values(self, column: Array, vertices: Integers) -> Array:
-        """A column of the table at some vertices.
-
-        Args:
-            column: by row of the table, (m,).
-            vertices: vertices of the body, (j,).
-        """
-        return np.asarray(column[self.row[vertices]])
+    @property
+    def pressure(self) -> Array:
+        """-σ_n by vertex of the body, NaN where it is lifted and off the part."""
+        values = np.full(len(self.row), np.nan)
+        values[self.part.vertices] = np.where(self.part.idle, np.nan, self.part.pressure)
+        return values
 
 
 def part_geometries(result: Result) -> list[PartGeometry]:
@@ -111,9 +103,8 @@ def part_geometries(result: Result) -> list[PartGeometry]:
     for part in result.parts:
         row = np.zeros(len(body.points), dtype=np.int64)
         row[part.vertices] = np.arange(len(part.vertices))
-        facets = body.oriented(part.facets)
         obstacle, met = result.obstacle(part.name), result.between_bodies(part.name)
-        found.append(PartGeometry(part, part.vertices, facets, row, obstacle, met))
+        found.append(PartGeometry(part, body.oriented(part.facets), row, obstacle, met))
     return found
 
 
@@ -130,13 +121,12 @@ def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
     assert body.displacement is not None
     u, stretch = np.nan_to_num(body.displacement), _stretch(body)
     largest = float(np.linalg.norm(u * stretch, axis=1).max(initial=0.0))
-    if largest == 0.0:
-        return DeformedBody(body, u, 1.0, stretch)
-    factor = 1.0 if largest > 0.5 * VISIBLE * body.size else round_below(VISIBLE * body.size / largest * 1.25)
+    factor = max(1.0, round_below(VISIBLE * body.size / largest)) if largest > 0.0 else 1.0
     while factor > 1.0 and body.kept(body.points + factor * u).min() < KEPT:
         factor = round_below(factor / 1.5)
     gap = max((float(np.nanmax(geometry.part["gap"], initial=0.0)) for geometry in parts), default=0.0)
-    return DeformedBody(body, u, factor if factor * gap * stretch.max() < NEAR * body.size else 1.0, stretch)
+    own_shape = factor * gap * stretch.max() > 3 * VISIBLE * body.size
+    return DeformedBody(body, u, 1.0 if own_shape else factor, stretch)
 
 
 def undeformed(body: BodyMesh) -> DeformedBody:
@@ -148,11 +138,68 @@ def _stretch(body: BodyMesh) -> Array:
     """By how much a picture is stretched along each axis, so that colours in a thin strip are seen, (3,)."""
     stretch, extents = np.ones(3), body.extents[: body.dimension]
     thin = int(np.argmin(extents))
-    if body.dimension == 2 and 0.0 < extents[thin] < THIN * body.size:
+    if body.dimension == 2 and extents[thin] > 0.0:
         stretch[thin] = max(1.0, round_below(DRAWN * body.size / float(extents[thin])))
     return stretch
 
 
-def largest_stress(parts: list[PartGeometry]) -> float:
-    """The largest |σ_n| on any of them, N/m²."""
-    return max((float(np.nanmax(np.abs(f.part.pressure), initial=0.0)) for f in parts), default=0.0)
+@dataclass(frozen=True)
+class Motion:
+    """x → pole + rotation(x - pole) + shift: a screw, a rotation, or a translation (spin zero).
+
+    Attributes:
+        pole: a point of the axis, m, (3,).
+        shift: along the axis, or the translation, m, (3,).
+        spin: the axis times the angle, (3,).
+    """
+
+    pole: Array
+    shift: Array
+    spin: Array
+
+    def at(self, points: Array, part: float = 1.0) -> Array:
+        """Where points are after a part of the motion, m, (n, 3).
+
+        Args:
+            points: at rest, m, (n, 3).
+            part: of the motion, 0 to 1.
+        """
+        from scipy.spatial.transform import Rotation
+
+        turned = Rotation.from_rotvec(part * self.spin).apply(points - self.pole)
+        return np.asarray(self.pole + turned + part * self.shift)
+
+
+def escaping(body: BodyMesh) -> Motion:
+    """The finite motion whose velocity is the body's escape mode, so that a ghost keeps the body's shape.
+
+    The field is a + w × (x - c); its pole is the point of the screw's axis that is nearest to c.
+    """
+    assert body.escape_mode is not None
+    mode = body.escape_mode
+    reach = 3 * VISIBLE * body.size / (float(np.linalg.norm(mode, axis=1).max()) or 1.0)
+    middle, shift = body.points.mean(axis=0), mode.mean(axis=0)
+    arms, field = body.points - middle, mode - shift
+    inertia = np.eye(3) * np.sum(arms**2) - arms.T @ arms
+    spin = np.linalg.lstsq(inertia, np.cross(arms, field).sum(axis=0), rcond=1e-12)[0]
+    square = float(spin @ spin)
+    if square * body.size**2 < 1e-12 * float(np.max(np.sum(mode**2, axis=1))):
+        return Motion(middle, reach * shift, np.zeros(3))
+    along = float(shift @ spin) / square * spin
+    return Motion(middle + np.cross(spin, shift) / square, reach * along, reach * spin)
+
+
+def followed(body: BodyMesh, motion: Motion) -> Array:
+    """Points to follow on their way: the middle in a translation, else one far out in each diagonal direction; (j, 3).
+
+    Args:
+        body: the body at rest.
+        motion: that it makes.
+    """
+    middle = (body.points.min(axis=0) + body.points.max(axis=0)) / 2
+    if not motion.spin.any():
+        return middle[None]
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * body.dimension)).reshape(body.dimension, -1).T
+    far = body.points[np.unique(np.argmax((body.points - middle)[:, : body.dimension] @ signs.T, axis=0))]
+    way = np.linalg.norm(motion.at(far) - far, axis=1)
+    return np.asarray(far[way > VISIBLE * way.max()])  # not the one that the body turns about

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,13 +16,9 @@ from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..solution_arrays import LoadArrays
 from ..units import quantity
-from .outline import normals
-from .vtk_view import area_vectors
 
 SHEAR = 0.2
 """A load is along its side where the part across it is smaller than this part of it."""
-CLOSED = 0.1
-"""Length of the mean of a side's unit normals below which it closes on itself."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +39,8 @@ class Side:
 
     @property
     def normal(self) -> Array:
-        """The mean outward normal (3,), of unit length; zero for a side that closes on itself, as a hole's does."""
-        mean = self.normals.mean(axis=0)
-        length = float(np.linalg.norm(mean))
-        return np.asarray(mean / length if length > CLOSED else np.zeros_like(mean))
+        """The mean outward normal (3,): short for a side that closes on itself, as a hole's does."""
+        return np.asarray(self.normals.mean(axis=0))
 
 
 @dataclass(frozen=True)
@@ -99,30 +93,25 @@ class HeldSide:
     rolling: bool
 
 
+def touches(roles: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether contact or a law acts on a part, from the roles of its effects."""
+    return any(role["bounded"] or role["laws"] for role in roles)
+
+
 def loaded_sides(result: Result) -> list[LoadedSide]:
     """The tractions that are not zero, and the forces that are spread over their parts."""
-    found, forces = [], {part: _components(value) for part, key, value in result.driven if key == "force"}
+    found, forces = [], {part: np.array([*value, 0.0][:3]) for part, key, value in result.driven if key == "force"}
     for side, roles in roles_by_side(result):
-        traction = np.sum([_traction(role, result.body.points[side.vertices], side.normals) for role in roles], axis=0)
+        points = result.body.points[side.vertices]
+        traction = sum((_traction(role, points, side.normals) for role in roles), np.zeros(points.shape))
         traction = traction + _given(result.arrays.loads.get(side.part), side)
         if np.any(traction):
             found.append(LoadedSide(side, traction))
         if np.any(force := forces.get(side.part, np.zeros(3))):
-            spread = np.broadcast_to(force / _measure(result, side.part), side.normals.shape)
+            measure = float(result.body.sizes(result.body.oriented(result.sides[side.part])).sum())
+            spread = np.broadcast_to(force / measure, side.normals.shape)
             found.append(LoadedSide(side, spread, float(np.linalg.norm(force))))
     return found
-
-
-def _components(force: Sequence[float]) -> Array:
-    return np.array([*force, 0.0][:3], dtype=np.float64)
-
-
-def _measure(result: Result, part: str) -> float:
-    """The length or the area of a boundary part, m or m²."""
-    facets, points = result.body.oriented(result.sides[part]), result.body.points
-    if facets.shape[1] == 2:
-        return float(np.linalg.norm(points[facets[:, 1]] - points[facets[:, 0]], axis=1).sum())
-    return float(np.linalg.norm(area_vectors(points, facets), axis=1).sum())
 
 
 def borne_loads(result: Result) -> list[LoadedSide]:
@@ -136,8 +125,7 @@ def held_sides(result: Result) -> list[HeldSide]:
     found = []
     for side, roles in roles_by_side(result):
         held = {component for role in roles for component in role["prescribed"]}
-        axis = int(np.argmax(np.abs(side.normal)))
-        if axis in held:
+        if int(np.argmax(np.abs(side.normal))) in held:
             found.append(HeldSide(side, rolling=len(held) < result.body.dimension))
     return found
 
@@ -146,27 +134,17 @@ def roles_by_side(result: Result) -> Iterator[tuple[Side, Sequence[Mapping[str, 
     """The pieces of each boundary part, with the roles of its effects."""
     body = result.body
     for name, own in result.sides.items():
-        roles = result.roles(name)
         facets = body.oriented(own)
-        for side in _lines(name, body, facets) if body.dimension == 2 else _faces(name, body, facets):
-            yield side, roles
+        lines = [np.column_stack([c[:-1], c[1:]]) for c in chains(facets)] if body.dimension == 2 else [facets]
+        for piece in lines:
+            if len(piece):
+                yield _side(name, body, piece), result.roles(name)
 
 
-def _lines(name: str, body: BodyMesh, facets: Integers) -> Iterator[Side]:
-    for chain in chains(facets):
-        edges = np.column_stack([chain[:-1], chain[1:]])
-        outward = np.pad(normals(body.points, chain), ((0, 0), (0, 1)))
-        yield Side(name, chain, edges, outward)
-
-
-def _faces(name: str, body: BodyMesh, facets: Integers) -> Iterator[Side]:
-    if not len(facets):
-        return
-    vertices, index = np.unique(facets, return_inverse=True)
-    outward = np.zeros((len(vertices), 3))
-    for corner in index.reshape(facets.shape).T:
-        np.add.at(outward, corner, area_vectors(body.points, facets))
-    yield Side(name, vertices, facets, outward / np.linalg.norm(outward, axis=1)[:, None])
+def _side(name: str, body: BodyMesh, facets: Integers) -> Side:
+    """A line in the order of its edges, or a face with its vertices ascending."""
+    vertices = np.append(facets[:, 0], facets[-1, 1]) if body.dimension == 2 else np.unique(facets)
+    return Side(name, vertices, facets, body.normals(facets)[vertices])
 
 
 def _given(load: LoadArrays | None, side: Side) -> Array:

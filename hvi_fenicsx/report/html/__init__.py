@@ -1,1 +1,0 @@
-"""The page report.html, made from a finished folder alone."""

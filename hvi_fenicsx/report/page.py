@@ -1,0 +1,260 @@
+"""``report.html`` beside a result: one file that a colleague reads without the program, made from the folder alone.
+
+The templates in ``html/`` have the words; here is what they are given, and how numbers are written in them.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import json
+import re
+import shlex
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ExitCode
+from ..runtime import manifest, writing
+from . import png_file, reader, searches, units
+from .contact_part import ContactPart
+from .errors import ResultError
+from .reader import Result
+from .rounding import unless_noise
+
+if TYPE_CHECKING:
+    import jinja2
+
+NAME = "report.html"
+MOST = 100
+"""Equilibria in the table, those of lowest energy."""
+_FIRST = ("escape", "scene", "body", "stress", "work_precision", "error_h", "error_epsilon", "time")
+"""The pictures that are shown first, in this order; what is not named here comes after, by its name."""
+_ABSOLUTE = re.compile(r"""(?P<before>^|=|=["'])/(?:[^/"']*/)*(?P<name>[^/"']*)""")
+"""A path from the root as a word of a command line, or after an equals sign in it."""
+
+
+def write(folder: Path) -> Path:
+    """Write ``report.html`` into a result folder, from its files; for rank 0 alone.
+
+    Raises:
+        ResultError: no result is there, or its files are damaged.
+        NotWrittenError: the page cannot be written.
+    """
+    result = reader.read(folder)
+    headline = dict(zip(("kind", "words"), _headline(result), strict=True))
+    contact = [{"name": part.name, "rows": list(contact_rows(part))} for part in result.parts]
+    given = {"verdict": headline, "contact": contact, "forces": _forces(result), "reproduce": _reproduce(result)}
+    return _page("run.html.j2", folder, result=result, **given)
+
+
+def write_path(folder: Path) -> Path:
+    """Write the page of a finished load path, likewise.
+
+    Raises:
+        ResultError: no load path is there, or its files are damaged.
+        NotWrittenError: the page cannot be written.
+    """
+    result = searches.read_path(folder)
+    forces = {
+        part: {**found, "force": [unless_noise(f, result.largest_force) for f in found["force"]]}
+        for part, found in result.path["peak_forces"].items()
+    }
+    return _page("path.html.j2", folder, result=result, forces=forces)
+
+
+def write_equilibria(folder: Path) -> Path:
+    """Write the page of a search of all equilibria, likewise.
+
+    Raises:
+        ResultError: no search is there, or its files are damaged.
+        NotWrittenError: the page cannot be written.
+    """
+    return _page("equilibria.html.j2", folder, result=searches.read_equilibria(folder), most=MOST)
+
+
+def write_study(folder: Path) -> Path:
+    """Write the page of a finished study; for one process alone.
+
+    Raises:
+        ResultError: no study is there, or it is damaged.
+        NotWrittenError: the page cannot be written.
+    """
+    file = folder / "study.json"
+    try:
+        study = json.loads(file.read_text(encoding="utf-8"))
+        given = {key: study[key] for key in ("sentences", "points", "ranks", "version", "quantities")}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ResultError(f"{file}: no finished study, or damaged ({error})") from None
+    title = f"{study['scene'] or 'untitled'}: what accuracy costs"
+    return _rendered("study.html.j2", folder, title=title, pictures=_pictures(folder), **given)
+
+
+def _page(template: str, folder: Path, *, result: Any, **given: Any) -> Path:
+    """Write the page of a result folder, and list it among the folder's files."""
+    page = _rendered(template, folder, result=result, title=result.title, pictures=_pictures(folder), **given)
+    manifest.add(folder, [NAME])
+    return page
+
+
+def _rendered(template: str, folder: Path, **given: Any) -> Path:
+    writing.text(folder / NAME, _environment().get_template(template).render(given))
+    return folder / NAME
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    """The templates, each compiled once, with the ways in which they write numbers."""
+    import jinja2  # a tenth of a second, for the report alone
+
+    loader = jinja2.FileSystemLoader(Path(__file__).with_name("html"))
+    found = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    ways: list[Callable[..., str]] = [units.number, units.quantity, units.percent, units.thousands, said, two_digits]
+    found.filters |= {way.__name__: way for way in ways}
+    found.filters |= {"file_name": lambda path: PurePath(str(path)).name, "named": _named}
+    return found
+
+
+def two_digits(value: float | None) -> str:
+    """A number that is read for its size alone.
+
+    Args:
+        value: the number; None where it is not finite.
+    """
+    return "not finite" if value is None else units.number(float(f"{value:.1e}"))
+
+
+def said(value: Any) -> str:
+    """A value of a scene file as people write it.
+
+    Args:
+        value: the value.
+    """
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return units.number(value)
+    if isinstance(value, list):
+        return f"({', '.join(map(said, value))})"
+    if isinstance(value, Mapping):
+        texts = {key: f"({said(item)})" if isinstance(item, Mapping) else said(item) for key, item in value.items()}
+        return ", ".join(text if key == "law" else f"{key} {text}" for key, text in texts.items())
+    return str(value).replace("_", " ") if str(value).isidentifier() else str(value)
+
+
+def _named(table: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """``[material]`` itself, or each ``[material.NAME]``."""
+    tables = [(f" “{name}”", t) for name, t in table.items() if isinstance(t, Mapping) and "law" not in t]
+    return tables if len(tables) == len(table) else [("", table)]
+
+
+def _pictures(folder: Path) -> dict[str, dict[str, Any]]:
+    """The finished pictures of a folder, which lie in the page itself, each with its size: the page does not jump."""
+    found = (path for path in folder.glob("*.png") if not path.name.startswith("."))
+    ordered = sorted(found, key=lambda p: (_FIRST.index(p.stem) if p.stem in _FIRST else len(_FIRST), p.stem))
+    return {path.stem: _picture(path) for path in ordered}
+
+
+def _picture(path: Path) -> dict[str, Any]:
+    raw = path.read_bytes()
+    width, height = png_file.size(raw)
+    data = f"data:image/png;base64,{base64.b64encode(raw).decode()}"
+    return {"caption": png_file.caption(raw) or path.stem, "data": data, "width": width, "height": height}
+
+
+def _headline(result: Result) -> tuple[str, str]:
+    """Whether the answer is good news (``good``, ``limited`` or ``bad``), and the answer in one line."""
+    code, state = result.summary.get("exit_code"), result.solvability.get("state")
+    if result.certified and result.coarse:
+        return "limited", f"Certified on a coarse mesh: {_rough(result.summary['estimate'])}."
+    if result.certified and state == "held":
+        return "good", "A solution exists, was found, and is certified."
+    if result.certified:
+        return "limited", f"An equilibrium was found and is certified; the state is {state}."
+    if not result.solved:
+        return "bad", "No solution exists: the load carries the body away."
+    if code == ExitCode.INTERRUPTED:
+        return "bad", "The run was interrupted: what is shown is not a solution."
+    off = " The body is carried off; `hvi path` finds the last state that is borne." if result.carried_off else ""
+    return "bad", f"No certified solution: {result.summary.get('reason')}.{off}"
+
+
+def _rough(found: Mapping[str, Any]) -> str:
+    """The mesh's error in words."""
+    norm, part = found.get("energy_norm"), found.get("discretisation")
+    size = f"{units.percent(part / norm)} of the solution" if norm and part is not None else "as large as the solution"
+    return (
+        f"the estimated error is {size}, so its numbers are rough; refine the mesh, or ask `hvi run` for an --accuracy"
+    )
+
+
+def contact_rows(part: ContactPart) -> Iterator[tuple[str, str]]:
+    """What happened on a part of Γc, in words and numbers.
+
+    Args:
+        part: the part.
+    """
+    yield "vertices", units.thousands(len(part))
+    if part.has("contact"):
+        yield "in contact", units.thousands(int(np.nansum(part["contact"])))
+        yield "largest gap", _largest(part["gap"], "m")
+    yield "largest slip", _largest(np.abs(part.size("slip")), "m")
+    if part.has("branch_t"):
+        yield "largest friction", _largest(np.abs(part.size("friction")), "Pa")
+        yield "pieces of the friction law in use, from 0", _pieces(part["branch_t"])
+    yield "largest pressure", _largest(part.pressure, "Pa")
+    if part.has("branch_n"):
+        yield "largest tension", _largest(part["sigma_n"], "Pa")
+        yield "pieces of the normal law in use, from 0", _pieces(part["branch_n"])
+
+
+def _largest(values: Any, unit: str) -> str:
+    known = values[np.isfinite(values)]
+    return units.quantity(max(float(known.max()), 0.0), unit) if len(known) else "-"
+
+
+def _pieces(branch: Any) -> str:
+    """How many vertices are on which piece of the law's graph, counted from 0 as in ``contact.csv``."""
+    found, counts = np.unique(branch[np.isfinite(branch)].astype(int), return_counts=True)
+    names = ("on a kink" if piece < 0 else f"on piece {piece}" for piece in found)
+    return ", ".join(f"{units.thousands(int(n))} {name}" for name, n in zip(names, counts, strict=True))
+
+
+def _forces(result: Result) -> dict[str, Any] | None:
+    """The forces on the body by place and in all, by component; None where the summary has none."""
+    found: Mapping[str, list[float]] = result.summary.get("resultants") or {}
+    if not found:
+        return None
+    places = {**found, "in all": [sum(component) for component in zip(*found.values(), strict=True)]}
+    dimension, largest = len(places["in all"]), max(abs(v) for force in places.values() for v in force)
+    unit = units.unit_for(largest, "N" if dimension == 3 else "N/m")
+    rows = {name: [unit.number(unless_noise(v, largest)) for v in force] for name, force in places.items()}
+    return {"axes": [f"{axis}, {unit.name}" for axis in "xyz"[:dimension]], "rows": rows}
+
+
+def _reproduce(result: Result) -> dict[str, Any]:
+    """The command that gave the result, the one that gives it again, the scene, and the files that this names.
+
+    Files are said by their names alone, since a reader has other folders.
+    """
+    summary, text = result.summary, (result.folder / "scene.toml").read_text(encoding="utf-8")
+    mesh = (result.scene.get("domain") or {}).get("file")
+    files = [str(file) for file in (*([mesh] if mesh else []), *(result.scene.get("plugins") or ()))]
+    for file in files:
+        text = text.replace(f'"{file}"', f'"{PurePath(file).name}"')
+    ranks, petsc = int(summary.get("ranks") or 1), str(summary.get("petsc") or "")
+    again = ["hvi", "run", "scene.toml", "--out", "again"]
+    again += [*(("--np", str(ranks)) if ranks > 1 else ()), *((f"--petsc={petsc}",) if petsc else ())]
+    given = shlex.split(str(summary.get("command") or ""))
+    return {
+        "given": shlex.join(_ABSOLUTE.sub(r"\g<before>\g<name>", word) for word in given),
+        "can": summary.get("command") is not None,
+        "again": shlex.join(again),
+        "scene": text,
+        "download": f"data:application/toml;base64,{base64.b64encode(text.encode()).decode()}",
+        "files": [PurePath(file).name for file in files],
+    }
