@@ -40,7 +40,7 @@ def draw(solution: Solution, picture: str) -> Figure | None:
 
 def _figure(result: Result, wanted: str) -> Figure:
     """Draw on rank 0."""
-    from ..report.pictures.registry import drawings
+    from ..report.pictures.drawings import drawings
 
     known = {drawing.path.stem: drawing for drawing in drawings(result)}
     if wanted not in known:

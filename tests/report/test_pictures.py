@@ -327,10 +327,10 @@ def test_a_process_that_dies_takes_the_picture_with_it_that_it_was_drawing(tmp_p
     write_sides(folder, square(4), **ON)
     code = (
         "import os, signal, sys; from pathlib import Path; from hvi_fenicsx.report import reader\n"
-        "from hvi_fenicsx.report.pictures import __main__, registry\n"
-        "found = list(registry.drawings(reader.read(Path(sys.argv[1]))))\n"
-        "first = registry.Drawing(found[0].path, '', lambda: os.kill(os.getpid(), signal.SIGKILL))\n"
-        "registry.drawings = lambda result: [first, *found[1:]]\n"
+        "from hvi_fenicsx.report.pictures import __main__, drawings\n"
+        "found = list(drawings.drawings(reader.read(Path(sys.argv[1]))))\n"
+        "first = drawings.Drawing(found[0].path, '', lambda: os.kill(os.getpid(), signal.SIGKILL))\n"
+        "drawings.drawings = lambda result: [first, *found[1:]]\n"
         "os.cpu_count = lambda: int(sys.argv[2])\n"
         "print(*__main__.draw_all(Path(sys.argv[1])))\n"
     )

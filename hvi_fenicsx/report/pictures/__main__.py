@@ -26,7 +26,7 @@ from .draw import COMPLAINT, TOLD, WHEN_TOLD
 from .xserver import x_server
 
 if TYPE_CHECKING:
-    from .registry import Drawing
+    from .drawings import Drawing
 
 Running = tuple["Drawing", BaseProcess, Connection]
 """A drawing, the process that makes it, and what this says in the end: None, or why it failed."""
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _told(dimension: int) -> bool:
     """Load what draws, and wait; whether there is something to draw."""
-    from . import bodies, contact  # noqa: F401 (loads matplotlib)
+    from . import drawings  # noqa: F401 (loads matplotlib)
 
     if dimension == 3:
         with contextlib.suppress(ModuleNotFoundError):  # each picture will say what it lacks
@@ -83,7 +83,7 @@ def draw_all(folder: Path) -> list[HviError]:
         ResultError: the folder is damaged.
         PictureError: there is nothing to draw.
     """
-    from .registry import drawings_of  # loads the plotting library
+    from .drawings import drawings_of  # loads the plotting library
 
     found = drawings_of(folder)
     with x_server(wanted=any(drawing.rendered for drawing in found)):
