@@ -130,7 +130,7 @@ def test_an_accuracy_of_the_users_quantity_is_kept(files: Path) -> None:
 def test_a_misspelt_quantity_is_told_with_the_users_own(files: Path) -> None:
     done = process("run", "pressed.toml", "--accuracy", "0.1", "--quantity", "werk", "--out", "x", cwd=files)
     assert done.returncode == 2
-    assert "--quantity: unknown name 'werk' (did you mean 'work'?); allowed: energy, u_t," in done.stderr
+    assert "--quantity: unknown name 'werk' (did you mean 'work'?); allowed: " in done.stderr
     assert not (files / "x").exists()
 
 
