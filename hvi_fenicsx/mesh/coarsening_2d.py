@@ -35,7 +35,7 @@ def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> 
     comm, sides, regions = domain.mesh.comm, sorted(domain.sides), sorted(domain.regions)
     parts = comm.gather(_half_edges(domain, sides, regions))
     with gmsh_model.session(comm) as gmsh:
-        names = on_root(comm, lambda: _mesh(gmsh, _thinned(parts, factor, thresholds), sides, regions))
+        names = on_root(comm, lambda: _mesh(gmsh, _outline(parts, factor, thresholds), sides, regions))
         if names is None:
             return None
         mesh, found, within = gmsh_model.distribute(comm, gmsh and gmsh_arrays.extract(gmsh, 2), 2, names)
@@ -72,7 +72,7 @@ def _numbered(named: Mapping[str, Entities], names: Sequence[str], size: int) ->
     return numbers
 
 
-def _thinned(parts: Sequence[HalfEdges] | None, factor: float, thresholds: Thresholds) -> ThinnedOutline | None:
+def _outline(parts: Sequence[HalfEdges] | None, factor: float, thresholds: Thresholds) -> ThinnedOutline | None:
     return thinned_outline.trace(HalfEdges.joined(parts or []), factor, thresholds)
 
 
