@@ -15,10 +15,9 @@ from ..model import Model
 from ..runtime import memory
 from ..runtime.mpi import largest
 from . import adaptive, quantities
-from .adaptive import AdaptiveLevel, AdaptiveSolver
+from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, ControlThresholds
 from .error_balance import Elements, ErrorBalance
 from .goal import AccuracyResult, AdaptiveStep, DegreeChoice, Goal
-from .thresholds import CONTROL, ControlThresholds
 
 _LARGEST = 2**31 - 1
 """Unknowns that PETSc's default integers can number."""

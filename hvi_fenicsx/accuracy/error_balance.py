@@ -10,9 +10,9 @@ import numpy as np
 
 from ..model import Model
 from ..runtime import memory
+from .adaptive import CONTROL, ControlThresholds
 from .goal import AdaptiveStep
 from .quantity_base import Quantity
-from .thresholds import CONTROL, ControlThresholds
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,12 +19,11 @@ from scenes import STEEL, model, quadratic_linear
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, quantities
-from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
+from hvi_fenicsx.accuracy.adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.error_balance import Elements, ErrorBalance
 from hvi_fenicsx.accuracy.goal import AccuracyResult, AdaptiveStep, Goal
 from hvi_fenicsx.accuracy.quantities import EnergyNorm, FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
-from hvi_fenicsx.accuracy.thresholds import CONTROL
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.runtime import memory
 from hvi_fenicsx.runtime.timing import Timer

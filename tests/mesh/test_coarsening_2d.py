@@ -21,11 +21,11 @@ from runs import RANKS
 from scenes import NESTED
 
 from hvi_fenicsx import Scene, read_scene, workflow
-from hvi_fenicsx.mesh import coarsening_2d, gmsh_file, thinned_outline
+from hvi_fenicsx.mesh import coarsening_2d, gmsh_file
+from hvi_fenicsx.mesh.coarsening_2d import HalfEdges
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.mesh.shapes import HalfDisk, NotchedStrip
-from hvi_fenicsx.mesh.thinned_outline import HalfEdges
 from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.mesh.transfer import InterpolationTransfer
 
@@ -109,7 +109,7 @@ def test_outlines_that_cross_themselves_are_given_up() -> None:
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.4, -0.2], [0.0, 1.0]])
     ends = np.column_stack([np.arange(5), (np.arange(5) + 1) % 5])
     edges = HalfEdges(ends, corners[ends], np.zeros(5, dtype=np.int64), np.zeros(5, dtype=np.int64))
-    assert thinned_outline.trace(edges, 1.0, COARSER) is None
+    assert coarsening_2d.trace(edges, 1.0, COARSER) is None
 
 
 def test_a_coarse_mesh_of_another_area_is_given_up() -> None:

@@ -86,12 +86,12 @@ def test_a_shape_with_a_mesh_of_its_own_is_solved_on_and_refined(wedge: type[Dom
 def test_sides_and_regions_of_a_users_shape_are_checked(wedge: type[DomainShape]) -> None:
     table = on_wedge()
     table["material"]["b"]["region"] = "easst"
-    with pytest.raises(ValidationError, match='unknown region "easst"; did you mean "east"') as caught:
+    with pytest.raises(InputError, match='unknown region "easst"; did you mean "east"') as caught:
         Scene.model_validate(table)
     assert "(a wedge)" in str(caught.value)
     table = on_wedge()
     table["boundary"]["floor"]["on"] = "floor"
-    with pytest.raises(ValidationError, match='unknown side "floor"; allowed: bottom, left, right, top'):
+    with pytest.raises(InputError, match='unknown side "floor"; allowed: bottom, left, right, top'):
         Scene.model_validate(table)
 
 

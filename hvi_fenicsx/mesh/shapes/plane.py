@@ -62,10 +62,10 @@ class PlaneShape(DomainShape):
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh that gmsh makes on rank 0. Collective."""
-        from .. import domain, gmsh_model
+        from .. import domain, gmsh_file
 
         domain.check_affordable(comm, self.unknowns(2), 2, "domain.mesh_size", "make it larger")
-        return gmsh_model.build(comm, self.outline(), self.mesh_size)
+        return gmsh_file.build(comm, self.outline(), self.mesh_size)
 
     def coarsest(self) -> Self:
         """The shape with its mesh size doubled as long as the cells stay small beside its extent."""
