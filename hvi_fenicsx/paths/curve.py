@@ -46,7 +46,7 @@ class Curve(Events):
     ) -> None:
         super().__init__(constant, rate, points, z, factor)
         self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, self.limits.standing
-        self._next = self.length
+        self._next, self._crossed = self.length, False
         self.disagreement: Callable[[Arc], float] = lambda move: 0.0
         self._size = self._extent()
 
@@ -177,13 +177,15 @@ class Curve(Events):
     @override
     def set_out(self, sign: float, check: Callable[[], None]) -> None:
         self.head_with_load(sign)
-        if Crossing(self, check).run():
-            self._settle_at_factor()
+        self._crossed = bool(Crossing(self, check).run())
 
     @override
     def watch_folds(self) -> None:
-        rate = self.rising
-        self.trend = int(np.sign(rate)) if rate else self.trend
+        self.trend = int(np.sign(self.rising)) or self.trend
+        if self._crossed:
+            self._crossed = False
+            self._settle_at_factor()
+            self.trend = int(np.sign(self.rising)) or self.trend
 
     @override
     def pass_on(self, move: Move, check: Callable[[], None]) -> list[Passage]:

@@ -100,8 +100,8 @@ class Jump(ABC):
     def _to_its_end(self, branch: Branch, most: int) -> Landing | None:
         none, standing, x = self._none(branch), 0, self._x
         for move in advancing(branch, 0.0, self._step, most):
-            standing = standing + 1 if np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0) else 0
-            x = branch.values.x
+            stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
+            standing, x = standing + 1 if stands else 0, branch.values.x
             anywhere = move.outcome is Outcome.AWAY and abs(branch.factor) <= none
             if move.outcome is Outcome.FACTOR or anywhere:
                 stable = self._points.unstable_directions(branch.values) == 0
