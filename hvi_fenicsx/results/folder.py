@@ -107,7 +107,9 @@ class ResultFolder:
     def _refuse_torn(self) -> None:
         """VTK's writers do not say that a disk was full."""
         for file in sorted(self.work.iterdir()):
-            if not _is_whole(file):
+            if file.name.startswith(".") and file.is_file():  # of a picture that was not drawn in time
+                file.unlink()
+            elif not _is_whole(file):
                 raise InputError(f"--out {self.target}: {file.name} could not be written whole; is the disk full?")
 
     def discard(self) -> None:
