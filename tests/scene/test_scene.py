@@ -149,7 +149,7 @@ REFUSED = {
         '"rectangle"',
         '"rectangel"',
         's.toml:3: domain.shape: unknown shape "rectangel"; did you mean "rectangle"? allowed: rectangle, box, '
-        "l_shape, disk, half_disk, notched_strip, file",
+        "disk, half_disk, l_shape, notched_strip, file",
     ),
     "not a table": ("{ gap = 0.0 }", "0.0", "s.toml:18: boundary.floor.contact: must be a table (is 0.0)"),
     "list wanted": (
