@@ -240,7 +240,12 @@ class Effect(BaseModel):
 
     @classmethod
     def refused(cls, text: str, where: Names | None) -> InputError:
-        """The refusal of an effect in a program: a line for each that is wrong, with the effect and its place."""
+        """The refusal of an effect in a program: a line for each that is wrong, with the effect and its place.
+
+        Args:
+            text: what is wrong.
+            where: the place.
+        """
         lines = text.replace('write "free"', "write None").splitlines()
         return InputError("\n".join(f"{cls.__name__} on {in_words(where)}: {line}" for line in lines))
 
