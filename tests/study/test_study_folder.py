@@ -204,13 +204,15 @@ def test_a_scene_without_a_solution_ends_a_study(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_a_point_that_takes_too_long_is_given_up_and_run_again_with_a_longer_limit(tmp_path: Path) -> None:
-    """The reference is never given up."""
-    file = write_scene(tmp_path / "square.toml", model(2, friction=LAW))
-    words = ("study", file, "--axis", "mesh=2", "--out", tmp_path / "out", "--repeat", 1)
+    """At its next Newton step: what one step solves is there all the same. The reference is never given up."""
+    file = write_scene(tmp_path / "square.toml", model(8, 3e6, friction=quadratic_linear(1e6)))
+    words = ("study", file, "--axis", "epsilon=0.01", "--out", tmp_path / "out", "--repeat", 1)
     assert hvi(*words, "--limit", 1e-9).returncode == 0
     told = data(tmp_path / "out")
     assert told["reference"]["converged"]
-    assert all(p["reason"].startswith("not finished after 1e-09 s; --limit") for p in told["points"])
+    given_up = [p["reason"] for p in told["points"] if not p["converged"]]
+    assert given_up
+    assert all(reason.startswith("not finished after 1e-09 s; --limit") for reason in given_up)
     assert hvi(*words, "--resume").returncode == 0
     assert all(p["converged"] for p in data(tmp_path / "out")["points"])
 
