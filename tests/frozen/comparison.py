@@ -24,7 +24,17 @@ def differences(old: Any, new: Any, tolerance: float, *, searched: bool = False)
     if searched:
         missing = [p for p in old["points"] if not any(_same_point(p, q, tolerance) for q in new.get("points", ()))]
         return [f"not found any more: {energy:.12g} ({kind})" for energy, kind in missing]
-    return list(_differences("", old, new, tolerance))
+    return list(_differences("", _of_all_parts(old), _of_all_parts(new), tolerance))
+
+
+def _of_all_parts(record: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Displacements and tractions of all parts in one list: those of a glued part may be rounding beside others."""
+    parts = record.get("columns")
+    if not isinstance(parts, Mapping) or not parts:  # a path's are names
+        return record
+    kinds = {kind: [part[kind] for part in parts.values()] for kind in next(iter(parts.values()))}
+    kinds["displacements"].append(record["max_gap"] or 0.0)
+    return {**record, "columns": {"parts": list(parts), **kinds}, "max_gap": None}
 
 
 def _same_point(old: Sequence[Any], new: Sequence[Any], tolerance: float) -> bool:
