@@ -20,15 +20,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LIMITS = {
-    "lines of code": 41000,
-    "tokens": 476000,
-    "files": 465,
-    "lines of the largest room": 4250,
+    "lines of code": 39000,
+    "tokens": 456000,
+    "files": 395,
+    "lines of the largest room": 3850,
     "flat modules": 12,
-    "tuning numbers": 450,
-    "class names used twice": 38,
+    "tuning numbers": 390,
+    "class names used twice": 28,
     "lines of the longest function": 46,
-    "floors": 16,
+    "floors": 17,
     "lines of tests": 28800,
     "lines of benchmarks": 2600,
 }
