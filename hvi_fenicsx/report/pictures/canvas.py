@@ -144,7 +144,8 @@ class Canvas:
             bar, spread = area(self.fig, 0.42 + 3.75 * place, foot - 0.68, 3.2, 0.2), scale.high > scale.low
             mappable = ScalarMappable(Normalize(scale.low, scale.high if spread else scale.low + 1.0), scale.colours)
             ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]) if spread else FixedLocator([scale.low])
-            self.fig.colorbar(mappable, cax=bar, orientation="horizontal", ticks=ticks).outline.set_visible(False)
+            self.fig.colorbar(mappable, cax=bar, orientation="horizontal", ticks=ticks)
+            bar.spines[:].set_visible(False)
             bar.set_title(scale.words, loc="left", size=12.5)
             bar.set_xlabel(scale.remark, loc="left", labelpad=7, size=12.5, weight="bold", color=GREY)
         for line, (words, colour) in enumerate(self.remarks):
@@ -173,11 +174,11 @@ class Canvas:
             text = self._written(label)
             text.get_window_extent()  # which puts it in its place
             box = Text.get_window_extent(text)  # without the line that leads to it
-            places = _places(label, box.size * 36 / self.fig.dpi)
+            places = _places(label, np.array(box.size) * 36 / self.fig.dpi)
             boxes = [box.translated(*(place * self.fig.dpi / 72)) for place in places]
             costs = [_cost(one, taken, vertices, self.fig.bbox) for one in boxes]
             best = costs.index(min(costs))
-            text.xyann = tuple(map(float, places[best]))
+            text.xyann = (float(places[best][0]), float(places[best][1]))
             assert text.arrow_patch is not None
             text.arrow_patch.set_visible(float(np.abs(places[best] - places[0]).max()) > 0.0)
             taken.append(boxes[best])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -160,8 +161,8 @@ def _worth_seeing(part: ContactPart) -> ContactPart:
 
 def _panel(axes: Axes, result: Result, part: ContactPart, field: Field, length: Unit) -> None:
     """A curve, with what the laws say of it."""
-    s, values = part["s"] / length.size, np.asarray(field.values / field.unit.size)
-    marker = {"marker": "o" if len(s) <= MARKED else "", "ms": 4.5 if len(s) <= MARKED // 2 else 3.0}
+    s, values = np.asarray(part["s"] / length.size, dtype=np.float64), np.asarray(field.values / field.unit.size)
+    marker: dict[str, Any] = {"marker": "o" if len(s) <= MARKED else "", "ms": 4.5 if len(s) <= MARKED // 2 else 3.0}
     axes.plot(s, values, color=field.colour, **marker)
     note = ""
     if field.kind == "friction":
@@ -185,7 +186,7 @@ def _panel(axes: Axes, result: Result, part: ContactPart, field: Field, length: 
     axes.set_axisbelow(True)
 
 
-_DASHED = {"color": INK, "ls": (0, (4, 3)), "lw": 1.4, "zorder": 4}
+_DASHED: dict[str, Any] = {"color": INK, "ls": (0, (4, 3)), "lw": 1.4, "zorder": 4}
 
 
 def _dropping(axes: Axes, s: Array, field: Field) -> str:
@@ -278,7 +279,8 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
         axes.tripcolor(grey, np.zeros(len(flat.rows)), cmap="gray", vmin=-1, vmax=1, alpha=0.45, antialiased=False)
     box = axes.get_position()
     bar = fig.add_axes((box.x1 + 0.02, box.y0, 0.02, box.height))
-    fig.colorbar(drawn, cax=bar, ticks=None if high > 0.0 else [0.0]).outline.set_visible(False)
+    fig.colorbar(drawn, cax=bar, ticks=None if high > 0.0 else [0.0])
+    bar.spines[:].set_visible(False)
     axes.set_title(f"{field.words} in {field.unit.name}", loc="left", size=14, parse_math=True)
     if field.kind != "pressure":
         _arrows(axes, flat, part, field.kind)

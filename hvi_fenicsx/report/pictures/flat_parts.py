@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from matplotlib.tri import Triangulation
 
-from ...typing import Array, Integers
+from ...typing import Array, Integers, Mask
 from ..body_mesh import BodyMesh
 from ..units import Unit, unit_for
 from .shape import PartGeometry
@@ -45,7 +45,7 @@ class FlatPart:
     @cached_property
     def triangulation(self) -> Triangulation:
         """The facets as matplotlib's."""
-        return Triangulation(*self.points.T, self.facets)
+        return Triangulation(self.points[:, 0], self.points[:, 1], self.facets)
 
     def along(self, vectors: Array) -> Array:
         """The components of vectors (m, 3) along the coordinates, (m, 2)."""
@@ -75,7 +75,7 @@ def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
     )
 
 
-def _unrolled(points: Array, triangles: Integers, normals: Array, touches: Array) -> FlatPart:
+def _unrolled(points: Array, triangles: Integers, normals: Array, touches: Mask) -> FlatPart:
     """Angle times mean radius, and the way along the axis that the normals are most across; cut opposite to contact."""
     axis = np.linalg.eigh(normals.T @ normals)[1][:, 0]
     largest = int(np.argmax(np.abs(axis)))

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Polygon
 from matplotlib.path import Path as DrawnPath
 from matplotlib.patheffects import Normal, TickedStroke, withStroke
+from matplotlib.tri import Triangulation
 
 from ...geometry import chains
 from ...typing import Array, Integers
@@ -31,7 +32,7 @@ LEGIBLE = 5000
 NOTHING = 1e-6
 """So small a part of the largest stress, or of the body's size, is none."""
 _HALO = [withStroke(linewidth=3.2, foreground="white")]
-_ALONG = {"clip_on": False, "solid_capstyle": "butt"}
+_ALONG: dict[str, Any] = {"clip_on": False, "solid_capstyle": "butt"}
 
 
 class PlaneCanvas(Canvas):
@@ -55,7 +56,7 @@ class PlaneCanvas(Canvas):
             (points[cells].reshape(-1, 2), np.arange(cells.size).reshape(-1, 3)) if by_cell else (points, cells)
         )
         at = np.repeat(values, 3) if by_cell else values  # vertices of its own for each cell
-        self.axes.tripcolor(*corners.T, triangles, at, shading="gouraud", **look)
+        self.axes.tripcolor(Triangulation(corners[:, 0], corners[:, 1], triangles), at, shading="gouraud", **look)
         if len(cells) * shape.body.size**2 <= LEGIBLE * shape.body.volumes.sum():
             self.axes.triplot(*points.T, cells, color="white", lw=0.6, alpha=0.5, zorder=2)
         dashed: dict[str, Any] = {"ls": (0, (5, 4)), "lw": 1.3}
@@ -107,7 +108,7 @@ class PlaneCanvas(Canvas):
                     fc="white", ec=INK, lw=1.2, clip_on=False, zorder=5,
                 )  # fmt: skip
                 self.axes.add_collection(rollers)
-                free = {"marker": "o", "mfc": "white", "ms": 7, "label": "support, free to slide"}
+                free: dict[str, Any] = {"marker": "o", "mfc": "white", "ms": 7, "label": "support, free to slide"}
                 self.key(Line2D([], [], color=INK, lw=2.2, **free))
             else:
                 self.key(Patch(fc="white", ec=GREY, hatch="/////", lw=0.0, label="support"))
