@@ -58,7 +58,9 @@ class CurvedPolygons(Overlaps):
         at = curved_shapes.places(self.own[each], flat.on_first)
         part = np.outer(triangle_clipping.twice_areas(self.on_first[chosen][:, :, 1:]), shares / 2).ravel()
         size = np.linalg.norm(curved_shapes.across(curved_shapes.slopes(self.nodes[each], flat.on_first)), axis=1)
-        return replace(flat, weights=np.abs(part) * size, on_second=_where(self.others[each], at, flat.on_second))
+        return replace(
+            flat, weights=np.abs(part) * size, on_second=_local_coordinates(self.others[each], at, flat.on_second)
+        )
 
 
 def in_space(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> CurvedPolygons:
@@ -154,7 +156,7 @@ def _outlines(first: Facets, second: Facets, pairs: _Pairs, pair: Integers, of_s
     each = np.repeat(pair, 3)
     at = curved_shapes.places(pairs.local[each], of_second.reshape(-1, 3))
     straight = np.column_stack([1.0 - at.sum(axis=1), at])
-    found = _where(pairs.own[pairs.number[each]], at, straight).reshape(-1, 3, 3)
+    found = _local_coordinates(pairs.own[pairs.number[each]], at, straight).reshape(-1, 3, 3)
     both = _on_rim(second, pairs.other[pair], of_second)[:, :, None] & _rim_edges(first)[pairs.number[pair]][:, None]
     found[both & (np.abs(found) < rim)] = 0.0
     return np.asarray(found[:, :, 1:] / found.sum(axis=2, keepdims=True))
@@ -175,7 +177,7 @@ def _on_rim(side: Facets, facets: Integers, places: Array) -> Mask:
     return np.asarray(np.any(alone[facets][:, None] & on_edge | corners[facets][:, None] & at_corner, axis=2))
 
 
-def _where(nodes: Array, at: Array, start: Array) -> Array:
+def _local_coordinates(nodes: Array, at: Array, start: Array) -> Array:
     """The barycentric coordinates of places (p, 2) in curved facets (p, 6, 2), or the start where there are none."""
     found, open_ = start.copy(), np.arange(len(start))
     for _ in range(_STEPS):
