@@ -71,7 +71,7 @@ def clip(outlines: Array, number: Integers, distance: Array, count: int, thresho
         thresholds: what is rounding.
     """
     over = np.flatnonzero(np.all((outlines.min(axis=1) < 1.0) & (outlines.max(axis=1) > 0.0), axis=1))
-    pieces = triangle_clipping.clip(outlines[over])
+    pieces = triangle_clipping.clip_triangles(outlines[over])
     solid = pieces.areas > thresholds.rounding
     pieces, outline = pieces.chosen(solid), over[solid]
     near = _nearest(pieces, number[outline], distance[outline], thresholds)

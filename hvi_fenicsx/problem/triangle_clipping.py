@@ -73,7 +73,7 @@ class Polygons:
         return polygon, np.abs(np.arctan2(cross, np.sum(one * other, axis=1)))
 
 
-def clip(triangles: Array) -> Polygons:
+def clip_triangles(triangles: Array) -> Polygons:
     """What triangles have in common with that of :data:`CORNERS`.
 
     Args:
@@ -124,7 +124,7 @@ def common_area(triangles: Array, others: Array) -> float:
     """
     sides = others[:, 1:] - others[:, :1]
     local = (triangles[None] - others[:, None, :1]) @ np.linalg.inv(sides)[:, None]
-    common = clip(local.reshape(-1, 3, 2)).areas.reshape(len(others), len(triangles))
+    common = clip_triangles(local.reshape(-1, 3, 2)).areas.reshape(len(others), len(triangles))
     return float(np.sum(common.sum(axis=1) * np.abs(np.linalg.det(sides))))
 
 
