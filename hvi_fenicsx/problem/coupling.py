@@ -76,10 +76,10 @@ def of(space: fem.FunctionSpace, interfaces: Sequence[Interface]) -> Coupling | 
         over = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale != 0.0)
         inverse = inverse + rest + own - unit
         forward = forward - diags_array(over, offsets=0) @ (rest - unit) - unit
-    return Coupling(space, _matrix(space, forward), _matrix(space, inverse))
+    return Coupling(space, _petsc_matrix(space, forward), _matrix(space, inverse))
 
 
-def _matrix(space: fem.FunctionSpace, rows: csr_array) -> PETSc.Mat:
+def _petsc_matrix(space: fem.FunctionSpace, rows: csr_array) -> PETSc.Mat:
     """A matrix over vertices as one over their vectors, component by component. Collective."""
     d, index_map = space.dofmap.index_map_bs, space.dofmap.index_map
     whole = csr_array(kron(csr_array(rows), np.eye(d), format="csr"))

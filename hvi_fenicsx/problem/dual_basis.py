@@ -58,8 +58,8 @@ def relative_rows(first: Facets, second: Facets, overlaps: Overlaps, kept: Mask,
     weights = np.bincount(rows.ravel(), weights=values.ravel(), minlength=size).astype(np.float64)
     return RelativeRows(
         weights=weights,
-        first=_matrix(rows, rows, values, functions, size),
-        second=_matrix(rows, second.nodes[points.second], values, second.functions(points.on_second), size),
+        first=_sums(rows, rows, values, functions, size),
+        second=_sums(rows, second.nodes[points.second], values, second.functions(points.on_second), size),
     )
 
 
@@ -82,7 +82,7 @@ def adopted(first: Facets, overlaps: Overlaps, kept: Mask) -> dict[int, int]:
     return found
 
 
-def _matrix(rows: Integers, columns: Integers, values: Array, functions: Array, size: int) -> csr_array:
+def _sums(rows: Integers, columns: Integers, values: Array, functions: Array, size: int) -> csr_array:
     """Sums of values (p, n) times functions (p, n) at rows and columns."""
     shape = (*values.shape, functions.shape[1])
     entries = np.einsum("pi,pk->pik", values, functions)

@@ -15,7 +15,7 @@ from dolfinx import fem
 from ...problem.contact_surface import Surface
 from ...problem.problem import Problem
 from ...typing import Array, Integers
-from . import tangent_alignment
+from .tangent_alignment import rotations, rotations_between, turned, turned_back
 from .block_forces import BlockForces, summed
 from .interface_points import InterfacePoints, SideBubbles
 
@@ -37,8 +37,8 @@ class InterfaceTrace:
         self._problem, self._points = problem, points
         self._surface, self._directions, self.weights = surface, directions, points.weights
         own = points.spread.of_carriers(directions)
-        self._rotations = tangent_alignment.rotations(own, points.spread.reference)
-        self._vectors = self._turned(tangent_alignment.turned(self._rotations, own))
+        self._rotations = rotations(own, points.spread.reference)
+        self._vectors = self._turned(turned(self._rotations, own))
 
     def _turned(self, own: Array) -> Array:
         """Directions of carriers (facets, n, k, d) at the points, (f, q, k, d). Collective.
@@ -52,8 +52,8 @@ class InterfaceTrace:
         spread = self._points.spread
         at_carriers = spread.of_carriers(self._surface.normals)
         one = at_carriers[np.arange(len(own)), spread.reference]
-        alike = own @ tangent_alignment.between(np.broadcast_to(one[:, None], at_carriers.shape), at_carriers)
-        back = tangent_alignment.between(normals, np.broadcast_to(one[facets, None], normals.shape))
+        alike = own @ rotations_between(np.broadcast_to(one[:, None], at_carriers.shape), at_carriers)
+        back = rotations_between(normals, np.broadcast_to(one[facets, None], normals.shape))
         return np.asarray(self._on_facets(self._points.functions, alike) @ back)
 
     def interpolated(self, values: Array) -> Array:
@@ -96,7 +96,7 @@ class InterfaceTrace:
     def _components(self, functions: Array, values: Array) -> Array:
         """Sums of functions (f, q, n) times components at the owned nodes (m, k). Collective."""
         spread = self._points.spread
-        return self._on_facets(functions, tangent_alignment.turned(self._rotations, spread.of_carriers(values)))
+        return self._on_facets(functions, turned(self._rotations, spread.of_carriers(values)))
 
     def _on_facets(self, functions: Array, values: Array) -> Array:
         """Sums of functions (f, q, n) times values of carriers (facets, n, k, ...)."""
@@ -125,7 +125,7 @@ class InterfaceTrace:
         found = self._summed(np.einsum("fqk,fqkd->fqd", scaled, self._vectors), 1)
         on_facets = np.zeros(self._rotations.shape[:3])
         np.add.at(on_facets, self._points.facets[0], np.einsum("fqk,fqn->fnk", scaled, self._points.functions))
-        carried = self._points.spread.summed(tangent_alignment.turned_back(self._rotations, on_facets))
+        carried = self._points.spread.summed(turned_back(self._rotations, on_facets))
         at_nodes = np.einsum("mk,mkd->md", carried, self._directions)
         return found, summed([(self._surface.blocks, at_nodes)], at_nodes.shape[1])
 

@@ -61,7 +61,7 @@ def frames(surface: Surface) -> Array:
     return np.concatenate([surface.normals[:, None], surface.tangents], axis=1)
 
 
-def between(one: Array, other: Array) -> Array:
+def rotations_between(one: Array, other: Array) -> Array:
     """The rotations that take unit vectors to others the shortest way, (..., d, d); these must not be opposite.
 
     Args:
