@@ -129,7 +129,7 @@ def examine(
     entries = deviations.measured(known, u, forces, states)
     passed, rounding = _within(entries, tolerance), None
     if not passed and _within(entries, thresholds.largest_rounding):
-        shuffled = deviations.rounding(known, u, forces, states)
+        shuffled = deviations.rounding_errors(known, u, forces, states)
         floors = {name: thresholds.rounding_safety * moved for name, moved in shuffled.items()}
         beyond = {name: np.where(values <= floors[name], 0.0, values) for name, values in entries.items()}
         passed, rounding = _within(beyond, tolerance), float(np.max(list(floors.values())))

@@ -37,7 +37,7 @@ def measured(
     }
 
 
-def rounding(
+def rounding_errors(
     references: References, u: fem.Function, forces: Forces, states: Sequence[ContactState]
 ) -> dict[str, Array]:
     """By how much the entries of :func:`measured` change when the last digits of u are shuffled, by body. Collective.

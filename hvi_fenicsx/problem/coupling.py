@@ -76,7 +76,7 @@ def of(space: fem.FunctionSpace, interfaces: Sequence[Interface]) -> Coupling | 
         over = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale != 0.0)
         inverse = inverse + rest + own - unit
         forward = forward - diags_array(over, offsets=0) @ (rest - unit) - unit
-    return Coupling(space, _petsc_matrix(space, forward), _matrix(space, inverse))
+    return Coupling(space, _petsc_matrix(space, forward), _petsc_matrix(space, inverse))
 
 
 def _petsc_matrix(space: fem.FunctionSpace, rows: csr_array) -> PETSc.Mat:

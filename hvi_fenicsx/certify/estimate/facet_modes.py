@@ -81,5 +81,5 @@ def facet_modes(
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
     material = stiffness_tensor(problem.bulk, at.facets.cells)
     size = (math.factorial(d - 1) * at.facets.areas) ** (1 / (d - 1))  # in space, a leg of a right triangle
-    compliance = size[:, None] / math.pi * half_space.compliance(material, at.corners)
+    compliance = size[:, None] / math.pi * half_space.surface_compliance(material, at.corners)
     return FacetModes(at.facets, at.nodes, at.barycentric, at.weights, values, degrees, compliance)

@@ -19,7 +19,7 @@ _DIRECTIONS = 4
 """Directions of the waves on a surface in space, over which the compliance is averaged."""
 
 
-def compliance(stiffness: Array, corners: Array) -> Array:
+def surface_compliance(stiffness: Array, corners: Array) -> Array:
     """Diagonal of L⁻¹, surface displacement by traction for k = 1, along each axis, (f, d).
 
     Args:
