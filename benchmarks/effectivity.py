@@ -23,7 +23,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import Scene, read_scene
 from hvi_fenicsx.certify.certificate import examine
-from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
+from hvi_fenicsx.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.mesh import nodes, refinement
 from hvi_fenicsx.problem.spaces import displacement_space
 from hvi_fenicsx.runtime.timing import Timer

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from .certify.certificate import Examination
-from .certify.estimate.estimator import Estimate
+from .estimate.estimator import Estimate
 from .model import PathTable
 from .paths.load_path import LoadPath
 from .problem import effect_summary

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from ..certify.certificate import Examination
 from ..errors import InputError
 from ..problem import spaces
-from ..problem.cell_stress import cell_stress, space_of_stress
 from ..problem.scaling import Scales
+from ..problem.stress import cell_stress, space_of_stress
 from ..report.contact_part import ContactPart
 from ..results import ResultFolder
 from ..results.contact_parts import contact_parts

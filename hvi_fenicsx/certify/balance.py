@@ -5,16 +5,20 @@ Rounding of the stresses excuses no net force: only what rounding makes of the s
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from dolfinx import fem
+from dolfinx import fem, la
 
+from ..mesh import nodes
+from ..problem import spaces
 from ..problem.contact_surface import Surface
-from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..problem.references import References
+from ..problem.vectors import NodalForces
+from ..runtime.mpi import largest
 from ..system import net_forces as rigid_balance
 from ..system.free_motions import SupportedBody
 from ..system.net_forces import ActingForces, Holder
@@ -163,3 +167,42 @@ def _pressures(state: ContactState) -> tuple[Array, Array]:
 def allowed_pressure(state: ContactState) -> Array:
     """The part of σ_n on its bounds that contact may carry, (m,)."""
     return np.clip(state.contact_pressure, *_pressures(state))
+
+
+_STEPS = 12
+"""Steps of the lattice of points on a facet's edges."""
+
+
+def largest_penetration(problem: Problem, states: Sequence[ContactState]) -> float | None:
+    """The largest penetration anywhere on Γc, nondimensional, at least 0; None at degree 1. Collective.
+
+    Args:
+        problem: what was solved.
+        states: of its parts.
+    """
+    if nodes.degree(problem.space) == 1:
+        return None
+    found = 0.0
+    for state in states:
+        if state.bounds is not None:
+            for beyond in (state.normal - state.bounds.upper, state.bounds.lower - state.normal):
+                found = max(found, _largest(problem, state, beyond))
+    return largest(problem.domain.mesh.comm, found)
+
+
+def _largest(problem: Problem, state: ContactState, beyond: Array) -> float:
+    """The largest value on this rank's facets of a function with coefficients at a part's nodes, (m,). Collective."""
+    everywhere = la.vector(problem.space.dofmap.index_map)
+    everywhere.array[:] = -np.inf
+    everywhere.array[state.surface.blocks] = beyond
+    everywhere.scatter_forward()
+    local = everywhere.array[nodes.facet_nodes(problem.space, state.surface.facets)]
+    local = local[np.all(np.isfinite(local), axis=1)]
+    return float(np.max(local @ _functions(problem.space), initial=0.0))
+
+
+def _functions(space: fem.FunctionSpace) -> Array:
+    """The basis functions of a facet on a lattice of points, (nodes, points)."""
+    steps = itertools.product(range(_STEPS + 1), repeat=space.mesh.geometry.dim)
+    lattice = np.array([step for step in steps if sum(step) == _STEPS]) / _STEPS
+    return spaces.simplex_functions(nodes.degree(space), lattice, spaces.edge_share(space)).T

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..problem.law_term import LawTerm
 from ..typing import Array, Mask
-from . import force_attribution, shared_forces
+from . import force_attribution
 from .force_attribution import ForceAttribution
 
 
@@ -103,7 +103,7 @@ def of_term(attribution: ForceAttribution, number: int, term: LawTerm, u: Array,
     argument, near = term.argument(u), term.reach(attribution.near[term.surface.blocks])
     low, high = term.law.interval(argument, near)
     parts, hidden = [], np.zeros(len(argument), dtype=bool)
-    for dofs, sign in shared_forces.components(local):
+    for dofs, sign in force_attribution.components(local):
         share = np.where(sign > 0, attribution.share[dofs], 1.0 - attribution.share[dofs])
         parts.append(low + share * (high - low) + sign * attribution.excess[dofs])
         hidden |= attribution.held[dofs]

@@ -12,9 +12,8 @@ from mpi4py import MPI
 
 from ..effects import Place
 from ..problem.contact_surface import Surface
-from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
-from ..problem.vectors import nodal, nodal_values
+from ..problem.vectors import NodalForces, nodal, nodal_values
 from ..typing import Array, Entities
 from .contact_state import ContactState, Forces
 

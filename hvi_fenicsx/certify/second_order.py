@@ -10,21 +10,26 @@ with them held means none, anything else stays undecided.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..problem.problem import Problem
+from ..laws import Length, Superpotential
+from ..problem.law_term import LawTerm
+from ..problem.problem import Bounds, Problem
 from ..problem.references import References
 from ..runtime.timing import Timer
 from ..solvers.law_models import Cells, VertexModel
+from ..system import local_frames
 from ..system.factorisation import Factorisation, form_of
 from ..system.system import System
-from ..typing import Array, Integers
-from .directional import Growth, growth
+from ..typing import Array, Entities, Integers, Mask
+from . import force_attribution
+from .thresholds import DEFAULT, CertificateThresholds
 
 LOCAL_MINIMISER, NO_MINIMISER, UNDECIDED = "local minimiser", "not a minimiser", "undecided"
 _PREFIX = "inertia_"
@@ -90,3 +95,318 @@ def negative_eigenvalues(system: System) -> Iterator[Callable[[Integers], int | 
 
     yield negative
     form.free()
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Growth and curvature at a displacement, by owned scalar dof in local components, (n,) each.
+
+    Attributes:
+        least: the least growth in the admissible directions of this component, or of those coupled with it.
+        opposite: the least sum of the growths in a direction and in the opposite one: negative on a concave kink.
+        slack: growth up to this size is none.
+        rounding: the opposite growths are none up to this size, since no residual is in them.
+        curvature: of the laws, the least.
+        bent: whether a bound, a support or a kink is here.
+    """
+
+    least: Array
+    opposite: Array
+    slack: Array
+    rounding: Array
+    curvature: Array
+    bent: Mask
+
+    @property
+    def falls(self) -> Mask:
+        """Where the energy falls in an admissible direction."""
+        return self.bent & ((self.least < -self.slack) | (self.opposite < -self.rounding))
+
+    @property
+    def strong(self) -> Mask:
+        """Where it rises in all of them."""
+        return self.bent & (self.least > self.slack)
+
+    @property
+    def weak(self) -> Mask:
+        """Where a bound or a kink leaves the matter to the curvature."""
+        return self.bent & ~self.strong
+
+    @property
+    def softens(self) -> Mask:
+        """Where the curvature of a law is negative and counts."""
+        return (self.curvature < 0.0) & ~self.strong
+
+
+def growth(
+    references: References, u: Array, forces: Array, tolerance: float, thresholds: CertificateThresholds = DEFAULT
+) -> Growth:
+    """The growth at a displacement.
+
+    Args:
+        references: of the problem, whose laws, bounds and supports count.
+        u: nondimensional, a local array.
+        forces: internal forces minus loads at the owned blocks, (blocks, d).
+        tolerance: relative traction up to which a growth is none.
+        thresholds: when a vertex is on a kink or a bound.
+    """
+    problem = references.problem
+    local = local_frames.frames_of(problem)
+    terms, bounds = problem.terms, problem.bounds
+    if local is not None:
+        u, forces = local.local_components(u), local.local_components(forces)
+        terms, bounds = tuple(local.term(t) for t in terms), tuple(local.bounds(b) for b in bounds)
+    near = thresholds.near * references.at(np.arange(len(forces)))
+    found = _Collector(references, u, forces.ravel(), forces.shape[1], near, tolerance, thresholds)
+    for term in terms:
+        (found.enter_vector_law if term.radial else found.enter_law)(term)
+    for one in bounds:
+        found.enter_bounds(one)
+    found.enter_supports(problem.fixed_here)
+    return found.growth()
+
+
+@dataclass
+class _Collector:
+    """The sums over laws, bounds and supports, by scalar dof (n,); couplings by vertex.
+
+    Attributes:
+        references: what tractions are relative to.
+        u: the displacement in local components, a local array.
+        forces: r, (n,).
+        d: the dimension.
+        near: distance from a kink or a bound that counts as being on it, by vertex.
+        tolerance: relative traction up to which a growth is none.
+        thresholds: up to when a jump is rounding.
+        couplings: of the laws of a length.
+    """
+
+    references: References
+    u: Array
+    forces: Array
+    d: int
+    near: Array
+    tolerance: float
+    thresholds: CertificateThresholds
+    couplings: list[CoupledVertices] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        n = len(self.forces)
+        self.up, self.down = self.forces.copy(), -self.forces
+        self.jump, self.slack = np.zeros(n), np.zeros(n)
+        self.curved_up, self.curved_down = np.zeros(n), np.zeros(n)
+        self.bent = np.zeros(n, dtype=bool)
+
+    def enter_law(self, term: LawTerm) -> None:
+        """Enter a law of a signed displacement.
+
+        Args:
+            term: the law, in local components.
+        """
+        (dofs, sign), w = next(force_attribution.components(term)), term.weights
+        near = term.reach(self.near[term.surface.blocks])
+        x = _on_kink(term.law, term.argument(self.u), near)
+        left, right = w * term.law.left(x), w * term.law.right(x)
+        before, after = (w / term.stretch * _second(term.law, x + step) for step in (-2 * near, 2 * near))
+        ahead = sign > 0
+        np.add.at(self.up, dofs, np.where(ahead, right, -left))
+        np.add.at(self.down, dofs, np.where(ahead, -left, right))
+        np.add.at(self.jump, dofs, right - left)
+        np.add.at(self.curved_up, dofs, np.where(ahead, after, before))
+        np.add.at(self.curved_down, dofs, np.where(ahead, before, after))
+        np.add.at(self.slack, dofs, self.tolerance * w * self.references.traction_scale(term))
+        self.bent[dofs] |= np.isin(x, term.law.kinks)
+
+    def enter_vector_law(self, term: LawTerm) -> None:
+        """Enter a law of a length: its force along the vector, the jump of a kink, and the stiffness across it.
+
+        Args:
+            term: the law, in local components.
+        """
+        w, slip, distance = term.weights, term.slip(self.u), self.near[term.surface.blocks]
+        near = term.reach(distance)
+        x = _on_kink(term.law, term.argument(self.u), near)
+        moving = x > near
+        size = np.where(moving, x, 1.0)
+        unit = np.where(moving[:, None], term.gradient(slip), 0.0)
+        left, right = np.where(moving, term.law.left(x), 0.0), term.law.right(x)
+        force = np.einsum("m,mk,mkd->md", w * (left + right) / 2, unit, term.directions)
+        across = np.where(moving, np.minimum(left, right) / size, np.inf)
+        sides = [_second(term.law, x + step) for step in (np.where(moving, -2, 2) * near, 2 * near)]
+        curvature = w / term.stretch * np.minimum(np.minimum(*sides), across)
+        touched = np.any(term.directions != 0.0, axis=1)
+        dofs = term.surface.dofs
+        self.up[dofs] += force
+        self.down[dofs] -= force
+        for side in (self.curved_up, self.curved_down):
+            np.add.at(side, dofs[touched], np.repeat(curvature, self.d).reshape(touched.shape)[touched])
+        slack = self.tolerance * w * self.references.traction_scale(term)
+        np.add.at(self.slack, dofs[touched], np.repeat(slack, self.d).reshape(touched.shape)[touched])
+        on = np.isin(x, term.law.kinks)
+        ahead = np.einsum("mk,mkd->md", unit, term.directions)[:, None]
+        self._couple(term, on & moving, w * (right - left) / 2, ahead, Length.plain(1))
+        counting = term.directions * term.counts(self.u, distance)[:, :, None]
+        self._couple(term, on & ~moving, w * right, counting, term.length or Length.plain(1))
+
+    def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array, length: Length) -> None:
+        self.couplings.append(CoupledVertices(term.surface.blocks[on], factors[on], rows[on], length))
+
+    def enter_bounds(self, bounds: Bounds) -> None:
+        """Directions beyond a reached bound are not admissible.
+
+        Args:
+            bounds: of one part, in local components.
+        """
+        dofs, sign = bounds.component()
+        near = self.near[bounds.surface.blocks]
+        lower, upper = force_attribution.on_bounds(bounds, sign * self.u.ravel()[dofs], near)
+        ahead = sign > 0
+        self.up[dofs[np.where(ahead, upper, lower)]] = np.inf
+        self.down[dofs[np.where(ahead, lower, upper)]] = np.inf
+        np.add.at(self.slack, dofs, self.tolerance * self.references.at(bounds.surface.blocks) * bounds.surface.weights)
+        self.bent[dofs] |= lower | upper
+
+    def enter_supports(self, fixed: Entities) -> None:
+        """Prescribed components do not move.
+
+        Args:
+            fixed: their scalar dofs.
+        """
+        self.up[fixed] = self.down[fixed] = np.inf
+        self.bent[fixed] = True
+
+    def growth(self) -> Growth:
+        """What was collected."""
+        free_up, free_down = np.isfinite(self.up), np.isfinite(self.down)
+        opposite = np.where(free_up & free_down, self.jump, np.inf)
+        least = np.minimum(self.up, self.down)
+        for dofs, lowest, pair in coupled(self.couplings, SideSlopes(self.up, self.down, self.jump), self.d):
+            least[dofs], opposite[dofs], self.bent[dofs] = lowest, pair, True
+        up, down = np.where(free_up, self.curved_up, np.inf), np.where(free_down, self.curved_down, np.inf)
+        rounding = self.thresholds.no_jump / self.tolerance * self.slack
+        return Growth(least, opposite, self.slack, rounding, np.minimum(up, down), self.bent)
+
+
+def _on_kink(law: Superpotential, x: Array, near: Array) -> Array:
+    """Arguments, those near a kink put on it."""
+    if not len(law.kinks):
+        return x
+    nearest = law.kinks[np.argmin(np.abs(x[:, None] - law.kinks), axis=1)]
+    return np.where(np.abs(x - nearest) <= near, nearest, x)
+
+
+def _second(law: Superpotential, x: Array) -> Array:
+    return law.convex.second(x) - law.concave.second(x)
+
+
+_DIRECTIONS = 256
+"""How many directions are tried where components are coupled, beside that of steepest descent."""
+
+
+@dataclass(frozen=True)
+class CoupledVertices:
+    """The terms c δ(B v) of one law of a length at vertices on its kinks.
+
+    Attributes:
+        blocks: the vertices, (m,).
+        factors: c, (m,).
+        rows: B, (m, q, d).
+        length: δ.
+    """
+
+    blocks: Entities
+    factors: Array
+    rows: Array
+    length: Length
+
+
+@dataclass(frozen=True)
+class _Bend:
+    """One term c δ(B v) at one vertex.
+
+    Attributes:
+        factor: c.
+        rows: B, (q, d), or its columns of some components.
+        length: δ.
+    """
+
+    factor: float
+    rows: Array
+    length: Length
+
+    def value(self, v: Array) -> Array:
+        """The term at directions v (p, d), (p,)."""
+        return self.factor * self.length.of(v @ self.rows.T)
+
+
+@dataclass(frozen=True)
+class SideSlopes:
+    """The growth by components, by scalar dof, (n,) each.
+
+    Attributes:
+        up: in the positive direction; infinite where that is not admissible.
+        down: in the negative direction, likewise.
+        jump: the sum of both, of the laws.
+    """
+
+    up: Array
+    down: Array
+    jump: Array
+
+
+def coupled(couplings: Sequence[CoupledVertices], sides: SideSlopes, d: int) -> Iterator[tuple[Integers, float, float]]:
+    """For each vertex with couplings: the components that they touch, their least growth, and that of a pair.
+
+    Args:
+        couplings: the terms.
+        sides: the growth without them.
+        d: the dimension.
+    """
+    at: dict[int, list[_Bend]] = {}
+    for one in couplings:
+        for i, block in enumerate(one.blocks):
+            at.setdefault(int(block), []).append(_Bend(float(one.factors[i]), one.rows[i], one.length))
+    for vertex, bends in at.items():
+        moved = np.flatnonzero(np.any(np.vstack([b.rows for b in bends]) != 0.0, axis=0))
+        dofs = vertex * d + moved
+        here = SideSlopes(sides.up[dofs], sides.down[dofs], sides.jump[dofs])
+        yield dofs, *_least(here, [replace(b, rows=b.rows[:, moved]) for b in bends])
+
+
+def _least(sides: SideSlopes, bends: list[_Bend]) -> tuple[float, float]:
+    """The least growth of coupled components over their admissible directions, and of opposite ones together."""
+    up, down = sides.up, sides.down
+    v = _admissible(np.vstack([_steepest(up, down), _sphere(len(up))]), np.isfinite(up), np.isfinite(down))
+    ahead, behind = (np.sum([b.value(side) for b in bends], axis=0) for side in (v, -v))
+    one_way = np.where(v > 0, np.where(np.isfinite(up), up, 0.0), np.where(np.isfinite(down), down, 0.0))
+    both = np.all((v == 0.0) | (np.isfinite(up) & np.isfinite(down)), axis=1)
+    rises = np.sum(one_way * np.abs(v), axis=1) + ahead
+    pairs = np.abs(v) @ sides.jump + ahead + behind
+    return float(np.min(rises, initial=np.inf)), float(np.min(pairs[both], initial=np.inf))
+
+
+def _steepest(up: Array, down: Array) -> Array:
+    """The direction of steepest descent without the coupling."""
+    with np.errstate(invalid="ignore"):  # both infinite: the next line
+        middle = (down - up) / 2
+    found = np.where(np.isfinite(up) & np.isfinite(down), middle, np.where(np.isfinite(up), -up, down))
+    return np.where(np.isfinite(found), found, 0.0)
+
+
+def _admissible(directions: Array, up: Mask, down: Mask) -> Array:
+    """Unit directions (q, k) without the components that are not admissible; those left empty are left out."""
+    v = np.where(((directions > 0) & ~up) | ((directions < 0) & ~down), 0.0, directions)
+    length = np.linalg.norm(v, axis=1)
+    return np.asarray(v[length > 0.0] / length[length > 0.0, None])
+
+
+def _sphere(k: int) -> Array:
+    """Directions spread over the sphere in k = 1, 2 or 3 dimensions, the axes among them."""
+    axes = np.vstack([np.eye(k), -np.eye(k)])
+    if k == 1:
+        return axes
+    turns = np.arange(_DIRECTIONS) * (np.pi * (3.0 - np.sqrt(5.0)))
+    height = np.zeros(_DIRECTIONS) if k == 2 else 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
+    circle = np.sqrt(1.0 - height**2)
+    spread = np.column_stack([circle * np.cos(turns), circle * np.sin(turns), height])
+    return np.vstack([axes, spread[:, :k]])

@@ -20,10 +20,11 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..certify import balance, certificate, contact_state, correction
+from ..certify import balance, certificate, contact_state
 from ..certify.certificate import Examination
 from ..certify.contact_state import Forces
 from ..certify.thresholds import DEFAULT as THRESHOLDS
+from ..estimate import correction
 from ..paths.distances import Distances, StateOnGraphs
 from ..paths.state import Event, PathState
 from ..problem import references

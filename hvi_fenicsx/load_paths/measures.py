@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from ..effects import Drive, Place
 from ..laws import Superpotential
-from ..problem import part_areas
+from ..problem import references
 from ..problem.problem import Problem
 from ..problem.vectors import new_vector, turn
 from ..reduced import loading
@@ -135,7 +135,7 @@ class Measures:
     def _mean(self, part: str, component: int) -> PETSc.Vec:
         """What multiplies u in the mean of a displacement component over a part."""
         problem = self._system.problem
-        weights, areas = new_vector(problem.space), part_areas.lumped(problem, problem.part_facets[part])
+        weights, areas = new_vector(problem.space), references.lumped(problem, problem.part_facets[part])
         weights.array[component :: problem.scales.dimension] = areas / self._system.comm.allreduce(areas.sum())
         turn(weights, self._system.rotation)
         return weights

@@ -21,7 +21,7 @@ from ..mesh.boundary_part import BoundaryPart, InterfaceSides
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from . import bulk, contact_parts, dirichlet, interfaces, part_facets, part_laws, scaling
+from . import boundary_parts, constraints, elastic_operator, interfaces, part_laws, scaling
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .part_laws import Modification, unchanged
@@ -67,7 +67,7 @@ def compose(domain: Domain, model: Formulation, thresholds: CompositionThreshold
             that excludes a prescribed displacement.
     """
     effects = model.effects
-    facets = part_facets.find(domain, model.parts, effects)
+    facets = boundary_parts.find(domain, model.parts, effects)
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
     context = DomainForms(domain, facets, scales, effects, model.degree)
@@ -141,13 +141,13 @@ def _problem(
 ) -> Problem:
     """All contributions together. Collective."""
     conditions, held, fixed = _conditions(context, scales, contributions, thresholds)
-    prescribed = dirichlet.values(context, conditions)
+    prescribed = constraints.values(context, conditions)
     surfaces, found = _surfaces(context, contributions, fixed, model, thresholds)
     fixed = np.unique(np.concatenate([fixed, *(one.tied for one in found)])).astype(np.int32)
     gaps = {one.name: one.gap for one in found}
-    bounds = contact_parts.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
-    contact_parts.check_bounds(context, bounds, prescribed, fixed, thresholds)
-    contact_parts.check_contradictions(context, scales, bounds, thresholds)
+    bounds = constraints.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
+    constraints.check_bounds(context, bounds, prescribed, fixed, thresholds)
+    constraints.check_contradictions(context, scales, bounds, thresholds)
     part_laws.check_laws(contributions)
     part_laws.check_moved(context.domain.mesh.comm, contributions, surfaces, thresholds)
     terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify, gaps)
@@ -157,7 +157,7 @@ def _problem(
         scales=scales,
         space=context.space,
         points=coefficients_of(context.space, context.points),
-        bulk=bulk.make_bulk(
+        bulk=elastic_operator.make_bulk(
             context.space, scales, contributions, strains, context.domain.shared, model.volumetric_ratio
         ),
         linear={**linear, **strains},
@@ -184,7 +184,7 @@ def _surfaces(
     thresholds: CompositionThresholds,
 ) -> tuple[dict[str, Surface], tuple[interfaces.Interface, ...]]:
     """The parts of Γc by name, those of interfaces too, and the interfaces. Collective."""
-    surfaces = contact_parts.make_surfaces(context, contributions, fixed, model.interfaces, thresholds)
+    surfaces = constraints.make_surfaces(context, contributions, fixed, model.interfaces, thresholds)
     occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
     found = interfaces.find(context, model.interfaces, occupied.astype(np.int32), thresholds)
     return surfaces | {one.name: one.surface for one in found}, found
@@ -195,7 +195,7 @@ def _conditions(
 ) -> tuple[tuple[fem.DirichletBC, ...], tuple[tuple[str, Entities], ...], Entities]:
     """Dirichlet conditions, the dofs of each with its part, and all these dofs. Collective."""
     wanted = [(str(where), c) for where, _, contribution in contributions for c in contribution.conditions]
-    conditions = dirichlet.make_conditions(context, scales, wanted, thresholds)
+    conditions = constraints.make_conditions(context, scales, wanted, thresholds)
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, conditions, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
     return conditions, held, fixed

@@ -5,7 +5,9 @@ Vertex (trapezoidal) quadrature makes every boundary term a sum over these nodes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,8 +17,10 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..geometry import spot, tangents
+from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
-from . import facet_integrals
+from . import facet_overlaps
+from .thresholds import DEFAULT, CompositionThresholds
 from .vectors import nodal
 
 
@@ -109,7 +113,7 @@ def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, b
 
     With the latter a uniform pressure has exactly the forces of its nodal values, whatever the curve.
     """
-    if facet_integrals.is_curved(space):
+    if facet_overlaps.is_curved(space):
         return np.asarray(np.linalg.norm(normal, axis=1))
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * space.mesh.geometry.dim)
     return np.asarray(nodal(ufl.inner(ones, test) * measure)[blocks, 0])
@@ -124,3 +128,178 @@ def component_dofs(blocks: Entities, directions: Array) -> tuple[Integers, Array
     """
     axis = np.argmax(np.abs(directions), axis=1)
     return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A direction that a vertex has already.
+
+    Attributes:
+        name: what brought it.
+        direction: unit vector, (d,).
+        exact: whether it is that of a flat part or a prescribed component.
+        prescribed: whether it is a prescribed component.
+    """
+
+    name: str
+    direction: Array
+    exact: bool
+    prescribed: bool
+
+
+def decide(
+    comm: MPI.Comm,
+    surfaces: Mapping[str, Surface],
+    stated: Mapping[str, Array],
+    fixed: Entities,
+    length: float,
+    thresholds: CompositionThresholds = DEFAULT,
+) -> dict[str, Surface]:
+    """The surfaces with the normals that count. Collective.
+
+    Args:
+        comm: the ranks of the mesh.
+        surfaces: by part, with the normals of the facets.
+        stated: the unit normals that the scene states (those towards an obstacle), by part, (m, d) each.
+        fixed: local scalar dofs that are prescribed.
+        length: of the body, m.
+        thresholds: what is rounding, and by which angles a normal may be turned.
+
+    Raises:
+        InputError: on all ranks alike: two directions at a vertex are neither orthogonal nor equal.
+    """
+    own = {name: _own(s, stated.get(name), length, thresholds.rounding) for name, s in surfaces.items()}
+    flat = {name for name, surface in own.items() if largest_turn(comm, surface) <= thresholds.flat}
+    normals = _at_shared_vertices(comm, own, flat, fixed, thresholds)
+    return {name: replace(s, normals=normals[name], tangents=tangents(normals[name])) for name, s in own.items()}
+
+
+def largest_turn(comm: MPI.Comm, surface: Surface) -> float:
+    """The largest angle (as a chord) between the part's own normal at a vertex and the mean one. Collective.
+
+    Args:
+        comm: the ranks of the mesh.
+        surface: the part.
+    """
+    mean = np.asarray(comm.allreduce(surface.weights @ surface.measured))
+    away = surface.measured - mean / (np.linalg.norm(mean) or 1.0)
+    return largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
+
+
+def _own(surface: Surface, stated: Array | None, length: float, rounding: float) -> Surface:
+    """The surface with its normals as if it were alone, without rounding."""
+    if stated is None:
+        normals = _without_rounding(surface.normals, rounding * _relative_refinement(surface, length))
+    else:
+        normals = _without_rounding(stated, rounding)
+    return replace(surface, normals=normals, measured=normals)
+
+
+def _relative_refinement(surface: Surface, length: float) -> Array:
+    """Size of the coordinates over that of the facets at each vertex, (m, 1): so much larger is rounding of normals."""
+    facet = length * surface.weights ** (1 / (surface.normals.shape[1] - 1))
+    return np.asarray((length + np.linalg.norm(surface.points, axis=1)) / facet)[:, None]
+
+
+def _without_rounding(normals: Array, rounding: Array | float) -> Array:
+    """Unit vectors (m, d), with zero for components up to the size of rounding, a number or (m, 1)."""
+    kept = np.where(np.abs(normals) <= rounding, 0.0, normals)
+    return np.asarray(kept / np.linalg.norm(kept, axis=1, keepdims=True))
+
+
+def _at_shared_vertices(
+    comm: MPI.Comm,
+    surfaces: Mapping[str, Surface],
+    flat: Collection[str],
+    fixed: Entities,
+    thresholds: CompositionThresholds,
+) -> dict[str, Array]:
+    """The normals (m, d) by part, orthogonal or equal to what else a vertex has. Collective."""
+    normals = {name: surface.normals.copy() for name, surface in surfaces.items()}
+    bad: list[str] = []
+    for places, held in _shared(surfaces, fixed):
+        rows = [_Row(f"u_{'xyz'[i]}", e, True, True) for i, e in held]
+        for name, i in sorted(places, key=lambda place: place[0] not in flat):
+            found = _turned(_Row(f"boundary.{name}", normals[name][i], name in flat, False), rows, thresholds)
+            if isinstance(found, str):
+                bad.append(f"boundary.{name}: at the vertex {surfaces[name].spot(i)} {found}")
+                break
+            normals[name][i] = found.direction
+            rows.append(found)
+    _refuse(comm, bad)
+    return normals
+
+
+def _refuse(comm: MPI.Comm, bad: Sequence[str]) -> None:
+    found = [text for rank in agree(comm, list(bad)) for text in rank]
+    if found:
+        raise InputError(found[0])
+
+
+def _shared(
+    surfaces: Mapping[str, Surface], fixed: Entities
+) -> Iterator[tuple[list[tuple[str, int]], list[tuple[int, Array]]]]:
+    """The vertices with a slanted normal and more than one direction: (part, row) of each, and the prescribed axes.
+
+    Vertices at which every component is prescribed have no use for a normal and are left out.
+    """
+    if not surfaces:
+        return
+    d = next(iter(surfaces.values())).normals.shape[1]
+    prescribed = {int(dof) for dof in fixed}
+    places: dict[int, list[tuple[str, int]]] = {}
+    candidates = _candidates(surfaces, fixed)
+    for name, surface in surfaces.items():
+        for i in np.flatnonzero(np.isin(surface.blocks, candidates)):
+            places.setdefault(int(surface.blocks[i]), []).append((name, int(i)))
+    for block, found in places.items():
+        held = [(i, np.eye(d)[i]) for i in range(d) if block * d + i in prescribed]
+        if len(held) < d:
+            yield found, held
+
+
+def _candidates(surfaces: Mapping[str, Surface], fixed: Entities) -> Integers:
+    """The blocks with a slanted normal that lie on several parts, or on one and have a prescribed component."""
+    slanted = [s.blocks[np.count_nonzero(s.normals, axis=1) > 1] for s in surfaces.values()]
+    blocks, counts = np.unique(np.concatenate([s.blocks for s in surfaces.values()]), return_counts=True)
+    d = next(iter(surfaces.values())).normals.shape[1]
+    shared = np.union1d(blocks[counts > 1], np.unique(fixed // d))
+    return np.intersect1d(np.concatenate(slanted), shared)
+
+
+def _turned(normal: _Row, rows: Sequence[_Row], thresholds: CompositionThresholds) -> _Row | str:
+    """The normal, orthogonal or equal to each row; or why not."""
+    rest = normal.direction
+    for row in rows:
+        limit, along = _largest_turn(normal, row, thresholds), float(row.direction @ normal.direction)
+        if math.hypot(*(normal.direction - along * row.direction)) <= limit:
+            return replace(normal, direction=math.copysign(1.0, along) * row.direction)
+        if abs(along) > limit:
+            return _refusal(normal, row, limit)
+        rest = rest - (row.direction @ rest) * row.direction
+    return replace(normal, direction=rest / np.linalg.norm(rest))
+
+
+def _refusal(normal: _Row, row: _Row, limit: float) -> str:
+    """Why two directions cannot stand at one vertex, and what to do."""
+    angle = math.degrees(math.acos(min(abs(float(row.direction @ normal.direction)), 1.0)))
+    remedy = (
+        ""
+        if normal.exact
+        else (
+            ", leave it out of the part (`where`), or state the normal: contact = { obstacle = { point = ..., normal "
+            "= ... } }, of a round obstacle its `direction`"
+        )
+    )
+    return (
+        f"its normal makes an angle of {angle:.6g}° with the direction of {row.name}; they must be orthogonal or "
+        f"equal, here to within {math.degrees(limit):.2g}°. Move the edge of the part, prescribe all components "
+        f"there{remedy}"
+    )
+
+
+def _largest_turn(normal: _Row, row: _Row, thresholds: CompositionThresholds) -> float:
+    """By which angle a normal may be turned to be orthogonal or equal to another direction."""
+    if not normal.exact:
+        return thresholds.uneven
+    return thresholds.turned_to_prescribed if row.prescribed else thresholds.flat

@@ -18,7 +18,7 @@ from ..mesh import curved, nodes
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from . import side_moments
+from . import boundary_parts
 from .scaling import Placed, Scales
 from .spaces import LOAD_DEGREE, displacement_space, pressure_space
 
@@ -103,7 +103,7 @@ class DomainForms:
 
     def side_moments(self, part: str) -> SideMoments:
         """Area, centroid and second moments of a boundary part. Collective."""
-        return side_moments.of(self.space, self.part_facets[part])
+        return boundary_parts.of(self.space, self.part_facets[part])
 
     def boundary(self, part: str, **metadata: Any) -> Any:
         """The measure ds over a part, SI.

@@ -2,21 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 
 from ..errors import InputError
+from ..geometry import spot
 from ..mesh import cell_checks, nodes
 from ..mesh.boundary_part import InterfaceSides
 from ..mesh.facets import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
-from . import curved_overlaps, curved_polygons, facet_overlaps, facet_polygons, spaces
+from . import curved_overlaps, facet_overlaps, facet_polygons, spaces
+from .contact_surface import Surface
 from .domain_forms import DomainForms
-from .facet_integrals import is_curved
-from .facet_overlaps import Facets, Overlaps
+from .facet_overlaps import Facets, Overlaps, is_curved
 from .thresholds import CompositionThresholds
+
+
+def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, thresholds: CompositionThresholds) -> None:
+    """Refuse a part with two vertices at one point whose outward normals face each other. Collective.
+
+    Args:
+        comm: the ranks.
+        surfaces: of the parts with contact or laws.
+        length: of the body, m.
+        thresholds: what is rounding of a coordinate.
+
+    Raises:
+        InputError: on all ranks alike, with the first such point.
+    """
+    for surface in surfaces:
+        gathered = agree(comm, (surface.points, surface.normals))
+        points, normals = (np.concatenate(arrays) for arrays in zip(*gathered, strict=True))
+        found = _facing(points, normals, thresholds.same * length)
+        if found is not None:
+            raise InputError(
+                f"boundary.{surface.part}: two sides lie on each other at {spot(found[: normals.shape[1]])} and face "
+                "each other. Contact and laws of a boundary part act between the body and a rigid obstacle: each side "
+                "would be held by an obstacle of its own. Give the part one of the sides only, or name both "
+                "in an [interface.NAME]"
+            )
+
+
+def _facing(points: Array, normals: Array, near: float) -> Array | None:
+    """The first point (3,) that two vertices with opposite normals share; None: there is none."""
+    from scipy.spatial import cKDTree
+
+    if len(points) < 2:
+        return None
+    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    facing = pairs[np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]]) < -0.5]
+    return points[np.sort(facing.ravel())[0]] if len(facing) else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +81,7 @@ class Pair:
         if self.first.points.shape[2] == 2:
             flat = curved_overlaps if self.curved else facet_overlaps
             return flat.in_plane(self.first, self.second, thresholds)
-        in_space = curved_polygons.in_space if self.curved else facet_polygons.in_space
+        in_space = curved_overlaps.in_space if self.curved else facet_polygons.in_space
         return in_space(self.first, self.second, thresholds)
 
     def covered(self, overlaps: Overlaps) -> Mask:

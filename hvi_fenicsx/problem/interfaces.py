@@ -6,24 +6,99 @@ side, and those that are prescribed, on another part with contact or laws, or on
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
-from scipy.sparse import csr_array
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse import csr_array, diags_array, eye_array, kron
 
+from ..errors import InputError
 from ..geometry import tangents
 from ..mesh.boundary_part import InterfaceSides
 from ..runtime.mpi import agree
-from ..typing import Array, Entities, Integers
-from . import curved_shapes, dual_basis, interface_checks, interface_sides
+from ..typing import Array, Entities, Integers, Mask
+from . import curved_overlaps, dual_basis, interface_sides
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
 from .facet_overlaps import Facets, Overlaps
 from .interface_sides import Pair
 from .thresholds import DEFAULT, CompositionThresholds
+
+
+def check_facing(pair: Pair, overlaps: Overlaps) -> None:
+    """Refuse two sides that do not lie over each other anywhere.
+
+    Args:
+        pair: the sides.
+        overlaps: the intersections of their facets.
+
+    Raises:
+        InputError: there are none.
+    """
+    if not len(overlaps.areas):
+        raise InputError(
+            f'interface.{pair.name}.between: "{pair.sides.first}" and "{pair.sides.second}" do not face each other: '
+            "nowhere does a normal of the first meet a facet of the second; name sides that lie over each other"
+        )
+
+
+def check_carried(pair: Pair, overlaps: Overlaps, kept: Mask, busy: Mask) -> None:
+    """Refuse an interface without a node that carries something, or a part of it that nothing carries.
+
+    Args:
+        pair: the sides.
+        overlaps: the intersections of their facets.
+        kept: which nodes of the first side's facets carry something, (f, n).
+        busy: which lie over the second side and carry something else, (f, n).
+
+    Raises:
+        InputError: with the place.
+    """
+    if not kept.any():
+        raise InputError(
+            f'interface.{pair.name}.between: no vertex of "{pair.sides.first}" is free to carry contact or laws: each '
+            f'lies beyond the end of "{pair.sides.second}", is prescribed, or is on another part; name the longer side '
+            "second, or make the mesh of the first finer"
+        )
+    lost = np.setdiff1d(overlaps.first, np.flatnonzero(kept.any(axis=1) | ~busy.any(axis=1)))
+    lost = np.setdiff1d(lost, list(dual_basis.adopted(pair.first, overlaps, kept)))
+    if len(lost):
+        at = tuple(float(f"{c:.6g}") for c in pair.first.corners[lost[0]].mean(axis=0))
+        raise InputError(
+            f"interface.{pair.name}: nothing carries the facet at {at}: its vertices and those near it are prescribed "
+            "or on other parts; make the mesh there finer"
+        )
+
+
+def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array, thresholds: CompositionThresholds) -> None:
+    """Refuse bodies that overlap by more than the facets of their curved sides do. Collective.
+
+    Args:
+        comm: the ranks.
+        pair: the sides.
+        surface: the nodes of the first side that carry something.
+        gap: the distance of the sides there, m, (m,).
+        thresholds: what is allowed, relative to the first side's facets.
+
+    Raises:
+        InputError: on all ranks alike, with the place where they overlap most.
+    """
+    deepest = [(float(gap[i]), surface.spot(i)) for i in _lowest(gap)]
+    depth, at = min((place for rank in agree(comm, deepest) for place in rank), default=(0.0, ""))
+    if depth < -thresholds.overlap * pair.first.width:
+        raise InputError(
+            f'interface.{pair.name}.between: at {at} "{pair.sides.second}" lies {-depth:.3g} m inside of the body '
+            f'of "{pair.sides.first}": move one of the bodies, name the sides that face each other, or mesh '
+            "curved sides more finely"
+        )
+
+
+def _lowest(gap: Array) -> Iterable[int]:
+    return (int(np.argmin(gap)),) if len(gap) else ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,17 +166,17 @@ def _interface(
     """
     pair = pairs[name]
     overlaps = pair.overlaps(thresholds)
-    interface_checks.check_facing(pair, overlaps)
+    check_facing(pair, overlaps)
     others = [taken, np.unique(pair.second.nodes)]
     others += [np.unique([*p.first.nodes.flat, *p.second.nodes.flat]) for n, p in pairs.items() if n != name]
     busy, covered = np.isin(pair.first.nodes, np.concatenate(others)), pair.covered(overlaps)
     kept = ~np.isin(pair.first.nodes, np.unique(pair.first.nodes[~covered | busy]))
-    interface_checks.check_carried(pair, overlaps, kept, covered & busy)
+    check_carried(pair, overlaps, kept, covered & busy)
     size = context.space.dofmap.index_map.size_global
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)
     surface = _surface(context, pair, overlaps, rows)
     gap = _gaps(context, surface, pair, rows)
-    interface_checks.check_apart(context.domain.mesh.comm, pair, surface, gap, thresholds)
+    check_apart(context.domain.mesh.comm, pair, surface, gap, thresholds)
     tied = _dofs(context, surface) if pair.sides.tied else np.empty(0, np.int32)
     return Interface(
         name=name,
@@ -158,7 +233,7 @@ def _summed_normals(pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> tuple
         return sums, rows.weights
     points, sizes = overlaps.points(pair.first.degree), np.zeros(len(sums))
     functions = points.weights[:, None] * pair.first.functions(points.on_first)
-    normals = curved_shapes.normals(pair.first, points)
+    normals = curved_overlaps.normals(pair.first, points)
     np.add.at(sums, pair.first.nodes[points.first], functions[:, :, None] * normals[:, None])
     np.add.at(sizes, pair.first.nodes[points.first], functions)
     ratio = np.divide(np.linalg.norm(sums, axis=1), sizes, out=np.ones_like(sizes), where=sizes > 0.0)
@@ -194,3 +269,76 @@ def whole_rows(found: Sequence[Interface], size: int) -> Iterator[tuple[csr_arra
         scale = np.divide(1.0, one.rows.weights, out=np.zeros(size), where=one.rows.weights > 0.0)
         rows = csr_array((one.rows.first - one.rows.second).multiply(scale[:, None]))
         yield rows, np.asarray(rows.diagonal())
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """The way between displacements u and unknowns û, both in Cartesian components.
+
+    Attributes:
+        space: of the displacements.
+        matrix: T.
+        inverse: T⁻¹.
+    """
+
+    space: fem.FunctionSpace
+    matrix: PETSc.Mat
+    inverse: PETSc.Mat
+
+    def relative(self, u: Array) -> Array:
+        """T⁻¹ u of a local array, of which the owned values count; a local array. Collective."""
+        return self._local(self.inverse.mult, u)
+
+    def forces(self, values: Array) -> Array:
+        """Tᵀ f: forces on u, at the owned vertices (n, d), as forces on û. Collective."""
+        return self._local(self.matrix.multTranspose, values)[: values.size].reshape(values.shape)
+
+    def forces_on_bodies(self, values: Array) -> Array:
+        """T⁻ᵀ f: forces on û, at the owned vertices (n, d), as forces on the vertices of the bodies. Collective."""
+        return self._local(self.inverse.multTranspose, values)[: values.size].reshape(values.shape)
+
+    def _local(self, product: object, values: Array) -> Array:
+        """A product with a local array, as a local array with ghosts updated."""
+        function = fem.Function(self.space)
+        right, left = self.matrix.createVecs()
+        right.array[:] = values.ravel()[: right.local_size]
+        product(right, left)  # type: ignore[operator]
+        function.x.array[: left.local_size] = left.array_r
+        function.x.scatter_forward()
+        right.destroy()
+        left.destroy()
+        return np.array(function.x.array)
+
+
+def coupled(space: fem.FunctionSpace, interfaces: Sequence[Interface]) -> Coupling | None:
+    """The coupling of interfaces; None where there are none. Collective.
+
+    Args:
+        space: of the displacements.
+        interfaces: none of whose nodes with weights is combined by another.
+    """
+    if not interfaces:
+        return None
+    size, (start, end) = space.dofmap.index_map.size_global, space.dofmap.index_map.local_range
+    inverse, forward = (csr_array(eye_array(size, format="csr")[start:end]) for _ in range(2))
+    for rows, diagonal in whole_rows(interfaces, size):
+        own = diags_array(diagonal[start:end], offsets=0) @ eye_array(size, format="csr")[start:end]
+        rest, scale = rows[start:end] - own, diagonal[start:end]
+        unit = diags_array((scale != 0.0).astype(float), offsets=0) @ eye_array(size, format="csr")[start:end]
+        over = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale != 0.0)
+        inverse = inverse + rest + own - unit
+        forward = forward - diags_array(over, offsets=0) @ (rest - unit) - unit
+    return Coupling(space, _petsc_matrix(space, forward), _petsc_matrix(space, inverse))
+
+
+def _petsc_matrix(space: fem.FunctionSpace, rows: csr_array) -> PETSc.Mat:
+    """A matrix over vertices as one over their vectors, component by component. Collective."""
+    d, index_map = space.dofmap.index_map_bs, space.dofmap.index_map
+    whole = csr_array(kron(csr_array(rows), np.eye(d), format="csr"))
+    whole.eliminate_zeros()
+    whole.sort_indices()
+    size = index_map.size_local * d, index_map.size_global * d
+    arrays = whole.indptr.astype(PETSc.IntType), whole.indices.astype(PETSc.IntType), whole.data
+    matrix = PETSc.Mat().createAIJ((size, size), bsize=d, csr=arrays, comm=space.mesh.comm)
+    matrix.assemble()
+    return matrix

@@ -23,12 +23,11 @@ from ..mesh.domain import Domain
 from ..rigid import AnyBody
 from ..runtime import forms
 from ..typing import Array, Entities, Integers
-from . import bodies, contact_surface, coupling, spaces
+from . import bodies, contact_surface, spaces
 from .bodies import MeshBodies
-from .bulk import Bulk
 from .contact_surface import Surface
-from .coupling import Coupling
-from .interfaces import Interface
+from .elastic_operator import Bulk
+from .interfaces import Coupling, Interface, coupled
 from .law_term import LawTerm
 from .scaling import Scales
 
@@ -227,7 +226,7 @@ class Problem:
     @functools.cached_property
     def coupling(self) -> Coupling | None:
         """The way between displacements and unknowns; None where both are the same. Collective when first used."""
-        return coupling.of(self.space, self.interfaces)
+        return coupled(self.space, self.interfaces)
 
     def with_obstacle_at(self, way: float) -> Problem:
         """The problem where the obstacle that a force presses has moved.

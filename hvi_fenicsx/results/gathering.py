@@ -16,9 +16,8 @@ from ..effects import SurfaceLoad
 from ..formula import Formula
 from ..mesh import nodes
 from ..problem import spaces
-from ..problem.cell_stress import stress_of_parts
 from ..problem.problem import Problem
-from ..problem.stress import von_mises
+from ..problem.stress import stress_of_parts, von_mises
 from ..report.reader import Result
 from ..report.solution_arrays import LoadArrays, SolutionArrays
 from ..runtime.mpi import agree, joined

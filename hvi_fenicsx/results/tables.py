@@ -12,8 +12,8 @@ import numpy as np
 
 from ..certify import placed_forces
 from ..paths.load_path import LoadPath, PathRow
-from ..problem import part_areas, spaces
-from ..problem.nodal_forces import NodalForces
+from ..problem import references, spaces
+from ..problem.vectors import NodalForces
 from ..report.contact_part import ContactPart
 from ..runtime import writing
 from ..runtime.mpi import joined
@@ -94,12 +94,12 @@ def boundary_rows(solution: Solution) -> Iterator[tuple[Any, ...]]:
 def _at_vertices(solution: Solution, loads: Mapping[str, NodalForces], part: str, facets: Entities) -> Array:
     """The numbers at the vertices of a part that this rank owns, (m, 12); NaN: none. Collective."""
     problem, forces = solution.problem, solution.forces
-    blocks = part_areas.vertices(problem, facets)
+    blocks = references.vertices(problem, facets)
     d, scales = problem.scales.dimension, problem.scales
     found = np.full((len(blocks), len(_QUANTITIES), 3), np.nan)
     found[:, 0, :d] = problem.positions[blocks, :d]
     if part in loads:
-        found[:, 2, :d] = loads[part].at(blocks) * scales.force / part_areas.lumped(problem, facets)[blocks, None]
+        found[:, 2, :d] = loads[part].at(blocks) * scales.force / references.lumped(problem, facets)[blocks, None]
     if solution.solve_result is not None and forces is not None:
         found[:, 1, :d] = spaces.values(problem.space, solution.solve_result.u.x.array)[blocks] * scales.displacement
         reaction = forces.reactions.get(part)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..model import dump_scene
-from ..problem.cell_stress import stress_of_parts
+from ..problem.stress import stress_of_parts
 from ..report import page, solution_arrays
 from ..report.errors import ReportError
 from ..report.pictures.draw import PictureProcess, waiting

@@ -1,21 +1,23 @@
 """Rigid motions: the kernel of a scene, the name of each motion, and whether the load can be borne."""
 
 from ..laws.convex_parts import Directional
-from .analyse import analyse, gives_way, load_factors
-from .kernel import FixedDirections, kernel, modes, null_space
 from .least_energy import OneSidedSupports, Rest, least_energy
+from .limit_analysis import analyse, gives_way, load_factors
 from .motions import (
     AnyBody,
+    FixedDirections,
     JoinedBodies,
     Mode,
     MotionFields,
     Movable,
     RigidBody,
     fields_at,
+    kernel,
+    modes,
+    null_space,
     rigid_fields,
 )
-from .pressed import pressed, without_obstacles
-from .reduction import ContactCone, Resistance, RigidProblem
+from .reduction import ContactCone, Resistance, RigidProblem, pressed, without_obstacles
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
 from .thresholds import RigidThresholds
 

@@ -18,8 +18,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .cutting_planes import Minimum, Programme, without_limit
-from .functional import Functional, Region, ball, faces, idle
+from .cutting_planes import Functional, Minimum, Programme, Region, ball, faces, idle, without_limit
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,15 @@ body by body, then the rotations of all.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from mpi4py import MPI
 
 from ..typing import Array, Integers
-from . import motion_names
+from .thresholds import DEFAULT, RigidThresholds
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class RigidBody:
             signed: whether the name has the sense too.
         """
         whose = f" of {self.name}" if self.name else ""
-        return motion_names.describe(coefficients, self.centre, self.length, signed=signed) + whose
+        return describe(coefficients, self.centre, self.length, signed=signed) + whose
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,8 @@ class JoinedBodies:
         found: dict[str, list[str]] = {}
         for number, body in enumerate(self.bodies):
             own = np.asarray(coefficients)[self.own(number)]
-            if np.abs(own).max() > motion_names.NEGLIGIBLE * np.abs(coefficients).max():
-                motion = motion_names.describe(own, body.centre, body.length, signed=signed)
+            if np.abs(own).max() > NEGLIGIBLE * np.abs(coefficients).max():
+                motion = describe(own, body.centre, body.length, signed=signed)
                 found.setdefault(motion, []).append(body.name)
         return ", ".join(f"{motion} of {' and '.join(names)}" for motion, names in found.items())
 
@@ -236,3 +238,187 @@ def rigid_fields(points: Array, body: RigidBody) -> Array:
     else:
         fields[:, 3:, :] = np.cross(np.eye(3)[None], (points - centre)[:, None, :])
     return fields
+
+
+@dataclass(frozen=True)
+class FixedDirections:
+    """Conditions direction·y(x) = 0; each rank gives its own rows.
+
+    Attributes:
+        points: x, (k, 3), or the motions there.
+        directions: (k, d).
+    """
+
+    points: Places
+    directions: Array
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.directions) != 2 or not is_place(self.points, len(self.directions)):
+            raise ValueError("FixedDirections needs points (k, 3) and directions (k, d) with the same k")
+
+
+def kernel(
+    comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections], thresholds: RigidThresholds = DEFAULT
+) -> Array:
+    """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
+
+    First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
+    displacement of the centre is orthogonal to those translations. Coordinate axes are taken where possible.
+    Each rank sends one triangular factor; the singular values of all of them stacked decide the rank.
+
+    Args:
+        comm: the ranks of the mesh.
+        body: the body that moves.
+        fixed: the conditions, on each rank its own.
+        thresholds: what counts as zero.
+    """
+    rows = np.vstack([np.zeros((0, body.motions)), *(_condition_rows(part, body) for part in fixed)])
+    factors = comm.gather(triangle(rows), root=0)
+    basis = None if factors is None else _natural_null_space(np.vstack(factors), body.shifts, thresholds)
+    return np.asarray(comm.bcast(basis, root=0))
+
+
+def _natural_null_space(rows: Array, shifts: int, thresholds: RigidThresholds) -> Array:
+    return natural_basis(null_space(rows, thresholds), shifts, thresholds)
+
+
+def modes(basis: Array, body: Movable) -> tuple[Mode, ...]:
+    """The motions of a kernel's basis. Local.
+
+    Args:
+        basis: rigid coefficients (3|6, k), one column each.
+        body: the body that moves.
+    """
+    return tuple(mode_of(column, body, signed=False) for column in basis.T)
+
+
+def triangle(rows: Array) -> Array:
+    """At most n rows with the null space and singular values of `rows` (m, n): the R of its QR factors."""
+    return np.asarray(np.linalg.qr(rows, mode="r")) if len(rows) else rows
+
+
+def null_space(rows: Array, thresholds: RigidThresholds = DEFAULT) -> Array:
+    """Orthonormal basis (n, k) of {z: rows @ z = 0}.
+
+    Args:
+        rows: (m, n), m = 0 allowed.
+        thresholds: what counts as zero.
+    """
+    n = rows.shape[1]
+    if not rows.any():
+        return np.eye(n)
+    _, values, right = np.linalg.svd(np.vstack([rows, np.zeros((n, n))]), full_matrices=False)
+    return np.asarray(right[values <= thresholds.rounding * values[0]].T)
+
+
+def natural_basis(basis: Array, count: int, thresholds: RigidThresholds = DEFAULT) -> Array:
+    """The same space by translations first, then rotations, see `kernel`.
+
+    Args:
+        basis: rigid coefficients (3|6, k), one column for each motion.
+        count: how many of the coefficients are translations; they come first.
+        thresholds: what counts as zero.
+    """
+    basis = np.where(np.abs(basis) <= thresholds.rounding, 0.0, basis)
+    shifts = _sparse_basis(basis[:count] @ null_space(basis[count:], thresholds), thresholds)
+    spins = _sparse_basis(basis[count:], thresholds)
+    lift = np.linalg.lstsq(basis[count:], spins, rcond=thresholds.rounding)[0]
+    centre = basis[:count] @ lift
+    centre = centre - shifts @ (shifts.T @ centre)
+    zeros = np.zeros((len(basis) - count, shifts.shape[1]))
+    return _snap(np.hstack([np.vstack([shifts, zeros]), np.vstack([centre, spins])]))
+
+
+def _sparse_basis(vectors: Array, thresholds: RigidThresholds) -> Array:
+    """Orthonormal basis of the span of the columns (n, k) of `vectors`, along axes where it can be."""
+    left, values, _ = np.linalg.svd(vectors, full_matrices=False)
+    span = left[:, values > thresholds.rounding]
+    factor, upper = np.linalg.qr(_reduce(span))
+    return _snap(factor * np.sign(np.diag(upper)))
+
+
+def _reduce(span: Array) -> Array:
+    """Column echelon form with full pivoting, columns ordered by pivot row."""
+    columns = span.copy()
+    pivots: list[int] = []
+    for j in range(columns.shape[1]):
+        open_rows = np.abs(columns[:, j:])
+        row, offset = divmod(int(np.round(open_rows, 9).argmax()), open_rows.shape[1])
+        columns[:, [j, j + offset]] = columns[:, [j + offset, j]]
+        columns[:, j] /= columns[row, j]
+        others = np.arange(columns.shape[1]) != j
+        columns[:, others] -= np.outer(columns[:, j], columns[row, others])
+        pivots.append(row)
+    return columns[:, np.argsort(pivots)]
+
+
+def _snap(values: Array) -> Array:
+    """The values, with zero for what is rounding in an orthonormal basis."""
+    return np.where(np.abs(values) < 1e-13, 0.0, values)
+
+
+def _condition_rows(part: FixedDirections, body: Movable) -> Array:
+    """(k, 3|6): the work of each condition on the basis motions."""
+    return np.asarray(np.einsum("kd,knd->kn", part.directions, fields_at(part.points, body)))
+
+
+NEGLIGIBLE = 1e-9
+"""A coefficient this small beside the largest is not named."""
+AXES = "xyz"
+
+
+def describe(coefficients: Array, centre: Array, length: float, *, signed: bool) -> str:
+    """A motion in words, such as "translation along y".
+
+    Args:
+        coefficients: (3|6,).
+        centre: of the body, (3,).
+        length: metres per unit of length.
+        signed: whether the name has the sense too: "translation along +y".
+    """
+    z = np.where(np.abs(coefficients) <= NEGLIGIBLE * np.abs(coefficients).max(), 0.0, coefficients)
+    d = 2 if len(z) == 3 else 3
+    shift, spin = z[:d], z[d:]
+    if not spin.any():
+        return f"translation along {_direction(shift, signed)}"
+    return (_rotation_2d if d == 2 else _rotation_3d)(shift, spin, centre, length, signed)
+
+
+def _rotation_2d(shift: Array, spin: Array, centre: Array, length: float, signed: bool) -> str:
+    pole = centre[:2] + np.array([-shift[1], shift[0]]) / spin[0]
+    sense = (", counterclockwise" if spin[0] > 0.0 else ", clockwise") if signed else ""
+    return f"rotation about {_point(pole, length)}{sense}"
+
+
+def _rotation_3d(shift: Array, spin: Array, centre: Array, length: float, signed: bool) -> str:
+    """Every motion in space is a screw; the point named is the one of its axis nearest the centre."""
+    square = float(spin @ spin)
+    pole, pitch = centre + np.cross(spin, shift) / square, float(shift @ spin) / square
+    axis = f"about the axis through {_point(pole, length)} along {_direction(spin, signed)}"
+    if abs(pitch) <= NEGLIGIBLE:
+        return f"rotation {axis}"
+    return f"screw motion {axis}, advancing {_metres(pitch, length)} per radian"
+
+
+def _direction(vector: Array, signed: bool) -> str:
+    """An axis by its letter, else a unit vector; without a sign its first largest entry is positive."""
+    unit = vector / np.linalg.norm(vector)
+    if not signed and unit[np.abs(unit).round(6).argmax()] < 0.0:
+        unit = -unit
+    if np.abs(unit).max() < 1.0 - NEGLIGIBLE:
+        return "(" + ", ".join(f"{_clean(c):.2f}" for c in unit) + ")"
+    i = int(np.abs(unit).argmax())
+    return (("+" if unit[i] > 0.0 else "-") if signed else "") + AXES[i]
+
+
+def _point(point: Array, length: float) -> str:
+    return "(" + ", ".join(_metres(c, length) for c in point) + ")"
+
+
+def _metres(value: float, length: float) -> str:
+    """A length in metres; one that is rounding beside the body is zero, however small the body is."""
+    return f"{_clean(value) * length:.4g}"
+
+
+def _clean(value: float) -> float:
+    return 0.0 if abs(value) < NEGLIGIBLE else float(value)

@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
-from ..problem.nodal_forces import NodalForces
+from ..problem.vectors import NodalForces
 from ..system import net_forces
 from ..system.free_motions import Motions, SupportedBody
 from ..system.held_solver import Reached

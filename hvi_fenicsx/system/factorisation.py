@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from typing_extensions import override
 
 from ..mesh import nodes
-from ..problem.nodal_averaging import Dilatation
+from ..problem.spaces import Dilatation
 from ..runtime.timing import Timer
 from ..typing import Array, Entities, Integers
 from .contact_rows import ContactRows

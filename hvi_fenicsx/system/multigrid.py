@@ -16,7 +16,7 @@ from collections.abc import Mapping
 import numpy as np
 from petsc4py import PETSc
 
-from ..problem.nodal_averaging import Dilatation
+from ..problem.spaces import Dilatation
 from ..typing import Entities
 from .factorisation import nested, without_dilatation
 from .levels import Levels

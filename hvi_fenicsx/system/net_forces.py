@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from ..problem.nodal_forces import NodalForces
 from ..problem.problem import Problem
 from ..problem.references import References
+from ..problem.vectors import NodalForces
 from ..typing import Array, Entities, Mask
 from .free_motions import Motions
 

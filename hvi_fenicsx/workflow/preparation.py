@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from mpi4py import MPI
 
-from ..certify import plausible_problem
+from ..estimate import plausibility
 from ..mesh import nodes
 from ..mesh.domain import Domain, check_affordable
 from ..mesh.thresholds import Thresholds as MeshThresholds
@@ -138,8 +138,8 @@ def _warnings(scene: Model, system: System, solvability: Solvability) -> tuple[s
     """Warnings about numbers that may be mistakes, logged. Collective."""
     found = (
         *scene.domain.implausible(system.problem.domain.length),
-        *plausible_problem.before_solving(system.problem, system.forces),
-        *plausible_problem.of_existence(solvability),
+        *plausibility.before_solving(system.problem, system.forces),
+        *plausibility.of_existence(solvability),
     )
     warn(_LOG, found)
     return found

@@ -7,10 +7,10 @@ from functools import cached_property
 
 from ..certify import placed_forces
 from ..certify.certificate import Certificate, Examination
-from ..certify.estimate.estimator import Estimate
 from ..certify.placed_forces import PlacedForces
 from ..certify.uniqueness import Uniqueness
 from ..errors import ExitCode
+from ..estimate.estimator import Estimate
 from ..model import Model
 from ..problem.problem import Problem
 from ..rigid import Solvability

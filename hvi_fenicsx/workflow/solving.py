@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..certify import certificate, correction, plausibility
+from ..certify import certificate
 from ..certify.certificate import Examination
-from ..certify.estimate.estimator import estimate
 from ..certify.uniqueness import Uniqueness, uniqueness
 from ..errors import SolverError
+from ..estimate import correction, plausibility
+from ..estimate.estimator import estimate
 from ..model import Model
 from ..runtime.log import logger, newton_step, warn
 from ..runtime.timing import Timer

@@ -11,10 +11,10 @@ from scenes import Table, model, quadratic_linear
 
 from hvi_fenicsx import Scene
 from hvi_fenicsx.certify.certificate import examine
-from hvi_fenicsx.certify.estimate.bubble_stiffness import BubbleStiffness
-from hvi_fenicsx.certify.estimate.coupled_errors import Coupled
-from hvi_fenicsx.certify.estimate.dual_norm import DualNorm
-from hvi_fenicsx.certify.estimate.law_traces import LawTraces
+from hvi_fenicsx.estimate.bubbles import BubbleStiffness
+from hvi_fenicsx.estimate.coupled_errors import Coupled
+from hvi_fenicsx.estimate.dual_norm import DualNorm
+from hvi_fenicsx.estimate.law_traces import LawTraces
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 

@@ -20,11 +20,9 @@ from scenes import Table, block, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.certify.certificate import examine
-from hvi_fenicsx.certify.estimate.bubble_diagonal import diagonal
-from hvi_fenicsx.certify.estimate.bubble_stiffness import BubbleStiffness
-from hvi_fenicsx.certify.estimate.bubbles import space
-from hvi_fenicsx.certify.estimate.contact_errors import estimate_contact_errors
-from hvi_fenicsx.certify.estimate.estimator import Estimate, estimate
+from hvi_fenicsx.estimate.bubbles import BubbleStiffness, diagonal, space
+from hvi_fenicsx.estimate.contact_errors import estimate_contact_errors
+from hvi_fenicsx.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.workflow import finish
 

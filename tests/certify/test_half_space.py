@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hvi_fenicsx.certify.estimate.half_space import surface_compliance
+from hvi_fenicsx.estimate.data_errors import surface_compliance
 
 FACET = np.array([[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]])
 TRIANGLE = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])

@@ -11,8 +11,8 @@ from runs import ROOT, hvi, summary, write_scene
 from scenes import block, model, quadratic_linear
 
 from hvi_fenicsx import Scene, console, prepare, read_scene, solve
-from hvi_fenicsx.certify import plausible_problem
 from hvi_fenicsx.certify.thresholds import PlausibilityThresholds
+from hvi_fenicsx.estimate import plausibility
 from hvi_fenicsx.mesh.shapes import MeshFile
 from hvi_fenicsx.workflow import finish
 
@@ -128,8 +128,8 @@ def test_before_solving_only_the_implausible_demos_are_warned_of(demo: Path) -> 
 def test_the_limits_can_be_chosen() -> None:
     prepared = prepare(Scene.model_validate(model(8)))
     problem, forces = prepared.problem, prepared.system.forces
-    assert plausible_problem.before_solving(problem, forces) == prepared.warnings == ()
-    (warning,) = plausible_problem.before_solving(problem, forces, PlausibilityThresholds(stiffest=1e11))
+    assert plausibility.before_solving(problem, forces) == prepared.warnings == ()
+    (warning,) = plausibility.before_solving(problem, forces, PlausibilityThresholds(stiffest=1e11))
     assert "Young's modulus is 2.15e+11" in warning
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hvi_fenicsx.certify.shared_forces import Carrier, nearest_sum
+from hvi_fenicsx.certify.force_attribution import Carrier, nearest_sum
 from hvi_fenicsx.laws import Length
 from hvi_fenicsx.typing import Array
 

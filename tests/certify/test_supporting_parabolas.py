@@ -11,7 +11,7 @@ from enumeration import Floor, polyline
 from scenes import Table, model
 
 from hvi_fenicsx import Scene, read_scene
-from hvi_fenicsx.certify.supporting_parabolas import needed_falls
+from hvi_fenicsx.certify.uniqueness import needed_falls
 from hvi_fenicsx.workflow import Solution, finish, prepare
 
 DROP = ((0.0, 0.0), (9e-6, 3e6), (9e-6, 1.5e6))

@@ -13,7 +13,7 @@ from dolfinx import fem
 from scenes import STEEL
 
 from hvi_fenicsx import Scene, prepare
-from hvi_fenicsx.problem import chosen_cells
+from hvi_fenicsx.problem import elastic_operator
 from hvi_fenicsx.problem.problem import Problem
 
 RUBBER: dict[str, Any] = {"model": "plane_strain", "youngs_modulus": 1e6, "poisson_ratio": 0.499}
@@ -67,10 +67,10 @@ def test_the_energies_of_the_cells_add_up_to_that_of_the_matrix() -> None:
 def test_the_energies_of_the_cells_do_not_depend_on_pieces(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = composed(STEEL)
     u, whole = bent(problem), problem.bulk.energy_by_cell(bent(problem))
-    found = list(chosen_cells.pieces(problem.space.mesh, most))
+    found = list(elastic_operator.pieces(problem.space.mesh, most))
     assert np.concatenate(found).tolist() == list(range(len(whole)))
     assert max(map(len, found)) <= most
-    monkeypatch.setattr(chosen_cells, "pieces", lambda mesh: found)
+    monkeypatch.setattr(elastic_operator, "pieces", lambda mesh: found)
     assert problem.bulk.energy_by_cell(u) == pytest.approx(whole, rel=1e-14)
 
 

@@ -12,8 +12,7 @@ from scenes import STEEL, P, Q, Table, block, displacement, model, points, quadr
 from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.geometry import tangents
-from hvi_fenicsx.problem.contact_normals import decide
-from hvi_fenicsx.problem.contact_surface import Surface
+from hvi_fenicsx.problem.contact_surface import Surface, decide
 
 SLOPES = [2e-9, 1e-7, 1e-5, 5e-5, 1.2e-4, 1e-2]
 """Between and on both sides of the angles at which normals were once rounded to an axis."""

@@ -10,8 +10,8 @@ import pytest
 from scenes import STEEL
 
 from hvi_fenicsx import Scene, prepare, read_scene
+from hvi_fenicsx.problem.elastic_operator import stiffness_tensor
 from hvi_fenicsx.problem.problem import Problem
-from hvi_fenicsx.problem.stiffness_tensor import stiffness_tensor
 
 RUBBER: dict[str, Any] = {"model": "plane_strain", "youngs_modulus": 1e6, "poisson_ratio": 0.499}
 SOLID: dict[str, Any] = {"model": "three_dimensional", "youngs_modulus": 3e9, "poisson_ratio": 0.3}

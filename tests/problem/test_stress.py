@@ -17,9 +17,9 @@ from scenes import Table, solved
 
 from hvi_fenicsx import Scene, Solution, prepare, read_scene, solve
 from hvi_fenicsx.effects import Contribution
-from hvi_fenicsx.problem import bulk, stress
-from hvi_fenicsx.problem.cell_stress import stress_of_parts
+from hvi_fenicsx.problem import elastic_operator, stress
 from hvi_fenicsx.problem.problem import PlacedContribution
+from hvi_fenicsx.problem.stress import stress_of_parts
 
 Array = npt.NDArray[np.float64]
 E, ALPHA, HEAT, PULL = 2.0e11, 1.2e-5, 40.0, 3.0e6
@@ -113,7 +113,7 @@ def test_a_users_own_form_of_the_strain_belongs_to_the_stress() -> None:
     bed = Contribution(bilinear=(2.0 * ufl.inner(u, v) * ufl.dx,))
     pull = next(placed.effect for placed in problem.contributions if placed.where == "pull")
     made = [*problem.contributions, *(PlacedContribution(None, pull, one) for one in (fibres, bed))]
-    own = bulk.make_bulk(problem.space, problem.scales, made, {})
+    own = elastic_operator.make_bulk(problem.space, problem.scales, made, {})
     stretched = fem.Function(problem.space)
     stretched.interpolate(lambda x: np.stack([x[0], x[1]]))
     alone, both = (stress_of_parts(one, stretched) for one in (problem.bulk, own))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hvi_fenicsx.problem import facet_polygons, triangle_clipping
+from hvi_fenicsx.problem import facet_polygons
 from hvi_fenicsx.problem.facet_overlaps import Facets
-from hvi_fenicsx.problem.triangle_clipping import CORNERS
+from hvi_fenicsx.problem.facet_polygons import CORNERS
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -16,7 +16,7 @@ def test_a_triangle_beyond_a_shared_edge_has_nothing_in_common() -> None:
     """Of these GEOS 3.13 returns the whole triangle."""
     beyond = [[1.0, 2.7755575615628914e-17], [0.0, 1.0], [0.3289306825365248, 1.9598487023640792]]
     same = [[0.0, 1.0], [1.0, 2.7755575615628914e-17], [0.0, 0.0]]
-    np.testing.assert_allclose(triangle_clipping.clip_triangles(np.array([beyond, same])).areas, [0.0, 0.5], atol=1e-15)
+    np.testing.assert_allclose(facet_polygons.clip_triangles(np.array([beyond, same])).areas, [0.0, 0.5], atol=1e-15)
 
 
 def test_the_parts_of_a_cut_plane_fill_the_triangle() -> None:
@@ -29,11 +29,11 @@ def test_the_parts_of_a_cut_plane_fill_the_triangle() -> None:
         angle, size = random.uniform(0, 2 * np.pi), random.uniform(0.25, 2.0)
         turn = size * np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         triangles = np.concatenate([low, high]) @ turn + random.uniform(-0.1, 0.1, 2)
-        pieces = triangle_clipping.clip_triangles(triangles)
+        pieces = facet_polygons.clip_triangles(triangles)
         assert pieces.areas.sum() == pytest.approx(0.5, rel=1e-13)
         fans, polygon = pieces.fans(1e-14)
-        assert np.abs(triangle_clipping.twice_areas(fans)).sum() == pytest.approx(1.0, rel=1e-12)
-        inside = triangle_clipping.barycentric(triangles[polygon], fans)
+        assert np.abs(facet_polygons.twice_areas(fans)).sum() == pytest.approx(1.0, rel=1e-12)
+        inside = facet_polygons.barycentric(triangles[polygon], fans)
         assert inside.min() > -1e-12
         for corner in CORNERS:
             full = {0.0: np.pi / 2}.get(float(corner.sum()), np.pi / 4)

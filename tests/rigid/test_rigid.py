@@ -34,7 +34,7 @@ from hvi_fenicsx.rigid import (
     modes,
     rigid_fields,
 )
-from hvi_fenicsx.rigid.functional import SlipIntegral
+from hvi_fenicsx.rigid.cutting_planes import SlipIntegral
 from hvi_fenicsx.rigid.solvability import undecided
 
 Array = NDArray[np.float64]

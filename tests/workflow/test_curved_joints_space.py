@@ -21,8 +21,8 @@ from shells import FLAT
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
-from hvi_fenicsx.problem import curved_shapes, facet_integrals
-from hvi_fenicsx.problem.curved_polygons import in_space
+from hvi_fenicsx.problem import curved_overlaps, facet_overlaps
+from hvi_fenicsx.problem.curved_overlaps import in_space
 from hvi_fenicsx.problem.facet_overlaps import Facets
 
 
@@ -50,7 +50,7 @@ def test_pairs_of_points_lie_on_one_normal_and_fill_curved_facets(own: int, othe
     found = in_space(first, second)
     points = found.points(2)
     one, two = (
-        curved_shapes.places(side.points[facets], on)
+        curved_overlaps.places(side.points[facets], on)
         for side, facets, on in ((first, points.first, points.on_first), (second, points.second, points.on_second))
     )
     normals, apart = first.normals[points.first], two - one
@@ -58,11 +58,11 @@ def test_pairs_of_points_lie_on_one_normal_and_fill_curved_facets(own: int, othe
     assert np.abs(np.linalg.norm(two, axis=1) - 1.01).max() < 4e-3
     assert found.covered.all()
     filled = np.bincount(points.first, weights=points.weights)
-    areas = facet_integrals.from_nodes(first.points, first.share)[1].sum(axis=1)
+    areas = facet_overlaps.from_nodes(first.points, first.share)[1].sum(axis=1)
     np.testing.assert_allclose(filled, areas, rtol=2e-4)
     assert filled.sum() == pytest.approx(areas.sum(), rel=2e-5)
     assert (
-        np.abs(curved_shapes.normals(first, points) - one / np.linalg.norm(one, axis=1)[:, None]).max() < 0.4 / own**2
+        np.abs(curved_overlaps.normals(first, points) - one / np.linalg.norm(one, axis=1)[:, None]).max() < 0.4 / own**2
     )
 
 

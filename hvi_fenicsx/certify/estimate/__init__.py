@@ -1,1 +1,0 @@
-"""A posteriori error estimates in the energy norm."""

@@ -1,0 +1,1 @@
+"""A posteriori error estimates in the energy norm, and warnings of numbers that are not plausible."""

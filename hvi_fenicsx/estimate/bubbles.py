@@ -1,0 +1,532 @@
+"""Forces on few of a space's blocks: what facets of Γc give, without arrays of the whole mesh."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import basix
+import basix.ufl
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem, la
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from ..mesh import nodes
+from ..problem.problem import Problem
+from ..problem.vectors import nodal_sum
+from ..runtime import forms
+from ..typing import Array, Entities
+
+
+@dataclass(frozen=True)
+class BlockForces:
+    """Forces at some blocks of a space, zero at all others.
+
+    Attributes:
+        blocks: local numbers, ascending, each once, (k,).
+        values: the forces, (k, d).
+    """
+
+    blocks: Entities
+    values: Array
+
+    def __sub__(self, other: BlockForces) -> BlockForces:
+        return summed([(self.blocks, self.values), (other.blocks, -other.values)], self.values.shape[1])
+
+    def everywhere(self, count: int) -> Array:
+        """The forces at all of the first blocks, (count, d)."""
+        found = np.zeros((count, self.values.shape[1]))
+        found[self.blocks] = self.values
+        return found
+
+
+def summed(parts: Sequence[tuple[npt.NDArray[np.integer], Array]], dimension: int) -> BlockForces:
+    """The sum of forces.
+
+    Args:
+        parts: blocks in any order, also several times, (k,), with the forces there, (k, d).
+        dimension: d.
+    """
+    every = np.concatenate([np.empty(0, np.int32), *(blocks for blocks, _ in parts)])
+    blocks, numbers = np.unique(every, return_inverse=True)
+    values = np.zeros((len(blocks), dimension))
+    np.add.at(values, numbers, np.concatenate([np.empty((0, dimension)), *(forces for _, forces in parts)]))
+    return BlockForces(blocks.astype(np.int32), values)
+
+
+def gathered(space: fem.FunctionSpace, forces: BlockForces) -> BlockForces:
+    """What all ranks give, at the owned blocks. Collective.
+
+    Args:
+        space: of the blocks.
+        forces: of this rank, at owned blocks and ghosts.
+    """
+    if space.mesh.comm.size == 1:
+        return forces
+    field, owned = fem.Function(space), space.dofmap.index_map.size_local
+    everywhere = field.x.array.reshape(-1, forces.values.shape[1])
+    everywhere[forces.blocks] = forces.values
+    field.x.scatter_reverse(la.InsertMode.add)
+    blocks = np.flatnonzero(np.any(everywhere[:owned], axis=1)).astype(np.int32)
+    return BlockForces(blocks, everywhere[blocks])
+
+
+Index = tuple[int, ...]
+"""A multi-index over the corners of a cell or of a facet."""
+
+
+def quadrature(cell: str, degree: int) -> tuple[Array, Array]:
+    """Barycentric points (q, corners) and weights (q,), whose sum is 1, of a simplex.
+
+    Args:
+        cell: its name, such as "triangle".
+        degree: of the polynomials that are integrated exactly.
+    """
+    made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[cell], degree)
+    points, weights = made
+    return np.column_stack([1 - points.sum(axis=1), points]), weights / weights.sum()
+
+
+def indices(degree: int, corners: Sequence[int], count: int) -> list[Index]:
+    """The bubbles that some corners have together: those on the edge, on the face or in the cell between them.
+
+    Args:
+        degree: p.
+        corners: of the edge, face or cell.
+        count: of all corners of the cell or facet.
+    """
+    found = []
+    for parts in itertools.product(range(2 * degree, 0, -1), repeat=len(corners)):
+        if sum(parts) == 2 * degree and any(part % 2 for part in parts):
+            at = dict(zip(corners, parts, strict=True))
+            found.append(tuple(at.get(corner, 0) for corner in range(count)))
+    return found
+
+
+def of_facet(degree: int, dimension: int) -> list[Index]:
+    """The bubbles of a facet, over its corners.
+
+    Args:
+        degree: p.
+        dimension: of space.
+    """
+    sets = (ends for size in range(2, dimension + 1) for ends in itertools.combinations(range(dimension), size))
+    return [index for corners in sets for index in indices(degree, corners, dimension)]
+
+
+def of_cell(degree: int, cell: str) -> list[Index]:
+    """The bubbles of a cell over its corners, in the order of the element's degrees of freedom.
+
+    Args:
+        degree: p.
+        cell: the name of its shape.
+    """
+    return [index for entities in _by_entity(degree, cell) for found in entities for index in found]
+
+
+def _by_entity(degree: int, cell: str) -> list[list[list[Index]]]:
+    topology: Any = basix.topology(basix.CellType[cell])
+    return [[indices(degree, corners, len(topology)) for corners in entities] for entities in topology]
+
+
+def shape(index: Index, barycentric: Array) -> Array:
+    """The values of a bubble at points, (q,).
+
+    Args:
+        index: of the bubble.
+        barycentric: the points, (q, corners).
+    """
+    factors = (_factor(order, sum(index))(barycentric[:, corner]) for corner, order in enumerate(index))
+    return np.asarray(functools.reduce(np.multiply, factors))
+
+
+def slope(index: Index, corner: int, barycentric: Array) -> Array:
+    """The derivative of a bubble by one of the barycentric coordinates at points, (q,).
+
+    Args:
+        index: of the bubble.
+        corner: number of the coordinate.
+        barycentric: the points, (q, corners).
+    """
+    factors = [_factor(order, sum(index)) for order in index]
+    factors[corner] = factors[corner].deriv()
+    values = (factor(barycentric[:, i]) for i, factor in enumerate(factors))
+    return np.asarray(functools.reduce(np.multiply, values))
+
+
+@functools.cache
+def _factor(order: int, degree: int) -> np.polynomial.Polynomial:
+    """The factor of a bubble of one barycentric coordinate: 1 at order/degree, 0 at the points before it."""
+    found = np.polynomial.Polynomial([1.0])
+    for step in range(order):
+        found = found * np.polynomial.Polynomial([-step, degree]) / (step + 1)
+    return found
+
+
+@functools.cache
+def element(cell: str, degree: int) -> Any:
+    """The bubbles of a triangle or tetrahedron, a scalar element.
+
+    Args:
+        cell: the name of its shape.
+        degree: p.
+    """
+    kind = basix.CellType[cell]
+    corners = np.asarray(basix.geometry(kind), dtype=np.float64)
+    by_entity, d = _by_entity(degree, cell), corners.shape[1]
+    where: list[Any] = [[_points(found, corners) for found in entities] for entities in by_entity]
+    what = [[np.eye(len(found)).reshape(len(found), 1, len(found), 1) for found in entities] for entities in by_entity]
+    empty: list[Any] = [[]] * (3 - d)
+    smooth, standard, none = basix.SobolevSpace.H1, basix.PolysetType.standard, -1  # no Lagrange space is contained
+    coefficients, highest, identity = _coefficients(cell, degree), 2 * degree, basix.MapType.identity
+    made: Any = basix.ufl.custom_element(
+        kind, [], coefficients, where + empty, what + empty, 0, identity, smooth, False, none, highest, standard
+    )
+    return made
+
+
+def _points(found: Sequence[Index], corners: Array) -> Array:
+    """The points of bubbles in a cell, (bubbles, d)."""
+    if not found:
+        return np.zeros((0, corners.shape[1]))
+    return np.asarray(np.array(found) / sum(found[0]) @ corners)
+
+
+def _coefficients(cell: str, degree: int) -> Array:
+    """The bubbles in the orthonormal polynomials of degree 2p, (bubbles, polynomials)."""
+    barycentric, weights = quadrature(cell, 4 * degree)
+    kind, points = basix.CellType[cell], barycentric[:, 1:]
+    legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, 2 * degree, points)
+    values = [shape(index, barycentric) for index in of_cell(degree, cell)]
+    volume = 1.0 / math.factorial(barycentric.shape[1] - 1)
+    return np.asarray(np.einsum("iq,q,jq->ij", np.array(values), volume * weights, legendre))
+
+
+def space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
+    """Vector-valued bubbles. Collective.
+
+    Args:
+        mesh: the mesh.
+        degree: p, that of the solution.
+    """
+    mesh.topology.create_entities(1)
+    scalar = element(mesh.topology.cell_name(), degree)
+    return fem.functionspace(mesh, basix.ufl.blocked_element(scalar, shape=(mesh.geometry.dim,)))
+
+
+_WEAK = 0.05
+"""Springs below this part of a bubble's own stiffness need not hold it."""
+
+_PIECE = 8192
+"""Blocks of which a few vectors fit into a processor's cache."""
+
+
+class Held(Protocol):
+    """What holds bubbles at some blocks, as the bounds of a part do."""
+
+    def project(self, r: Array) -> None:
+        """Take out of r (n, d) what is held, in place."""
+        ...
+
+
+class Springs(Protocol):
+    """What holds bubbles elastically, as laws do."""
+
+    def diagonal(self) -> BlockForces:
+        """Forces for a unit of each bubble, at the owned blocks. Collective."""
+        ...
+
+    def times(self, e: fem.Function) -> BlockForces:
+        """Forces of bubbles, at the owned blocks. Collective.
+
+        Args:
+            e: the bubbles, ghosts updated.
+        """
+        ...
+
+
+class BubbleStiffness:
+    """The elastic stiffness of the bubbles, nondimensional: its products and its diagonal. Creation is collective.
+
+    It is not stored. In space it would take 9 kB a vertex at degree 1, more than all else of a run, and take longer to
+    assemble than the few products that are wanted of it.
+
+    Attributes:
+        problem: whose elastic operator it is.
+        space: the bubbles.
+        comm: the ranks.
+    """
+
+    def __init__(self, problem: Problem, bubbles: fem.FunctionSpace) -> None:
+        self.problem, self.space = problem, bubbles
+        self.comm: MPI.Comm = bubbles.mesh.comm
+        self._inverse = diagonal(problem, bubbles)  # first: the vectors take the memory that it frees
+        np.reciprocal(self._inverse, out=self._inverse)
+        self._in, self._out = fem.Function(bubbles), fem.Function(bubbles)
+        self._action = forms.compiled(problem.bulk.between(self._in, ufl.TestFunction(bubbles)))
+        self._springs: Springs | None = None
+        self._sprung: tuple[Entities, Array] = np.empty(0, np.int32), np.empty((0, self._inverse.shape[1]))
+
+    def hold(self, springs: Springs) -> bool:
+        """Add springs to the stiffness, in the place of those before; say whether there are strong ones. Collective.
+
+        Args:
+            springs: none are added where all are weaker than a twentieth of the bubbles that they hold.
+        """
+        at, elastic = self._sprung
+        self._inverse[at] = elastic
+        rates = springs.diagonal()
+        matter = bool(np.any(rates.values * self._inverse[rates.blocks] > _WEAK))
+        strong = bool(self.comm.allreduce(matter, op=MPI.LOR))
+        self._springs = springs if strong else None
+        at = rates.blocks if strong else rates.blocks[:0]
+        self._sprung = at, self._inverse[at]
+        self._inverse[at] = 1.0 / (1.0 / self._inverse[at] + rates.values[: len(at)])
+        return strong
+
+    def times(self, e: Array) -> Array:
+        """A e of owned values (n, d), overwritten by the next product. Collective."""
+        self._owned(self._in)[:] = e
+        return self._product()
+
+    def _product(self) -> Array:
+        """A e of what the owned values are that products are made of; overwritten by the next one. Collective."""
+        self._in.x.scatter_forward()
+        self._out.x.array[:] = 0.0
+        fem.assemble_vector(self._out.x.array, self._action)
+        self._out.x.scatter_reverse(la.InsertMode.add)
+        result = self._owned(self._out)
+        if self._springs is not None:
+            force = self._springs.times(self._in)
+            result[force.blocks] += force.values
+        return result
+
+    def _owned(self, field: fem.Function) -> Array:
+        """The owned values of a field of bubbles, (n, d), in place."""
+        return np.asarray(field.x.array[: self._inverse.size].reshape(self._inverse.shape))
+
+    def work(self, e: Array, force: BlockForces) -> float:
+        """The work of a force on bubbles. Collective.
+
+        Args:
+            e: the bubbles, (n, d).
+            force: on them.
+        """
+        return self._dot(e[force.blocks], force.values)
+
+    def diagonal_solve(self, r: Array, at: Entities) -> Array:
+        """The diagonal's inverse times r at some blocks, (k, d).
+
+        Args:
+            r: there, (k, d).
+            at: the owned blocks, (k,).
+        """
+        return np.asarray(r * self._inverse[at])
+
+    def descent(self, r: Array, held: Sequence[Held], at: Entities) -> Array:
+        """P D⁻¹ P r, D being the diagonal and P taking out what is held; overwritten by the next product.
+
+        Args:
+            r: (n, d).
+            held: what is.
+            at: the blocks where something is, (k,).
+        """
+        z = np.multiply(r, self._inverse, out=self._owned(self._out))
+        z[at] = r[at]
+        for part in held:
+            part.project(z)
+        z[at] *= self._inverse[at]
+        for part in held:
+            part.project(z)
+        return z
+
+    def move(self, r: Array, e: Array, at: Entities, step: Array) -> float:
+        """Change e at some blocks and the residual with it, in place. Collective.
+
+        Args:
+            r: the residual load - A e, (n, d).
+            e: (n, d).
+            at: the owned blocks, (k,).
+            step: of e there, (k, d).
+
+        Returns:
+            By how much e·A e grows.
+        """
+        if not self.comm.allreduce(bool(step.any()), op=MPI.LOR):
+            return 0.0
+        p = self._owned(self._in)
+        p[:] = 0.0
+        p[at] = step
+        q = self._product()
+        return self._dot(p, q) + self._moved(r, e, 1.0, p, q)
+
+    def _moved(self, r: Array, e: Array, alpha: float, p: Array, q: Array) -> float:
+        """Add α p to e, and -α q to r, q being A p: 2 e·A (α p) before. Collective."""
+        mixed = 2 * alpha * self._dot(e, q)
+        _add(e, alpha, p)
+        _add(r, -alpha, q)
+        return mixed
+
+    def square(self, r: Array, descent: Callable[[Array], Array]) -> float:
+        """The square of a residual's norm. Collective.
+
+        Args:
+            r: (n, d).
+            descent: as :meth:`descent`.
+        """
+        return self._dot(r, descent(r))
+
+    def solve(self, r: Array, e: Array, descent: Callable[[Array], Array], *, goal: float, max_steps: int) -> float:
+        """A e = load among e + the range of a symmetric projection, by conjugate gradients; in place. Collective.
+
+        Args:
+            r: the residual load - A e, what is not free included, (n, d).
+            e: start and result, (n, d).
+            descent: of a residual, as :meth:`descent`.
+            goal: square of the residual's norm at which to end.
+            max_steps: of the conjugate gradients.
+
+        Returns:
+            By how much e·A e grows.
+        """
+        p, rho, growth = self._owned(self._in), 0.0, 0.0  # in place: they are large
+        for step in range(max_steps):
+            z = descent(r)
+            rho, before = self._dot(r, z), rho
+            if rho <= goal:
+                break
+            _combine(p, z, rho / before if step else 0.0)
+            q = self._product()
+            alpha = rho / self._dot(p, q)
+            growth += alpha * rho + self._moved(r, e, alpha, p, q)
+        return growth
+
+    def _dot(self, a: Array, b: Array) -> float:
+        return float(self.comm.allreduce(float(np.vdot(a, b)), op=MPI.SUM))
+
+
+def _pieces(count: int) -> Iterator[slice]:
+    """Slices of so few blocks that what is done with one stays in the processor's cache."""
+    return (slice(start, start + _PIECE) for start in range(0, count, _PIECE))
+
+
+def _add(y: Array, factor: float, x: Array) -> None:
+    """Add factor x to y, without a temporary array of their size."""
+    for at in _pieces(len(y)):
+        y[at] += factor * x[at]
+
+
+def _combine(p: Array, z: Array, factor: float) -> None:
+    """Set p to z + factor p; p is not read where the factor is 0."""
+    if factor == 0.0:
+        np.copyto(p, z)
+        return
+    for at in _pieces(len(p)):
+        p[at] *= factor
+        p[at] += z[at]
+
+
+def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
+    """The diagonal of the bubbles' stiffness at the blocks that this rank owns, (n, d). Collective.
+
+    On a cell in which the material is constant it is a sum of the energies of the affine functions λ_a and λ_a + λ_b
+    (:func:`energy_shares`); what a foundation adds is that of a constant, by the mean of the bubble's square. At a
+    bubble's own point no other bubble has a value, so a linear form whose quadrature points are these takes each
+    energy to the bubbles that have a share in it.
+
+    Args:
+        problem: whose elastic operator it is.
+        bubbles: the space of bubbles.
+    """
+    v, integrals = ufl.TestFunction(bubbles), []
+    for form, height, shares in _energies(problem):
+        each = [_over_cells(_energy(problem, form, height, axis)) for axis in range(problem.scales.dimension)]
+        for along in zip(*each, strict=True):
+            density = ufl.dot(ufl.as_vector([integral.integrand() for integral in along]), v)
+            for share in sorted(set(shares.values())):
+                rule = _rule([index for index, own in shares.items() if own == share])
+                integrals.append(along[0].reconstruct(integrand=share * density, metadata=rule))
+    return nodal_sum(ufl.Form(integrals))
+
+
+def _energies(problem: Problem) -> Iterator[tuple[Any, Any, Mapping[Index, float]]]:
+    """Functions whose energies make up those of a cell's bubbles: the form, the function, the bubbles' shares.
+
+    The energies of λ_a + λ_b and of the others' sum are one, since all together are constant.
+    """
+    d, cell = problem.scales.dimension, problem.space.mesh.topology.cell_name()
+    hats, of_bubbles = np.vstack([-np.ones(d), np.eye(d)]), of_cell(nodes.degree(problem.space), cell)
+    slopes = [*hats, *(hats[a] + hats[b] for a, b in itertools.combinations(range(d + 1), 2))]
+    upward = [tuple((one * np.sign(one[np.flatnonzero(one)[0]])).tolist()) for one in slopes]
+    of_slopes: dict[tuple[float, ...], dict[Index, float]] = {}
+    for index in of_bubbles:
+        for number, share in energy_shares(index, cell):
+            shares = of_slopes.setdefault(upward[number], {})
+            shares[index] = shares.get(index, 0.0) + share * 16 / ((d + 1) * (d + 2))
+    mesh = problem.space.mesh
+    place = ufl.JacobianInverse(mesh) * (ufl.SpatialCoordinate(mesh) - ufl.classes.CellVertices(mesh)[0, :])
+    for affine, shares in of_slopes.items():
+        yield problem.bulk.material, ufl.dot(ufl.as_vector(affine), place), shares
+    if problem.bulk.foundation is not None:
+        squares = {index: _mean_square(index, cell) for index in of_bubbles}
+        yield problem.bulk.foundation, fem.Constant(mesh, 1.0), squares
+
+
+def _energy(problem: Problem, form: Any, height: Any, axis: int) -> Any:
+    """The form of the energy of a function along an axis, in UFL."""
+    d, arguments = problem.scales.dimension, problem.bulk.form.arguments()
+    moved = ufl.as_vector([height if i == axis else 0.0 for i in range(d)])
+    return ufl.replace(form, dict.fromkeys(arguments, moved))
+
+
+def _over_cells(form: Any) -> list[Any]:
+    """The integrals of a form over cells."""
+    return [integral for integral in form.integrals() if integral.integral_type() == "cell"]
+
+
+def _rule(places: list[Index]) -> dict[str, Any]:
+    """A quadrature rule of the points of some bubbles, each with the whole cell for its weight."""
+    points = [[part / sum(index) for part in index[1:]] for index in places]
+    weights = [1 / math.factorial(len(point)) for point in points]
+    return {"quadrature_rule": "custom", "quadrature_points": points, "quadrature_weights": weights}
+
+
+@functools.cache
+def energy_shares(index: Index, cell: str) -> list[tuple[int, float]]:
+    """The energy of a bubble as a sum of those of affine functions: numbers and shares, times (d + 1)(d + 2)/16.
+
+    The gradient is Σ ∂φ/∂λ_a ∇λ_a, so a(φ, φ) = Σ G_ab a(λ_a, λ_b), G_ab being the mean of ∂φ/∂λ_a ∂φ/∂λ_b.
+
+    Args:
+        index: of the bubble.
+        cell: the name of the cell's shape.
+
+    Returns:
+        First of λ_a by a, then of λ_a + λ_b by pairs a < b; those that are zero are left out.
+    """
+    barycentric, weights = quadrature(cell, 4 * sum(index))
+    slopes = [slope(index, corner, barycentric) for corner in range(len(index))]
+    mean = np.array([[np.sum(weights * a * b) for b in slopes] for a in slopes])
+    pairs = itertools.combinations(range(len(index)), 2)
+    shares = [2 * mean[a, a] - mean[a].sum() for a in range(len(index))] + [mean[a, b] for a, b in pairs]
+    rounded = np.round(np.array(shares) * len(index) * (len(index) + 1) / 16, 12)
+    return [(number, float(share)) for number, share in enumerate(rounded) if share]
+
+
+@functools.cache
+def _mean_square(index: Index, cell: str) -> float:
+    """The mean of the square of a bubble over a cell.
+
+    Args:
+        index: of the bubble.
+        cell: the name of the cell's shape.
+    """
+    barycentric, weights = quadrature(cell, 2 * sum(index))
+    return float(np.round(np.sum(weights * shape(index, barycentric) ** 2), 12))

@@ -1,0 +1,165 @@
+"""The error that bubbles, nodes and laws make together.
+
+The bubbles alone, on nodes that stay, see too little of it on a mesh that is too coarse for the bending of a body.
+And a law that drops ties them together:
+what drops within an edge leaves a force on the nodes. They move, the place of the drop moves with them, and
+the force with that place. On one mesh several neighbouring nodes may be the last before the drop, each of them in
+equilibrium, so the place is wrong by several edges: more than the bubbles of one edge see.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..certify.law_state import LawState
+from ..laws import Superpotential
+from ..runtime.mpi import total
+from ..typing import Array
+from . import defect
+from .bubbles import BlockForces, BubbleStiffness, summed
+from .dual_norm import DualNorm
+from .law_traces import ErrorField, LawSprings, LawTraces, Trace
+
+
+def within_facets(traces: LawTraces) -> bool:
+    """Whether a law, as it is solved, drops between the nodes of a facet. Collective."""
+    found = [
+        bool(np.any(heights(traces.part(state.surface, law.term.directions), law, law.term.law)))
+        for state in traces.states
+        for law in state.laws
+    ]
+    return bool(traces.problem.domain.mesh.comm.allreduce(any(found), op=MPI.LOR))
+
+
+def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
+    """By how much the law drops within each facet, (f,). Collective.
+
+    Args:
+        points: of the law's part.
+        law: its state.
+        of: the law, as it is or as it is solved.
+    """
+    of_nodes = points.at_nodes if law.term.radial else points.components_at_nodes
+    ends = of_nodes(law.argument[:, None])[:, :, 0]
+    low, high = ends.min(axis=1, initial=np.inf), ends.max(axis=1, initial=-np.inf)
+    height = np.zeros(len(ends))
+    for kink, jump in zip(of.concave.kinks, of.concave.jumps, strict=True):
+        height += jump * ((low < kink) & (kink < high))
+    return height
+
+
+class Coupled:
+    """The forms and constraints of bubbles and nodes that are found together. Creation is collective.
+
+    Args:
+        traces: the laws between the nodes.
+        inverse: of the system.
+        stiffness: of the bubbles.
+
+    Attributes:
+        error: as it is known so far.
+    """
+
+    def __init__(self, traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> None:
+        problem, space = traces.problem, traces.bubbles
+        self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
+        self._longest = 0.0
+        self.error = ErrorField(fem.Function(problem.space), fem.Function(space))
+        load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
+        self._laws, _ = traces.tested()
+        load[self._laws.blocks] -= self._laws.values
+        under = defect.constraints(problem, traces.u, space)
+        self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load, self._thresholds)
+        self._moved = fem.Function(problem.space)
+        self._of_moved = problem.bulk.force_in(space, self._moved)
+        self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
+        self._shared, self._strongest = 0.0, 0.0
+        self._answer = summed((), problem.scales.dimension)
+        self._force: Array = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
+
+    @property
+    def residual(self) -> Array:
+        """What the bubbles feel beside the error, what is held included, (n, d)."""
+        return self._least.residual
+
+    @property
+    def size(self) -> float:
+        """The energy norm of the error. Collective."""
+        problem = self._traces.problem
+        relative = problem.relative(self.error.nodes.x.array)[: self._force.size]
+        of_nodes = total(problem.domain.mesh.comm, float(np.vdot(relative, self._force)))
+        return float(np.sqrt(max(self._least.energy + 2 * self._shared + of_nodes, 0.0)))
+
+    def find_bubbles(self) -> None:
+        """Find the bubbles that belong to the nodes. Collective."""
+        self._least.find_beside(LawSprings(self._traces, self.error))
+
+    def move_nodes(self) -> None:
+        """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
+        traces, inverse, nodes = self._traces, self._inverse, self.error.nodes
+        np.negative(nodes.x.array, out=self._moved.x.array)
+        of_bubbles = self._of_bubbles.values()
+        asked = traces.problem.combined(of_bubbles)
+        for number in range(self._thresholds.rounds):
+            _, laws = traces.tested(self.error)
+            if self._settled(laws) and number > 0:
+                break
+            unmet = -asked
+            unmet -= self._force
+            unmet[laws.blocks] += laws.values
+            step, length = inverse.solve(unmet, self._thresholds.rough_tolerance)
+            nodes.x.array[:] += step.x.array
+            self._force = inverse.force(nodes)
+            self._longest = max(self._longest, length)
+            if length <= self._thresholds.answer_change * self._longest:
+                break
+        if inverse.keep_within_bounds(nodes):
+            self._force = inverse.force(nodes)
+        self._moved.x.array[:] += nodes.x.array
+        work = float(np.vdot(nodes.x.array[: of_bubbles.size], of_bubbles))
+        self._shared = total(traces.problem.domain.mesh.comm, work)
+
+    def _settled(self, laws: BlockForces) -> bool:
+        """Whether the laws' force on the nodes is nearly the one before. Collective."""
+        comm = self._traces.problem.domain.mesh.comm
+        changed = np.sqrt(total(comm, float(np.sum((laws - self._answer).values ** 2))))
+        self._answer, self._strongest = laws, max(self._strongest, changed)
+        return bool(changed <= self._thresholds.coupled_change * self._strongest)
+
+    def tell_bubbles(self) -> None:
+        """Let the bubbles feel that nodes and laws have moved. Collective."""
+        before = self._laws
+        self._laws, _ = self._traces.tested(self.error)
+        fallen = before - self._laws
+        self._least.residual[fallen.blocks] += fallen.values
+        self._least.residual -= self._of_moved.values()
+
+
+def of_solution(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> tuple[ErrorField, Array]:
+    """Bubbles and nodes in turns, each under the influence of the other, until their energy settles. Collective.
+
+    Args:
+        traces: the laws between the nodes.
+        inverse: of the system.
+        stiffness: of the bubbles.
+
+    Returns:
+        The estimated error, and η_K² of the owned cells.
+    """
+    error = _found(traces, inverse, stiffness)
+    return error, traces.problem.bulk.energy_by_cell(error.nodes + error.bubbles)
+
+
+def _found(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> ErrorField:
+    """The estimated error. Collective."""
+    coupled, size = Coupled(traces, inverse, stiffness), 0.0
+    for _ in range(traces.thresholds.coupled_rounds):
+        coupled.find_bubbles()
+        coupled.move_nodes()
+        before, size = size, coupled.size
+        if abs(size - before) <= traces.thresholds.coupled_change * size:
+            break
+        coupled.tell_bubbles()
+    return coupled.error

@@ -1,0 +1,417 @@
+"""The data on the boundary that vary in space, and samples of them within facets."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import basix
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from ..certify.contact_state import ContactState
+from ..formula import SpatialValue
+from ..problem import spaces
+from ..problem.elastic_operator import stiffness_tensor
+from ..problem.problem import Bounds, PrescribedComponent, Problem
+from ..runtime.mpi import total
+from ..typing import Array, Entities
+from .bubbles import of_facet, quadrature, shape
+from .contact_facets import ContactFacets, PartTrace, contact_facets
+from .thresholds import EstimateThresholds
+
+
+def varies(value: SpatialValue | None) -> bool:
+    """Whether a value varies in space and is known between nodes."""
+    return value is not None and value.everywhere and not value.is_number
+
+
+def tractions(problem: Problem) -> Iterator[tuple[Entities, int, SpatialValue]]:
+    """The facets, the component and the value of each traction that varies."""
+    for where, effect, _ in problem.contributions:
+        load = effect.surface_load()
+        if where is None or load is None:
+            continue
+        for axis, value in enumerate(load.components):
+            if varies(value):
+                yield problem.part_facets[where], axis, value
+
+
+def gaps(problem: Problem) -> Iterator[tuple[Bounds, SpatialValue | None, SpatialValue | None]]:
+    """The bounds of each part of the boundary with contact, and the values of lower and upper -u·n that vary."""
+    stated = [b for where, _, c in problem.contributions if where is not None for b in c.bounds]
+    for bounds, values in zip(problem.bounds, stated, strict=True):
+        if problem.interface_of(bounds.surface) is not None:
+            continue
+        lower, upper = (value if varies(value) else None for value in (values.lower, values.upper))
+        yield bounds, lower, upper
+
+
+def everything(problem: Problem) -> Iterator[tuple[Entities, SpatialValue]]:
+    """The facets and the value of all that varies on the boundary."""
+    for facets, _, value in tractions(problem):
+        yield facets, value
+    for part in problem.prescribed:
+        if varies(part.value):
+            yield part.facets, part.value
+    for bounds, *values in gaps(problem):
+        yield from ((bounds.surface.facets, value) for value in values if value is not None)
+
+
+@dataclass(frozen=True)
+class FacetSamples:
+    """Sample points (q of them) within facets (f).
+
+    Attributes:
+        facets: whose cells this rank owns.
+        nodes: their nodes, corners first, m, (f, n, 3).
+        barycentric: the sample points in barycentric coordinates, (q, d).
+        weights: of the points; their sum is 1, (q,).
+    """
+
+    facets: ContactFacets
+    nodes: Array
+    barycentric: Array
+    weights: Array
+
+    @property
+    def corners(self) -> Array:
+        """The vertices, m, (f, d, 3)."""
+        return self.nodes[:, : self.facets.dimension]
+
+    def interpolated(self, at_nodes: Array, at: Array | None = None) -> Array:
+        """Values at the nodes, interpolated at points, (f, q).
+
+        Args:
+            at_nodes: the values, (f, n).
+            at: the points in barycentric coordinates, (q, d); by default the sample points.
+        """
+        points = self.barycentric if at is None else at
+        return np.asarray(at_nodes @ spaces.simplex_functions(self.facets.degree, points).T)
+
+    def of(self, value: SpatialValue, at: Array | None = None) -> Array:
+        """A value at points, SI, (f, q).
+
+        Args:
+            value: on the boundary.
+            at: the points in barycentric coordinates, (q, d); by default the sample points.
+        """
+        points = self.points if at is None else self.places(at)
+        return value.at(points.reshape(-1, 3)).reshape(points.shape[:2])
+
+    @functools.cached_property
+    def points(self) -> Array:
+        """The sample points, m, (f, q, 3)."""
+        return self.places(self.barycentric)
+
+    def places(self, at: Array) -> Array:
+        """Points of the facets, on the curve where a facet is curved, m, (f, q, 3).
+
+        Args:
+            at: in barycentric coordinates, (q, d).
+        """
+        return np.asarray(np.einsum("qn,fni->fqi", spaces.simplex_functions(self.facets.degree, at), self.nodes))
+
+    def beyond_nodes(self, value: SpatialValue, at: Array | None = None) -> Array:
+        """What interpolation between the nodes leaves of a value at points, SI, (f, q).
+
+        Args:
+            value: on the boundary.
+            at: the points in barycentric coordinates, (q, d); by default the sample points.
+        """
+        at_nodes = value.at(self.nodes.reshape(-1, 3)).reshape(self.nodes.shape[:2])
+        return np.asarray(self.of(value, at) - self.interpolated(at_nodes, at))
+
+
+def sample(
+    problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: EstimateThresholds
+) -> FacetSamples:
+    """Samples of boundary facets, exact for products of the modes of the data. Collective.
+
+    Args:
+        problem: the mesh.
+        bubbles: the space of bubbles.
+        facets: the local facets.
+        thresholds: the degree of the modes.
+    """
+    found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
+    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * thresholds.data_degree[d - 2])
+    return FacetSamples(found, problem.positions[found.nodes], barycentric, weights)
+
+
+@dataclass(frozen=True)
+class FacetModes(FacetSamples):
+    """Legendre modes (m of them) on facets (f), at q sample points.
+
+    Attributes:
+        values: of the modes at the points, orthonormal under the weights, (m, q).
+        degrees: of the modes, (m,).
+        compliance: nondimensional displacement by traction of the wave of one half-length, along each axis, (f, d).
+    """
+
+    values: Array
+    degrees: Array
+    compliance: Array
+
+    def coefficients(self, sampled: Array) -> Array:
+        """The coefficients of sampled values (f, q), (f, m)."""
+        return np.asarray((sampled * self.weights) @ self.values.T)
+
+    def energies(self, tractions: Array, compliance: Array, lowest: int) -> Array:
+        """Energies a(w, w) of the displacements w that tractions cause, (f,).
+
+        Args:
+            tractions: nondimensional, (f, q).
+            compliance: of the facets in the direction of the tractions, (f,).
+            lowest: degree from which modes count.
+        """
+        squares = self.coefficients(tractions) ** 2 / (self.degrees + 0.5)
+        return np.asarray(self.facets.areas * compliance * np.sum(squares[:, self.degrees >= lowest], axis=1))
+
+    def energies_of_displacements(self, displacements: Array, compliance: Array) -> Array:
+        """Energies a(w, w) of displacements w, (f,).
+
+        Args:
+            displacements: nondimensional, (f, q).
+            compliance: of the facets in the direction of the displacements, (f,).
+        """
+        squares = self.coefficients(displacements) ** 2 * (self.degrees + 0.5)
+        return np.asarray(self.facets.areas / compliance * np.sum(squares, axis=1))
+
+
+def facet_modes(
+    problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: EstimateThresholds
+) -> FacetModes:
+    """The modes on boundary facets. Collective.
+
+    Args:
+        problem: the mesh.
+        bubbles: the space of bubbles.
+        facets: the local facets.
+        thresholds: how many modes.
+    """
+    at, d = sample(problem, bubbles, facets, thresholds), problem.scales.dimension
+    degree, kind = thresholds.data_degree[d - 2], basix.CellType.interval if d == 2 else basix.CellType.triangle
+    legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, at.barycentric[:, 1:])
+    values = legendre / math.sqrt(math.factorial(d - 1))
+    degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
+    material = stiffness_tensor(problem.bulk, at.facets.cells)
+    size = (math.factorial(d - 1) * at.facets.areas) ** (1 / (d - 1))  # in space, a leg of a right triangle
+    compliance = size[:, None] / math.pi * surface_compliance(material, at.corners)
+    return FacetModes(at.facets, at.nodes, at.barycentric, at.weights, values, degrees, compliance)
+
+
+_ANGLES = 32
+"""Angles of the rectangle rule on a periodic integrand; an isotropic material is met to 1e-12."""
+
+_DIRECTIONS = 4
+"""Directions of the waves on a surface in space, over which the compliance is averaged."""
+
+
+def surface_compliance(stiffness: Array, corners: Array) -> Array:
+    """Diagonal of L⁻¹, surface displacement by traction for k = 1, along each axis, (f, d).
+
+    Args:
+        stiffness: C_ijkl below each facet, (f, d, d, d, d).
+        corners: of the facets, (f, d, 3); in space, the mean of all waves along the facet.
+    """
+    d = corners.shape[1]
+    sides = np.asarray((corners[:, 1:] - corners[:, :1])[:, :, :d], dtype=np.float64)
+    along = _unit(sides[:, 0])
+    normals = (
+        np.stack([along[:, 1], -along[:, 0]], axis=1)
+        if d == 2
+        else _unit(np.asarray(np.cross(along, sides[:, 1]), dtype=np.float64))
+    )
+    waves = [along]
+    if d == 3:
+        across, angles = np.cross(normals, along), np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
+        waves = [np.cos(a) * along + np.sin(a) * across for a in angles]
+    inverses = np.linalg.inv(np.array([_barnett_lothe(stiffness, wave, normals) for wave in waves]))
+    return np.asarray(np.einsum("wfii->fi", inverses) / len(waves))
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:
+    """L of waves and normals (f, d), (f, d, d)."""
+    along, across = (np.einsum("fijkl,fj->fikl", stiffness, one) for one in (wave, normal))
+    ww, nw = (np.einsum("fikl,fl->fik", one, wave) for one in (along, across))
+    wn, nn = (np.einsum("fikl,fl->fik", one, normal) for one in (along, across))
+    angles = (np.arange(_ANGLES) * np.pi / _ANGLES)[:, None, None, None]
+    c, s = np.cos(angles), np.sin(angles)  # of m = c wave + s normal, n = c normal - s wave
+    q = c * c * ww + c * s * (wn + nw) + s * s * nn
+    r = c * c * wn + c * s * (nn - ww) - s * s * nw
+    t = c * c * nn - c * s * (wn + nw) + s * s * ww
+    return np.asarray(np.mean(q - r @ np.linalg.solve(t, np.swapaxes(r, -1, -2)), axis=0))
+
+
+def redistributed(
+    comm: MPI.Comm,
+    on: FacetModes,
+    pushes: Array,
+    gaps: Array,
+    compliance: Array,
+    *,
+    free: bool,
+    thresholds: EstimateThresholds,
+) -> Array:
+    """Pressures p ≥ 0 with w ≤ gap and p (gap - w) = 0, w being what the pushes less p cause, (f, q). Collective.
+
+    Args:
+        comm: the ranks.
+        on: the facets.
+        pushes: pressures that are given, (f, q).
+        gaps: how far the facets are from the obstacle, (f, q).
+        compliance: of the facets along the normal, (f,).
+        free: whether the body may move along the normal.
+        thresholds: how many rounds.
+    """
+    kernel = (on.values.T / (on.degrees + 0.5)) @ on.values * on.weights
+    missing = np.eye(len(on.weights)) - on.values.T @ on.values * on.weights
+    kernel += missing / (on.degrees[-1] + 1.5)
+    within, pressure = gaps / compliance[:, None], pushes.copy()
+    if not free:
+        return _solved(kernel, pushes, within, pressure, 4 * thresholds.coupled_rounds)
+    areas = on.facets.areas[:, None] * on.weights
+    wanted = total(comm, float(np.sum(areas * pushes)))
+    if wanted == 0.0:
+        return pressure
+    reach = (pushes @ kernel.T) * compliance[:, None]
+    low = comm.allreduce(float(np.min(gaps - reach, initial=0.0)), op=MPI.MIN)
+    high = comm.allreduce(float(np.max(gaps, initial=0.0)), op=MPI.MAX)
+    for _ in range(thresholds.gap_shifts):
+        shift = (low + high) / 2
+        pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, thresholds.coupled_rounds)
+        more = total(comm, float(np.sum(areas * pressure))) > wanted
+        low, high = (low, shift) if more else (shift, high)
+    return pressure
+
+
+def _solved(kernel: Array, pushes: Array, within: Array, pressure: Array, sweeps: int) -> Array:
+    """Projected Gauss-Seidel sweeps over the points, all facets at once, (f, q)."""
+    p = pressure.copy()
+    beyond = (pushes - p) @ kernel.T - within
+    for _ in range(sweeps):
+        for i, own in enumerate(np.diag(kernel)):
+            change = np.maximum(beyond[:, i] / own, -p[:, i])
+            p[:, i] += change
+            beyond -= change[:, None] * kernel[:, i]
+    return p
+
+
+_ALONG = 1e-6
+"""Share of a mean normal along an axis from which it has a component there."""
+
+
+def squares(
+    problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState], thresholds: EstimateThresholds
+) -> Array:
+    """η_K² of the owned cells that the data within facets add. Collective.
+
+    Args:
+        problem: what was solved.
+        bubbles: the space of bubbles.
+        states: of the parts of Γc at the solution.
+        thresholds: how finely the data are sampled.
+    """
+    found = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
+
+    known: dict[int, FacetModes] = {}
+
+    def modes(facets: Entities) -> FacetModes:
+        if id(facets) not in known:
+            known[id(facets)] = facet_modes(problem, bubbles, facets, thresholds)
+        return known[id(facets)]
+
+    for facets, axis, value in tractions(problem):
+        on = modes(facets)
+        rest = on.energies(
+            np.asarray(on.of(value) / problem.scales.stress), on.compliance[:, axis], lowest=on.facets.degree
+        )
+        np.add.at(found, on.facets.cells, rest)
+    for part in problem.prescribed:
+        if varies(part.value):
+            on = modes(part.facets)
+            np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
+    for obstacle in _obstacles(problem, states, modes, thresholds.near):
+        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(problem, bubbles, obstacle, thresholds))
+    return found
+
+
+def _unprescribed(problem: Problem, on: FacetModes, part: PrescribedComponent) -> Array:
+    """Energies of what interpolation of twice the degree leaves of a prescribed displacement, (f,)."""
+    rest = on.beyond_nodes(part.value)
+    for index in of_facet(on.facets.degree, problem.scales.dimension):
+        there = on.beyond_nodes(part.value, np.array([index]) / sum(index))
+        rest -= there * shape(index, on.barycentric)
+    rest /= problem.scales.displacement
+    return on.energies_of_displacements(rest, on.compliance[:, part.component])
+
+
+@dataclass(frozen=True)
+class _Obstacle:
+    """One side's gap of a part with contact, nondimensional.
+
+    Attributes:
+        bounds: of the part.
+        push: pressure of the body against it at the nodes, (m,).
+        gap: distance from it at the nodes, (m,).
+        within: what interpolation between the nodes leaves of the gap at the sample points, (f, q).
+        on: the facets of the part.
+    """
+
+    bounds: Bounds
+    push: Array
+    gap: Array
+    within: Array
+    on: FacetModes
+
+
+def _obstacles(
+    problem: Problem, states: Sequence[ContactState], modes: Callable[[Entities], FacetModes], rounding: float
+) -> Iterator[_Obstacle]:
+    """The sides of the parts with contact whose gap varies within facets by more than rounding. Collective."""
+    for bounds, lower, upper in gaps(problem):
+        state = next(s for s in states if s.surface is bounds.surface)
+        for value, sign, bound in ((lower, -1.0, bounds.upper), (upper, 1.0, -bounds.lower)):
+            if value is None:
+                continue
+            on = modes(bounds.surface.facets)
+            within = np.asarray(-sign * on.beyond_nodes(value) / problem.scales.displacement)
+            if problem.domain.mesh.comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) > rounding:
+                push, gap = sign * state.contact_pressure, bound + sign * state.normal
+                yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
+
+
+def _moved_pressure(
+    problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle, thresholds: EstimateThresholds
+) -> Array:
+    """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
+    surface, on = obstacle.bounds.surface, obstacle.on
+    trace = PartTrace(problem, bubbles, surface, surface.normals[:, None, :], 1)
+    normals = trace.at_nodes(surface.normals).mean(axis=1)
+    compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
+    pushes, gaps = (on.interpolated(trace.at_nodes(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
+    solve = functools.partial(
+        redistributed,
+        comm=problem.domain.mesh.comm,
+        on=on,
+        pushes=pushes,
+        compliance=compliance,
+        free=not _held(problem, surface.normals),
+        thresholds=thresholds,
+    )
+    return on.energies(solve(gaps=gaps + obstacle.within) - solve(gaps=gaps), compliance, lowest=0)
+
+
+def _held(problem: Problem, normals: Array) -> bool:
+    """Whether a prescribed component holds the body against a translation along a part's mean normal. Collective."""
+    mean = [abs(total(problem.domain.mesh.comm, float(along))) for along in normals.sum(axis=0)]
+    return any(mean[part.component] > _ALONG * max(mean) for part in problem.prescribed)

@@ -1,0 +1,430 @@
+"""What the bubbles must meet: prescribed displacements, and the bounds of contact at the points of the bubbles.
+
+The constraints are those of the inequality at these points (Kornhuber 1996; Zou, Veeser, Kornhuber and Gräser 2011).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem, la
+from mpi4py import MPI
+
+from ..mesh import nodes
+from ..problem import spaces
+from ..problem.problem import Bounds, Problem
+from ..runtime import forms
+from ..typing import Array, Entities, Mask
+from .bubbles import BubbleStiffness, Springs, of_cell
+from .dual_norm import DualNorm
+from .law_traces import ErrorField, LawSprings, LawTraces
+from .thresholds import DEFAULT, EstimateThresholds
+
+_FAR = 1e30
+"""Stands for no bound: an infinite nodal value has no interpolant."""
+
+
+@dataclass(frozen=True)
+class BubbleBounds:
+    """Bounds at the points of a part's bubbles (k of them): lower ≤ e·n ≤ upper.
+
+    Attributes:
+        blocks: the bubbles' owned blocks, (k,).
+        normals: outward unit normals, (k, d).
+        lower: lower bounds, (k,).
+        upper: upper bounds, (k,).
+        side: 1 where e is held on the upper bound, -1 on the lower one, else 0; (k,).
+    """
+
+    blocks: Entities
+    normals: Array
+    lower: Array
+    upper: Array
+    side: npt.NDArray[np.int8]
+
+    def component(self, e: Array) -> Array:
+        """The normal component e·n at the points, (k,)."""
+        return np.asarray(np.sum(e[self.blocks] * self.normals, axis=1))
+
+    def updated(self, e: Array, force: Array) -> BubbleBounds:
+        """Held where e leaves the bounds, let go where a force draws away from the bound that holds.
+
+        Args:
+            e: the bubbles at the points, (k, d).
+            force: the force on them, (k, d).
+        """
+        along, push = np.sum(e * self.normals, axis=1), np.sum(force * self.normals, axis=1)
+        upper = np.where(self.side == 1, push >= 0, along > self.upper)
+        lower = np.where(self.side == -1, push <= 0, along < self.lower)
+        return replace(self, side=np.where(upper, 1, np.where(lower, -1, 0)).astype(np.int8))
+
+    def put_on_bounds(self, e: Array) -> None:
+        """Put e (n, d) on the bounds that hold it, in place."""
+        target = np.where(self.side == 1, self.upper, self.lower)
+        change = np.where(self.side == 0, 0.0, target - self.component(e))
+        e[self.blocks] += change[:, None] * self.normals
+
+    def project(self, r: Array) -> None:
+        """Take out of r (n, d) what the bounds carry, in place."""
+        carried = np.where(self.side == 0, 0.0, self.component(r))
+        r[self.blocks] -= carried[:, None] * self.normals
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """One prescribed component at the points of a part's bubbles (k of them).
+
+    Attributes:
+        blocks: the bubbles' owned blocks, (k,).
+        component: number of the component.
+        values: what the bubbles are to be, (k,).
+    """
+
+    blocks: Entities
+    component: int
+    values: Array
+
+    def project(self, r: Array) -> None:
+        """Take out of r (n, d) what is prescribed, in place."""
+        r[self.blocks, self.component] = 0.0
+
+
+def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Prescribed, ...]:
+    """What prescribed displacements ask of the bubbles. Collective.
+
+    Args:
+        problem: the prescribed displacements.
+        u: the solution, nondimensional.
+        space: the bubbles.
+    """
+    found = []
+    for part in problem.prescribed:
+        points = _Points(space, _on(space, part.facets))
+        wanted = part.value.at(points.positions(needed=not part.value.is_number)) / problem.scales.displacement
+        found.append(Prescribed(points.blocks, part.component, wanted - points.values(u)[:, part.component]))
+    return tuple(found)
+
+
+class _Points:
+    """The points of some bubbles.
+
+    Args:
+        space: of the bubbles.
+        blocks: their owned blocks, ascending, (k,).
+
+    Attributes:
+        blocks: as they are given.
+    """
+
+    def __init__(self, space: fem.FunctionSpace, blocks: Entities) -> None:
+        self._space, self.blocks = space, blocks
+        chosen = np.zeros(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.bool_)
+        chosen[blocks] = True
+        of_cells = space.dofmap.list.ravel()
+        places = np.flatnonzero(chosen[of_cells])
+        _, one = np.unique(of_cells[places], return_index=True)  # any cell around a point knows what is there
+        self._cells, self._numbers = np.divmod(places[one], space.dofmap.list.shape[1])
+
+    def values(self, u: fem.Function) -> Array:
+        """The values of a displacement of the problem's space, (k, d)."""
+        space, degree = u.function_space, nodes.degree(u.function_space)
+        places = np.array(of_cell(degree, self._space.mesh.topology.cell_name())) / (2 * degree)
+        functions = spaces.simplex_functions(degree, places, spaces.edge_share(space))[self._numbers]
+        there = u.x.array.reshape(-1, self._space.dofmap.bs)[space.dofmap.list[self._cells]]
+        return np.asarray(np.einsum("kn,knd->kd", functions, there))
+
+    def positions(self, *, needed: bool) -> Array:
+        """Where they are, m, (k, 3); zeros where it does not matter: dolfinx finds the points of all bubbles."""
+        if not needed:
+            return np.zeros((len(self.blocks), 3))
+        return np.asarray(self._space.tabulate_dof_coordinates()[self.blocks])
+
+
+def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> BubbleBounds:
+    """The bounds of a part at the points of its bubbles, interpolated between those at the nodes. Collective.
+
+    Args:
+        problem: what was solved.
+        u: the solution, nondimensional.
+        bounds: at the nodes of the part.
+        space: the bubbles.
+    """
+    d = problem.scales.dimension
+    points, field = _Points(space, _on(space, bounds.surface.facets)), fem.Function(problem.space)
+
+    def middle(values: Array) -> Array:
+        spread = np.clip(values, -_FAR, _FAR)
+        field.x.array.reshape(-1, d)[bounds.surface.blocks, : spread.shape[1]] = spread
+        field.x.scatter_forward()
+        return points.values(field)
+
+    normals = middle(bounds.surface.normals)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normal = np.sum(bounds.surface.values(u.x.array) * bounds.surface.normals, axis=1)
+    lower, upper = middle(np.column_stack([bounds.lower - normal, bounds.upper - normal]))[:, :2].T
+    if nodes.degree(problem.space) == 1:  # what is beyond them is rounding; a quadratic function dips
+        lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+    return BubbleBounds(points.blocks, normals, lower, upper, np.zeros(len(points.blocks), np.int8))
+
+
+def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
+    """Owned blocks on facets, those of a facet of another rank included. Collective."""
+    found = fem.locate_dofs_topological(space, space.mesh.topology.dim - 1, facets)
+    return np.unique(found[found < space.dofmap.index_map.size_local]).astype(np.int32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constraints:
+    """What the bubbles must meet.
+
+    Attributes:
+        prescribed: what is prescribed.
+        bounds: of the parts with contact.
+    """
+
+    prescribed: tuple[Prescribed, ...]
+    bounds: tuple[BubbleBounds, ...]
+
+    def free(self, blocks: Entities) -> Mask:
+        """Where bubbles are not prescribed, (k, d).
+
+        Args:
+            blocks: the bubbles' owned blocks, with bounds, (k,).
+        """
+        found = np.ones((len(blocks), self.bounds[0].normals.shape[1]), dtype=np.bool_)
+        for given in self.prescribed:
+            found[np.isin(blocks, given.blocks), given.component] = False
+        return found
+
+
+def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Constraints:
+    """What the bubbles must meet beside a solution. Collective.
+
+    Args:
+        problem: what was solved.
+        u: the solution, nondimensional.
+        space: the bubbles.
+    """
+    parts = [b for b in problem.bounds if problem.interface_of(b.surface) is None]
+    bounds = tuple(bubble_bounds(problem, u, part, space) for part in parts)
+    return Constraints(prescribed=prescribed(problem, u, space), bounds=bounds)
+
+
+class LeastEnergy:
+    """The admissible bubbles of least energy, an active set method, a few rounds. Creation is collective.
+
+    Args:
+        bubbles: take the result.
+        stiffness: a(e, e).
+        under: what they must meet.
+        load: ρ, (n, d); it becomes the residual.
+        thresholds: how accurately.
+
+    Attributes:
+        residual: ρ - a(e, ·), what is held included, (n, d); a change of the load is to be added to it.
+        energy: a(e, e).
+    """
+
+    def __init__(
+        self,
+        bubbles: fem.Function,
+        stiffness: BubbleStiffness,
+        under: Constraints,
+        load: Array,
+        thresholds: EstimateThresholds = DEFAULT,
+    ) -> None:
+        self._bubbles, self._stiffness, self._under, self._thresholds = bubbles, stiffness, under, thresholds
+        self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
+        self._e = bubbles.x.array[: load.size].reshape(load.shape)
+        self._special = _union([*(p.blocks for p in under.bounds), *(p.blocks for p in under.prescribed)])
+        for given in under.prescribed:
+            self._e[given.blocks, given.component] = given.values
+
+    def find(self) -> None:
+        """Find them; from the second time on from those that were found before. Collective."""
+        stiffness, limits, e = self._stiffness, self._thresholds, self._e
+        self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
+        tolerance = limits.rough_tolerance if self._begun else limits.tolerance
+        goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), limits.rounding**2)
+        for _ in range(limits.rounds):
+            self._put_on_bounds()
+            steps = limits.bubble_steps
+            self.energy += stiffness.solve(self.residual, e, self._descent, goal=goal, max_steps=steps)
+            changed = tuple(p.updated(e[p.blocks], self.residual[p.blocks]) for p in self._parts)
+            same = all(np.array_equal(a.side, b.side) for a, b in zip(self._parts, changed, strict=True))
+            self._parts = changed
+            if stiffness.comm.allreduce(same, op=MPI.LAND):
+                break
+        self._bubbles.x.scatter_forward()
+
+    def find_beside(self, springs: Springs) -> None:
+        """Find them while springs answer their growth; the residual and the energy stay those without. Collective.
+
+        Args:
+            springs: what answers.
+        """
+        if not self._stiffness.hold(springs):
+            self.find()
+            return
+        before = springs.times(self._bubbles)
+        work = self._stiffness.work(self._e, before) if self._begun else 0.0
+        self.find()
+        force = springs.times(self._bubbles)
+        grown = force - before if self._begun else force
+        self.residual[grown.blocks] += grown.values
+        self.energy += work - self._stiffness.work(self._e, force)
+
+    def _guess(self, part: BubbleBounds) -> Array:
+        """The bubbles of a part as they are, at first what the diagonal alone makes of the load, (k, d)."""
+        at = part.blocks
+        if self._begun:
+            return self._e[at]
+        return np.where(self._under.free(at), self._stiffness.diagonal_solve(self.residual[at], at), self._e[at])
+
+    def _put_on_bounds(self) -> None:
+        """Put the bubbles on the bounds that hold them; the residual follows, at first what is prescribed, too."""
+        before = self._e[self._special] if self._begun else 0.0
+        for part in self._parts:
+            part.put_on_bounds(self._e)
+        step = self._e[self._special] - before
+        self._e[self._special] -= step
+        self._begun = True
+        self.energy += self._stiffness.move(self.residual, self._e, self._special, step)
+
+    def _descent(self, r: Array) -> Array:
+        return self._stiffness.descent(r, (*self._under.prescribed, *self._parts), self._special)
+
+
+def _union(parts: Iterable[Entities]) -> Entities:
+    """All of some blocks, sorted."""
+    return np.unique(np.concatenate([np.empty(0, np.int32), *parts]))
+
+
+def find_least_energy(
+    bubbles: fem.Function,
+    stiffness: BubbleStiffness,
+    under: Constraints,
+    load: Array,
+    thresholds: EstimateThresholds = DEFAULT,
+) -> None:
+    """Find the admissible bubbles of least energy under a load. Collective.
+
+    Args:
+        bubbles: take the result, ghosts updated; zero before.
+        stiffness: a(e, e).
+        under: what they must meet.
+        load: ρ, (n, d), overwritten.
+        thresholds: how accurately.
+    """
+    LeastEnergy(bubbles, stiffness, under, load, thresholds).find()
+
+
+class VertexStiffness(BubbleStiffness):
+    """The bubbles' stiffness with the nodes that follow them and the averaged volumetric energy of both.
+
+    The diagonal is that of the shear alone: a preconditioner. Creation is collective.
+
+    Args:
+        problem: whose elastic operator it is.
+        bubbles: the space of bubbles.
+        inverse: of the system, for the nodes.
+        thresholds: how accurately.
+
+    Attributes:
+        at_nodes: the nodes' displacement, as :meth:`follow` found it last.
+        pressures: the averaged volumetric stress of bubbles and nodes, by region.
+    """
+
+    def __init__(
+        self, problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thresholds: EstimateThresholds
+    ) -> None:
+        super().__init__(problem, bubbles)
+        self._node_inverse, self._tolerance = inverse, thresholds.vertex_tolerance
+        self.at_nodes = fem.Function(problem.space)
+        bulk, moved = problem.bulk, self._in + self.at_nodes
+        self.pressures = bulk.pressures(self.at_nodes)
+        self._dilated = [forms.compiled(form) for form in bulk.dilated(moved)]
+        tests = ufl.TestFunction(problem.space), ufl.TestFunction(bubbles)
+        self._on_nodes, self._action = (
+            forms.compiled(bulk.between(moved, v) + bulk.pressed(self.pressures, v)) for v in tests
+        )
+
+    def _product(self) -> Array:
+        """As of :class:`.BubbleStiffness`, the nodes following. Collective."""
+        self._let_follow()
+        return super()._product()
+
+    def follow(self, e: Array, unmet: Array) -> None:
+        """Let the nodes follow the bubbles and a force, and the pressures both. Collective.
+
+        Args:
+            e: the bubbles, (n, d).
+            unmet: the force on the nodes, (n, d).
+        """
+        self._owned(self._in)[:] = e
+        self._let_follow(unmet)
+
+    def _let_follow(self, unmet: Array | None = None) -> None:
+        """As :meth:`follow`, of the bubbles that products are made of. Collective."""
+        self._in.x.scatter_forward()
+        self.at_nodes.x.array[:] = 0.0
+        self._press()
+        force = -self.problem.combined(_assembled(self._on_nodes, self.at_nodes))
+        if unmet is not None:
+            force += unmet
+        self.at_nodes.x.array[:] = self._node_inverse.solve(force, self._tolerance)[0].x.array
+        self._press()
+
+    def _press(self) -> None:
+        """The pressures of the bubbles and the nodes as they are. Collective."""
+        parts = self.problem.bulk.dilatations
+        for pressure, dilated, part in zip(self.pressures, self._dilated, parts, strict=True):
+            average = _assembled(dilated, pressure).ravel()
+            pressure.x.array[: len(average)] = part.stiffness.array_r * average
+            pressure.x.scatter_forward()
+
+    def on_bubbles(self, unmet: Array) -> Array:
+        """What a force at the nodes leaves at the bubbles through the nodes, (n, d). Collective.
+
+        Args:
+            unmet: the force on the nodes, (n, d).
+        """
+        self._owned(self._in)[:] = 0.0
+        self._let_follow(unmet)
+        return super()._product()
+
+
+def _assembled(form: fem.Form, like: fem.Function) -> Array:
+    """A linear form's values at the owned blocks of a function's space, (n, block size). Collective."""
+    vector = fem.assemble_vector(form)
+    vector.scatter_reverse(la.InsertMode.add)
+    dofs = like.function_space.dofmap
+    found = vector.array[: dofs.index_map.size_local * dofs.index_map_bs]
+    return np.array(found).reshape(-1, dofs.index_map_bs)
+
+
+def squares(traces: LawTraces, inverse: DualNorm) -> Array:
+    """η_K² of the owned cells: shear and volumetric energy of bubbles and nodes. Collective.
+
+    Args:
+        traces: the laws between the nodes.
+        inverse: of the system.
+    """
+    problem, u = traces.problem, traces.u
+    stiffness = VertexStiffness(problem, traces.bubbles, inverse, traces.thresholds)
+    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+    between, left = traces.tested()
+    load[between.blocks] -= between.values
+    unmet = left.everywhere(problem.space.dofmap.index_map.size_local)
+    if problem.terms:
+        load -= stiffness.on_bubbles(unmet)
+    bubbles, under = fem.Function(traces.bubbles), constraints(problem, u, traces.bubbles)
+    stiffness.hold(LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles)))
+    find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
+    stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(load)], unmet)
+    shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)
+    return shear + problem.bulk.pressure_energy(stiffness.pressures) + problem.bulk.dilatation_error(u)

@@ -1,0 +1,208 @@
+"""Dual energy norms on u_h's space: sqrt(r·A⁻¹r), A the stiffness without what contact or sticking holds.
+
+Two functionals are measured so: what smoothing changes of the law, and what the solver left over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..certify import balance
+from ..certify.certificate import Examination
+from ..certify.contact_state import ContactState
+from ..certify.force_attribution import components, on_kink, touches
+from ..problem.law_term import LawTerm
+from ..problem.problem import Problem
+from ..problem.vectors import turn
+from ..runtime.mpi import total
+from ..runtime.timing import Timer
+from ..system.held_solver import Goal, HeldPreconditioner
+from ..system.levels import Levels
+from ..system.linear_settings import LinearSettings
+from ..system.system import System
+from ..typing import Array, Entities, Integers
+from .law_traces import nearest
+from .thresholds import DEFAULT, EstimateThresholds
+
+
+class DualNorm:
+    """The inverse of the system's stiffness where u is held: by contact, by convex kinks, by supports.
+
+    Laws add the rising part of their tangent, so that the body they hold has no free motion. Creation is collective.
+
+    Attributes:
+        system: whose stiffness it is.
+        held: the owned scalar dofs at which u is held.
+    """
+
+    def __init__(
+        self, system: System, levels: Levels, u: fem.Function, thresholds: EstimateThresholds = DEFAULT
+    ) -> None:
+        self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.tolerance
+        self._near, self._x = thresholds.near, system.unknowns(u)
+        self.held = _held(system, self._x, thresholds.near)
+        at = self._x.array_r
+        system.jacobian.set_rates([_rising(system.comm, term, at, thresholds) for term in system.terms])
+        self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
+        self._inverse.prepare(self.held)
+
+    def solve(self, functional: Array, tolerance: float | None = None) -> tuple[fem.Function, float]:
+        """The Riesz representative of a functional and its energy norm. Collective.
+
+        Args:
+            functional: at the owned blocks, Cartesian, (n, d).
+            tolerance: of the relative residual; by default that of the thresholds.
+        """
+        system = self.system
+        load, x = self._load(functional), system.load.duplicate()
+        x.set(0.0)
+        if load.norm() > 0:
+            self._inverse.solve(load, x, Goal(rtol=self._tolerance if tolerance is None else tolerance))
+        energy = float(load.dot(x))
+        return system.displacement(x), float(np.sqrt(max(energy, 0.0))) if np.isfinite(energy) else np.inf
+
+    def force(self, field: fem.Function) -> Array:
+        """The elastic force a(field, ·) at the owned blocks as :meth:`solve` takes it, (n, d). Collective.
+
+        Args:
+            field: of u_h's space, nondimensional; zero where u is prescribed.
+        """
+        system = self.system
+        x, out = system.unknowns(field), system.load.duplicate()
+        system.jacobian.matrix.mult(x, out)
+        system.jacobian.rows.overwrite(x, out)  # without what laws and holding add to them
+        cartesian = out if system.rotation is None else system.rotation * out
+        return np.array(cartesian.array_r).reshape(-1, system.problem.scales.dimension)
+
+    def keep_within_bounds(self, error: fem.Function) -> bool:
+        """Put u + an error on the bounds that it leaves, in place; from then on it is held there. Collective.
+
+        Args:
+            error: a field of u_h's space, nondimensional.
+
+        Returns:
+            Whether it left any.
+        """
+        at, before, error_there = self._x.array_r, self.held, self.system.unknowns(error)
+        for bounds in self.system.bounds:
+            dofs, sign = bounds.component()
+            along = sign * (at[dofs] + error_there.array_r[dofs])
+            inside = np.clip(along, bounds.lower, bounds.upper)
+            beyond = np.abs(along - inside) > self._near
+            error_there.array[dofs[beyond]] = (sign * inside - at[dofs])[beyond]
+            self.held = np.union1d(self.held, dofs[beyond]).astype(np.int32)
+        leaves = bool(self.system.comm.allreduce(len(self.held) > len(before), op=MPI.LOR))
+        if leaves:
+            error.x.array[:] = self.system.displacement(error_there).x.array
+            self._inverse.prepare(self.held)
+        return leaves
+
+    def _load(self, functional: Array) -> PETSc.Vec:
+        system = self.system
+        load = system.load.duplicate()
+        load.array[:] = functional.ravel()
+        turn(load, system.rotation)
+        load.array[self.held] = 0.0
+        load.array[system.problem.fixed_here] = 0.0
+        return load
+
+    def destroy(self) -> None:
+        """Free the preconditioner and put the tangent back that was there. Collective."""
+        self._inverse.destroy()
+        self.system.jacobian.set_rates(self._before)
+
+
+def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
+    """Owned scalar dofs on a bound, or on a convex kink of a law."""
+    u = x.array_r
+    found: list[Integers] = [np.empty(0, np.int64)]
+    for bounds in system.bounds:
+        dofs, sign = bounds.component()
+        found.append(dofs[touches(bounds, sign * u[dofs], near)])
+    for term in system.terms:
+        stuck = on_kink(term.law.convex, term.argument(u), term.reach(near))[:, None] & term.counts(u, near)
+        found.extend(dofs[stuck[:, i]] for i, (dofs, _) in enumerate(components(term)))
+    return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
+
+
+def _rising(comm: MPI.Comm, term: LawTerm, u: Array, thresholds: EstimateThresholds) -> Array:
+    """The rising part of a law's tangent; where it is flat everywhere, a foundation in its place. Collective."""
+    argument = term.argument(u)
+    convex = term.law.convex
+    second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
+    if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
+        second = np.full_like(second, thresholds.foundation)
+        return term.rate(u, second * argument * term.stretch, second * term.stretch)
+    secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second
+    return term.rate(u, secant, second)
+
+
+def smoothing(problem: Problem, states: Sequence[ContactState], near: float) -> Array:
+    """The smoothed laws' nodal forces minus the nearest ones of the unsmoothed laws, owned blocks (n, d).
+
+    Args:
+        problem: what was solved.
+        states: of the parts of Γc.
+        near: distance from a kink that counts as being on it.
+    """
+    return _law_forces(problem, states, near, exact=True)
+
+
+def algebraic(problem: Problem, examination: Examination, near: float) -> Array:
+    """Nodal forces that nothing accounts for: off the carriers, beyond the laws, pulling or distant contact; (n, d).
+
+    Args:
+        problem: what was solved.
+        examination: of its solution.
+        near: distance from a kink that counts as being on it.
+    """
+    rest = balance.unbalanced(problem, examination.forces.reaction, examination.states)
+    rest = rest - _law_forces(problem, examination.states, near, exact=False)  # a law's force is minus its residual
+    for state in examination.states:
+        if state.bounds is not None:
+            force = state.surface.weights * _impossible_pressure(state)
+            rest[state.surface.blocks] += force[:, None] * state.surface.normals
+    return np.asarray(rest)
+
+
+def _impossible_pressure(state: ContactState) -> Array:
+    """σ_n (m,) that contact cannot carry: at a gap, or of the wrong sign."""
+    p = state.contact_pressure
+    right = (state.on_upper & (p <= 0)) | (state.on_lower & (p >= 0))
+    return np.where(right, 0.0, p)
+
+
+def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> float:
+    """Σ force times penetration over the nodes with bounds. Collective.
+
+    Args:
+        problem: what was solved.
+        states: of the parts of Γc.
+    """
+    local = 0.0
+    for state in states:
+        if state.bounds is not None:
+            beyond = np.maximum(state.bounds.beyond(state.normal), 0.0)
+            local += float(np.sum(state.surface.weights * np.abs(state.contact_pressure) * beyond))
+    return total(problem.domain.mesh.comm, local)
+
+
+def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *, exact: bool) -> Array:
+    """Nodal law forces that the (exact or solved) law cannot give, owned blocks (n, d)."""
+    d = problem.scales.dimension
+    forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
+    for state in states:
+        for law in state.laws:
+            term = law.term
+            asked = term.exact if exact else term.law
+            components = np.asarray(law.components / term.stretch[:, None])
+            away = law.given - nearest(asked, term.length, components, law.given, term.reach(near))
+            away[law.hidden] = 0.0
+            vectors = np.einsum("mk,mkd->md", away * term.weights[:, None], term.directions)
+            np.add.at(forces, state.surface.blocks, vectors)
+    return forces

@@ -1,0 +1,298 @@
+"""The laws between the nodes: what they give pointwise along Γc, tested with bubbles and with the functions of u_h.
+
+The discrete problem knows a law at the nodes only (trapezoidal rule, Simpson's). Between them the nodal tractions are
+interpolated to τ_h, and the law wants τ ∈ ∂j(u_t): here the nearest such τ to τ_h.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+
+from ..certify.contact_state import ContactState
+from ..certify.law_state import LawState
+from ..certify.placed_forces import traction
+from ..laws import Length, Superpotential
+from ..mesh import nodes
+from ..problem.contact_surface import Surface
+from ..problem.problem import Problem
+from ..typing import Array, Entities, Mask
+from . import bubbles, contact_facets
+from .bubbles import BlockForces, gathered, summed
+from .contact_facets import PartTrace
+from .interface_traces import InterfacePoints, InterfaceTrace
+from .thresholds import DEFAULT, EstimateThresholds
+
+Trace = PartTrace | InterfaceTrace
+"""The facets of a part, or of two bodies that meet, between their nodes."""
+
+
+def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
+    """The admissible tractions of a law nearest to given ones, (m, k).
+
+    Args:
+        law: its superpotential j.
+        length: the length that it acts on; None: the signed slip, k = 1.
+        slip: the components of what it acts on, (m, k).
+        traction: the given ones, (m, k).
+        near: distance from a kink that counts as being on it, one for all or (m,).
+    """
+    ends = law.interval(slip[:, 0] if length is None else length.of(slip), near)
+    if length is None:
+        return np.asarray(np.clip(traction[:, 0], *ends)[:, None])
+    return length.allowed(slip, traction, ends, near)
+
+
+def stopped(law: Superpotential, before: Array, after: Array) -> Array:
+    """Slips after a change, stopped at the convex kinks that they would pass; (..., k).
+
+    A convex kink holds the slip by as much traction as its jump gives. To the explicit answer of a law a slip that
+    changes its sign would give that jump in full, and the answer would not settle.
+
+    Args:
+        law: its superpotential j.
+        before: the slips before the change; with k = 1 signed.
+        after: the slips after the change.
+    """
+    if after.shape[-1] > 1:
+        turned = np.sum(before * after, axis=-1, keepdims=True) < 0
+        return np.where(turned, 0.0, after) if len(law.convex.kinks) else after
+    for kink in law.convex.kinks:
+        after = np.where((before - kink) * (after - kink) < 0, kink, after)
+    return after
+
+
+@dataclass(frozen=True)
+class ErrorField:
+    """An estimated error of u_h.
+
+    Attributes:
+        nodes: its part in the space of u_h.
+        bubbles: what it adds between the nodes.
+    """
+
+    nodes: fem.Function
+    bubbles: fem.Function
+
+
+@dataclass(frozen=True)
+class LawTrace:
+    """One law between the nodes, at the quadrature points of its part, (f, q, k) each.
+
+    Attributes:
+        points: the quadrature points.
+        nodal: the interpolated nodal tractions.
+        traction: those that the law allows nearest to them.
+    """
+
+    points: Trace
+    nodal: Array
+    traction: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Solved:
+    """What u_h gives one law between the nodes, (f, q, k) each; no error changes it. Slips are over the law's stretch.
+
+    Attributes:
+        points: the quadrature points.
+        multiplier: of the law, (f, q, 1).
+        stretch: of the law, (f, q, 1).
+        nodal: the interpolated nodal tractions.
+        sticks: whether all nodes around are on a convex kink, (f, q, 1).
+        nodewise: the slip, linear from node to node.
+        slip: of u_h.
+    """
+
+    points: Trace
+    multiplier: Array
+    stretch: Array
+    nodal: Array
+    sticks: Mask
+    nodewise: Array
+    slip: Array
+
+    def slip_under(self, law: Superpotential) -> Array:
+        """The slip, (f, q, k): where the nodes around do not pass a convex kink it does not dip beyond that."""
+        return np.where(self.sticks, self.nodewise, stopped(law, self.nodewise, self.slip))
+
+
+class LawTraces:
+    """The laws between the nodes at a displacement. Creation is collective.
+
+    Attributes:
+        problem: what was solved.
+        u: its solution u_h, nondimensional, ghosts updated.
+        states: of the parts of Γc at u_h.
+        thresholds: of the quadrature and of kinks.
+        exact: whether an error meets the unsmoothed laws, so that it has what smoothing changes, too.
+        degree: of the solution.
+        bubbles: the space of bubbles.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        u: fem.Function,
+        states: Sequence[ContactState],
+        thresholds: EstimateThresholds = DEFAULT,
+        *,
+        exact: bool,
+    ) -> None:
+        self.problem, self.u, self.states, self.thresholds, self.exact = problem, u, states, thresholds, exact
+        self.degree = nodes.degree(problem.space)
+        self.bubbles = bubbles.space(problem.space.mesh, self.degree)
+        self._interfaces: dict[str, InterfacePoints] = {}
+        self._traces: dict[int, tuple[Array, Trace]] = {}
+        self._solved: dict[int, tuple[LawState, _Solved]] = {}
+
+    def part(self, surface: Surface, directions: Array) -> Trace:
+        """The quadrature points of a part, or of an interface. Collective.
+
+        Args:
+            surface: the part.
+            directions: along which displacements are looked at, (m, k, d).
+        """
+        known = self._traces.get(id(directions))
+        if known is None:
+            known = self._traces[id(directions)] = directions, self._new_part(surface, directions)
+        return known[1]
+
+    def _new_part(self, surface: Surface, directions: Array) -> Trace:
+        problem, space, degree = self.problem, self.bubbles, self.thresholds.facet_degree[self.degree - 1] // 2
+        if (interface := problem.interface_of(surface)) is None:
+            return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree - 1])
+        if interface.name not in self._interfaces:
+            self._interfaces[interface.name] = InterfacePoints(problem, space, interface, degree)
+        return InterfaceTrace(problem, self._interfaces[interface.name], surface, directions)
+
+    def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> LawTrace:
+        """One law between the nodes. Collective.
+
+        Args:
+            state: of its part.
+            law: one of the part's.
+            error: added to u_h before the law is evaluated; nothing is added where a whole part of a facet sticks (its
+                nodes on a convex kink), and elsewhere no slip passes a convex kink.
+        """
+        solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
+        k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
+        near = np.asarray(self.thresholds.near / solved.stretch, dtype=np.float64).ravel()
+        traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), near)
+        return LawTrace(solved.points, solved.nodal, solved.multiplier * traction.reshape(slip.shape))
+
+    def _asked(self, state: ContactState, law: LawState, error: ErrorField | None) -> tuple[Superpotential, Array]:
+        """The law that an error meets, and the slip that it is asked at, over its stretch, (f, q, k). Collective."""
+        solved = self._of_u(state, law)
+        asked = law.term.exact if self.exact and error is not None else law.term.law
+        slip = solved.slip_under(asked)
+        if error is not None:
+            added = (solved.points.of_field(error.nodes) + solved.points.of_bubbles(error.bubbles)) / solved.stretch
+            slip = stopped(asked, slip, slip + np.where(solved.sticks, 0.0, added))
+        return asked, slip
+
+    def rising(self, state: ContactState, law: LawState, error: ErrorField) -> tuple[Trace, Array]:
+        """By how much the tractions of one law rise with the displacement, (f, q, k); none where it falls. Collective.
+
+        Args:
+            state: of its part.
+            law: one of the part's.
+            error: as in :meth:`of_law`.
+
+        Returns:
+            The quadrature points, and the rates along each direction.
+        """
+        solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
+        flat, length = slip.reshape(-1, slip.shape[2]), law.term.length
+        argument = flat[:, 0] if length is None else length.of(flat)
+        second = np.maximum(asked.convex.second(argument) - asked.concave.second(argument), 0.0)
+        rates = second[:, None]
+        if length is not None:  # alike along and across the displacement
+            rates = np.einsum("mkk->mk", length.hessian(flat, second * argument, second))
+        moves = solved.multiplier / solved.stretch * ~solved.sticks
+        return solved.points, moves * rates.reshape(slip.shape)
+
+    def _of_u(self, state: ContactState, law: LawState) -> _Solved:
+        """What u_h gives a law. Collective."""
+        if id(law) not in self._solved:
+            points = self.part(state.surface, law.term.directions)
+            on_kink = points.from_node_to_node(law.on_convex_kink()[:, None].astype(float))
+            stretch = points.from_node_to_node(law.term.stretch[:, None])
+            solved = _Solved(
+                points=points,
+                multiplier=points.interpolated(law.term.multiplier[:, None]),
+                stretch=stretch,
+                nodal=points.interpolated_components(law.carried),
+                sticks=np.asarray(on_kink > 1 - self.thresholds.near),
+                nodewise=points.of_field_from_node_to_node(self.u) / stretch,
+                slip=points.of_field(self.u) / stretch,
+            )
+            self._solved[id(law)] = law, solved
+        return self._solved[id(law)][1]
+
+    def tested(self, error: ErrorField | None = None) -> tuple[BlockForces, BlockForces]:
+        """∫ τ·v ds of all laws tested with bubbles; the nodal forces minus that with u_h's; owned blocks. Collective.
+
+        ``error`` is added to u_h as in :meth:`of_law`. The bubbles of two bodies that meet feel what contact or glue
+        carries, too.
+        """
+        d, at_nodes, between = self.problem.scales.dimension, [], list(self._carried_between_bodies)
+        for state in self.states:
+            for law in state.laws:
+                trace = self.of_law(state, law, error)
+                with_bubbles, with_nodes = trace.points.tested(trace.traction)
+                nodal = np.einsum("mk,mkd->md", law.given * law.term.weights[:, None], law.term.directions)
+                between.append((with_bubbles.blocks, with_bubbles.values))
+                at_nodes += [(with_nodes.blocks, -with_nodes.values), (state.surface.blocks, nodal)]
+        return gathered(self.bubbles, summed(between, d)), gathered(self.problem.space, summed(at_nodes, d))
+
+    @functools.cached_property
+    def _carried_between_bodies(self) -> list[tuple[Entities, Array]]:
+        """As :meth:`_carried`, of all interfaces, blocks and forces. Collective when first used."""
+        between = [state for state in self.states if self.problem.interface_of(state.surface) is not None]
+        return [(force.blocks, force.values) for force in map(self._carried, between)]
+
+    def _carried(self, state: ContactState) -> BlockForces:
+        """∫ τ·v ds of what bodies that meet put on each other without a law, tested with bubbles. Collective."""
+        force = -traction(state)
+        for law in state.laws:
+            force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
+        axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
+        if (interface := self.problem.interface_of(state.surface)) is not None and interface.curved:
+            axes = contact_facets.frames(state.surface)
+        points = self.part(state.surface, axes)
+        return points.tested(points.interpolated_components(np.einsum("mkd,md->mk", axes, force)))[0]
+
+
+class LawSprings:
+    """The springs of all laws at a displacement. Creation is collective.
+
+    Args:
+        traces: the laws between the nodes.
+        error: added to u_h.
+    """
+
+    def __init__(self, traces: LawTraces, error: ErrorField) -> None:
+        self._space = traces.bubbles
+        self._rates = [traces.rising(state, law, error) for state in traces.states for law in state.laws]
+
+    def diagonal(self) -> BlockForces:
+        """Forces for a unit of each bubble, at the owned blocks. Collective."""
+        return self._summed([points.squared(rates) for points, rates in self._rates])
+
+    def times(self, e: fem.Function) -> BlockForces:
+        """Forces of bubbles, at the owned blocks. Collective.
+
+        Args:
+            e: the bubbles, ghosts updated.
+        """
+        return self._summed([points.tested(rates * points.of_bubbles(e))[0] for points, rates in self._rates])
+
+    def _summed(self, local: list[BlockForces]) -> BlockForces:
+        """Contributions at local blocks as one at the owned blocks. Collective."""
+        parts = [(force.blocks, force.values) for force in local]
+        return gathered(self._space, summed(parts, self._space.dofmap.bs))

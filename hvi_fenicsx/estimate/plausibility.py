@@ -1,0 +1,325 @@
+"""The keys in the scene of the effects that brought bounds and laws, for sentences about them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+from ..certify.certificate import Examination
+from ..certify.contact_state import ContactState
+from ..certify.law_state import LawState
+from ..certify.thresholds import DEFAULT, PLAUSIBILITY, PlausibilityThresholds
+from ..effects import Direction
+from ..mesh import facets, nodes
+from ..mesh.curved import CurvedMesh
+from ..problem import thresholds as composition
+from ..problem.contact_surface import largest_turn
+from ..problem.law_term import LawTerm
+from ..problem.problem import Problem
+from ..rigid import Solvability, kernel
+from ..runtime.mpi import largest, total
+from ..runtime.terminal import percent
+from ..system import existence
+from ..typing import Array
+from .contact_errors import ratio
+from .estimator import Estimate
+
+
+def of_bounds(problem: Problem, part: str) -> str:
+    """The key of the effect that brought a part's bounds.
+
+    Args:
+        problem: as composed.
+        part: with contact.
+    """
+    keys = (
+        effect.key for where, effect, contribution in problem.contributions if where == part and contribution.bounds
+    )
+    return f"boundary.{part}.{next(keys)}"
+
+
+def of_law(problem: Problem, term: LawTerm) -> str:
+    """The key of the effect that brought a law.
+
+    Args:
+        problem: as composed.
+        term: the law.
+    """
+    part = term.surface.part
+    keys = (
+        effect.key
+        for where, effect, contribution in problem.contributions
+        if where == part and any(law.direction is term.direction for law in contribution.laws)
+    )
+    return f"boundary.{part}.{next(keys)}"
+
+
+def before_solving(
+    problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds = PLAUSIBILITY
+) -> tuple[str, ...]:
+    """What there is to warn of before anything is solved, in sentences. Collective; the same on all ranks.
+
+    Args:
+        problem: as composed.
+        forces: its load vectors by name, nondimensional.
+        thresholds: what is plausible.
+    """
+    return (
+        *problem.implausible,
+        *_scales(problem, thresholds),
+        *_uneven_parts(problem, thresholds),
+        *_polygons(problem, thresholds),
+        *_straightened(problem),
+        *_weak_laws(problem, forces, thresholds),
+    )
+
+
+def of_existence(found: Solvability, thresholds: PlausibilityThresholds = PLAUSIBILITY) -> tuple[str, ...]:
+    """What there is to warn of in the factor of the load that is borne, in sentences. Local; the same on all ranks.
+
+    Args:
+        found: whether a solution can exist.
+        thresholds: what is plausible.
+    """
+    peak, far = found.lambda_peak, thresholds.far_peak
+    if not (0.0 < peak < 1.0 / far or far < peak < np.inf):
+        return ()
+    than = "far more" if peak > 1.0 else "far less"
+    return (
+        f"the load may be multiplied by {peak:.1e} at most before no solution exists: the laws can carry {than} than "
+        "it; are loads and the laws' tractions in N/m²?",
+    )
+
+
+def _scales(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    scales, strain = problem.scales, problem.scales.stress / problem.scales.modulus
+    if not thresholds.softest <= scales.modulus <= thresholds.stiffest:
+        yield f"the largest Young's modulus is {scales.modulus:.3g} N/m²; is it in N/m²? (steel has 2.1e11)"
+    if strain > thresholds.largest_strain:
+        yield (
+            f"the load (or prescribed displacement, or thermal strain) is {strain:.3g} of Young's modulus, where small "
+            "strains are assumed; are loads and modulus in N/m², displacements in m?"
+        )
+
+
+def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """Contact parts that seem to be meant flat, in a mesh with few digits in its coordinates."""
+    comm = problem.domain.mesh.comm
+    for surface in (bounds.surface for bounds in problem.bounds):
+        turn = largest_turn(comm, surface)
+        if composition.DEFAULT.flat < turn < composition.DEFAULT.uneven:
+            yield (
+                f"{of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to "
+                f"{turn:.1e} rad; this unevenness is part of the problem. If it is rounding of the mesh's coordinates, "
+                "state the flat part: contact = { obstacle = { point = [...], normal = [...] } }"
+            )
+
+
+def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """Contact parts of degree 2 whose facets seem to be those of a curve that the program does not know. Collective."""
+    domain, comm = problem.domain, problem.domain.mesh.comm
+    if nodes.degree(problem.space) == 1:
+        return
+    known = np.concatenate([np.empty(0, np.int32), *(domain.sides[name] for name in domain.curves)])
+    for surface in (bounds.surface for bounds in problem.bounds):
+        turns = facets.turns(domain.mesh, np.setdiff1d(surface.facets, known).astype(np.int32))
+        bent = turns[(turns > thresholds.straight) & (turns < thresholds.corner)]
+        if total(comm, len(bent)) > thresholds.mostly_bent * total(comm, len(turns)):
+            most = np.degrees(largest(comm, float(np.max(bent, initial=0.0))))
+            yield (
+                f"{of_bounds(problem, surface.part)}: nearly all facets turn from one to the next, by up to "
+                f"{most:.2g}°, as those of a curved side. They are taken for a polygon, and the pressure of degree 2 "
+                "shows its corners: give a mesh file of second order (gmsh: Mesh.ElementOrder = 2), or use "
+                "solver.degree = 1"
+            )
+
+
+def _straightened(problem: Problem) -> Iterator[str]:
+    """Cells of degree 2 that are straight although the curves of their sides are known."""
+    domain, mesh = problem.domain, problem.space.mesh
+    if nodes.degree(problem.space) == 1 or not domain.curves:
+        return
+    unknown = "the error of this polygon is not estimated"
+    if not domain.bends:
+        yield (
+            f"domain: the energy has data of the straight mesh, so all cells stay straight, and {unknown}; write them "
+            "as formulas of the position"
+        )
+    elif isinstance(mesh, CurvedMesh) and (straight := mesh.straight_cells) > 0:
+        sides = ", ".join(repr(name) for name in sorted(domain.curves))
+        cells = "1 cell would turn over and stays" if straight == 1 else f"{straight} cells would turn over and stay"
+        yield (
+            f"domain: the mesh is too coarse for its curve ({sides}): {cells} straight, and {unknown}; use smaller "
+            "cells"
+        )
+
+
+def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds) -> Iterator[str]:
+    comm = problem.domain.mesh.comm
+    load = total(comm, sum(float(np.abs(force.array_r).sum()) for force in forces.values()))
+    for term in problem.terms:
+        peak = max(term.exact.peak.minus, term.exact.peak.plus)
+        most = peak * total(comm, float(term.weights.sum()))
+        if most < thresholds.negligible * load and not _holds(problem, forces, term, DEFAULT.near):
+            unit = "N" if problem.scales.dimension == 3 else "N/m"
+            yield (
+                f"{of_law(problem, term)}: the law can carry {most * problem.scales.force:.3g} {unit} at "
+                f"most, {most / load:.1e} of the load, and no rigid motion needs it: it cannot matter; are its "
+                "tractions in N/m²?"
+            )
+
+
+def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rounding: float) -> bool:
+    """Whether a rigid motion that the supports leave works against the law. Collective."""
+    comm, surface, work = problem.domain.mesh.comm, term.surface, 0.0
+    for body, rigid in zip(problem.bodies, existence.rigid_problems(problem, forces), strict=True):
+        basis = kernel(comm, body, rigid.fixed)
+        mine = existence.inside(problem, body, surface.blocks)
+        fields = problem.motions_at(surface.blocks[mine], body)
+        along = np.einsum("mkd,mnd,nj->mkj", term.directions[mine], fields, basis)
+        work = max(work, float(np.max(np.abs(along), initial=0.0)))
+    return largest(comm, work) > rounding
+
+
+def of_solution(
+    problem: Problem, examination: Examination, u: fem.Function, thresholds: PlausibilityThresholds = PLAUSIBILITY
+) -> tuple[str, ...]:
+    """What there is to warn of in a solution, in sentences. Collective; the same on all ranks.
+
+    Args:
+        problem: as composed.
+        examination: its state at u.
+        u: the displacement, nondimensional.
+        thresholds: what is plausible.
+    """
+    warnings = [*_strain(problem, u, thresholds)]
+    if examination.certificate.passed:
+        size = largest(problem.domain.mesh.comm, float(np.max(np.abs(u.x.array), initial=0.0)))
+        warnings += _dips(problem, examination, size, thresholds)
+        for state in examination.states:
+            warnings += _distant_obstacle(problem, state, size, thresholds)
+            for law in state.laws:
+                warnings += _slip_and_kink(problem, law, thresholds)
+                warnings += _wide_smoothing(problem, law, thresholds)
+    return tuple(warnings)
+
+
+def of_estimate(errors: Estimate) -> tuple[str, ...]:
+    """What there is to warn of in an estimated error, in sentences. Local; the same on all ranks.
+
+    Args:
+        errors: of the solution.
+    """
+    if not errors.coarse:
+        return ()
+    share = ratio(errors.discretisation, errors.energy_norm)
+    size = f"{percent(share)} of the solution" if np.isfinite(share) else "as large as the solution"
+    return (
+        f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "
+        "are solved and certified; refine the mesh",
+    )
+
+
+def _strain(problem: Problem, u: fem.Function, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """By the edges: of P1, the strain along an edge is its change of length over its length."""
+    comm, scales, d = problem.domain.mesh.comm, problem.scales, problem.scales.dimension
+    values = u.x.array.reshape(-1, d)
+    size = np.sqrt(d) * largest(comm, float(np.max(np.abs(values), initial=0.0))) * scales.displacement
+    shortest = problem.once("shortest edge", None, lambda: _shortest_edge(problem))
+    if 2.0 * size <= thresholds.largest_strain * shortest:
+        return
+    most = 0.0
+    for edge, change in zip(_along_edges(problem, problem.points[:, :d]), _along_edges(problem, values), strict=True):
+        along = np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge)
+        most = max(most, float(np.max(along, initial=0.0)))
+    strain = largest(comm, most) * scales.displacement
+    if strain > thresholds.largest_strain:
+        yield f"the largest strain is {strain:.3g}, where small strains are assumed; is the modulus in N/m²?"
+
+
+def _shortest_edge(problem: Problem) -> float:
+    """The shortest edge of all cells, m. Collective."""
+    edges = _along_edges(problem, problem.points[:, : problem.scales.dimension])
+    shortest = min(float(np.min(np.einsum("nd,nd->n", edge, edge), initial=np.inf)) for edge in edges)
+    return float(np.sqrt(-largest(problem.domain.mesh.comm, -shortest)))
+
+
+def _along_edges(problem: Problem, values: Array) -> Iterator[Array]:
+    """The difference of vectors (nodes, d) between the ends of each edge of the cells, (cells, d)."""
+    d = problem.scales.dimension
+    corners = np.take(values, problem.space.dofmap.list[:, : d + 1], axis=0)
+    for a, b in combinations(range(d + 1), 2):
+        yield corners[:, b] - corners[:, a]
+
+
+def _dips(problem: Problem, examination: Examination, size: float, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """A penetration between the nodes that is not small."""
+    dip = examination.between_nodes
+    if dip is not None and dip > thresholds.negligible * size > 0:
+        yield (
+            f"between the nodes of Γc, where nothing bounds it, a body goes {dip * problem.scales.displacement:.3g} m "
+            f"beyond its bound, {dip / size:.1e} of the largest displacement; a finer mesh there makes it smaller"
+        )
+
+
+def _distant_obstacle(
+    problem: Problem, state: ContactState, size: float, thresholds: PlausibilityThresholds
+) -> Iterator[str]:
+    """An obstacle that nothing comes near."""
+    comm = problem.domain.mesh.comm
+    if state.bounds is None:
+        return
+    gap = -largest(comm, -float(np.min(state.bounds.upper, initial=np.inf)))
+    if np.isfinite(gap) and thresholds.negligible * gap > size > 0:
+        metres, displacement = (value * problem.scales.displacement for value in (gap, size))
+        yield (
+            f"{of_bounds(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
+            f"displacement {displacement:.3g} m: it is never closed; is it in m?"
+        )
+
+
+def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """A law whose kinks are of another order than what the solution does to it."""
+    comm, term, far = problem.domain.mesh.comm, law.term, 1.0 / thresholds.negligible
+    kink, reached, weights = term.exact.length_scale, np.abs(law.argument), term.weights
+    if term.exact.is_linear or np.any(term.exact.kinks == 0.0):
+        return
+    if term.direction in (Direction.OPENING, Direction.PENETRATION):
+        reached = np.where(law.argument > 0, reached, 0.0)
+    most = largest(comm, float(np.max(reached, initial=0.0)))
+    beyond = total(comm, float(weights[reached > far * kink].sum())) / total(comm, float(weights.sum()))
+    metres = problem.scales.displacement * largest(comm, float(np.max(term.stretch, initial=0.0)))
+    what = "slip" if term.direction is Direction.SLIP else term.direction.value
+    sizes = f"{most * metres:.3g} m, the law's first kink {kink * metres:.3g} m"
+    if DEFAULT.near < most < kink / far:
+        yield (
+            f"{of_law(problem, term)}: the largest {what} is {sizes}: "
+            "the law is on its first piece everywhere; are the law's displacements in m?"
+        )
+    elif beyond > thresholds.nearly_all:
+        yield (
+            f"{of_law(problem, term)}: the {what} is up to {sizes}: "
+            "the law is far beyond it nearly everywhere; are the law's displacements in m?"
+        )
+
+
+def _wide_smoothing(problem: Problem, law: LawState, thresholds: PlausibilityThresholds) -> Iterator[str]:
+    """A smoothing so wide that the law which is solved is another one."""
+    comm, term = problem.domain.mesh.comm, law.term
+    if term.law is term.exact:
+        return
+    peak = max(term.exact.peak.minus, term.exact.peak.plus)
+    away, weights, limit = law.true_distance(), term.weights, thresholds.smoothing_change
+    share = total(comm, float(weights[away > limit * peak].sum())) / total(comm, float(weights.sum()))
+    if share > thresholds.smoothing_share:
+        most, of_peak = (largest(comm, float(np.max(v, initial=0.0))) for v in (away * term.multiplier, away / peak))
+        yield (
+            f"{of_law(problem, term)}: smoothing changes the traction by up to "
+            f"{most * problem.scales.stress:.3g} N/m² ({percent(of_peak)} of the law's peak), "
+            f"and by more than {100 * limit:.0f} % on "
+            f"{percent(share)} of the part; is a smaller ε meant? (epsilon_absolute is in N/m)"
+        )

@@ -1,0 +1,359 @@
+"""The parts with contact or laws: their surfaces and the bounds on u·n, nondimensional."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations, combinations_with_replacement
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+from ..effects import Condition, Effect, NormalBounds, ObstacleForce, Towards, load_name
+from ..errors import InputError
+from ..formula import SpatialValue
+from ..geometry import spot
+from ..mesh import nodes
+from ..runtime.mpi import agree
+from ..typing import Array, Entities
+from . import contact_surface, interface_sides
+from .contact_surface import Surface
+from .domain_forms import DomainForms
+from .problem import Bounds, BoundsForce, BoundsMove, PlacedContribution
+from .scaling import Scales
+from .spaces import contact_rule, edge_share
+from .thresholds import DEFAULT, CompositionThresholds
+
+
+def make_surfaces(
+    context: DomainForms,
+    contributions: Sequence[PlacedContribution],
+    fixed: Entities,
+    interfaces: Collection[str],
+    thresholds: CompositionThresholds,
+) -> dict[str, Surface]:
+    """The surfaces of the boundary parts with bounds or laws, by part, in the scene's order. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        contributions: of all effects.
+        fixed: local scalar dofs that are prescribed.
+        interfaces: names of interfaces, which are no boundary parts.
+        thresholds: what is rounding of a normal, and how far it may be turned.
+
+    Raises:
+        InputError: on all ranks alike: a facet lies inside the body, two sides of a part face each other, or two
+            directions that meet at a vertex are neither orthogonal nor equal.
+    """
+    found = dict.fromkeys(w for w, _, c in contributions if w is not None and (c.bounds or c.laws))
+    parts = [where for where in found if where not in interfaces]
+    surfaces = {where: _surface(context, where) for where in parts}
+    towards = {w: b.towards for w, _, c in contributions for b in c.bounds if w in parts and b.towards is not None}
+    stated = {name: _stated(context, surfaces[name], obstacle) for name, obstacle in towards.items()}
+    if not context.domain.one_piece:
+        interface_sides.refuse(context.domain.mesh.comm, surfaces.values(), context.length, thresholds)
+    return contact_surface.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length, thresholds)
+
+
+def _surface(context: DomainForms, where: str) -> Surface:
+    """The surface of a part, with the mean normals of its facets. Collective."""
+    facets, degree = context.part_facets[where], nodes.degree(context.space)
+    return context.domain.once(
+        f"surface {where} of degree {degree}",
+        facets.tobytes(),
+        lambda: contact_surface.make_surface(
+            where,
+            context.space,
+            context.points,
+            facets,
+            context.boundary(where, **contact_rule(context.space)),
+            context.length ** (context.dimension - 1),
+        ),
+    )
+
+
+def _stated(context: DomainForms, where: Surface, obstacle: Towards) -> Array:
+    """The unit vectors towards an obstacle at the vertices of a part, (m, d). Collective.
+
+    Raises:
+        InputError: on all ranks alike: there is none at a vertex, such as at the centre of a ball.
+    """
+    found = obstacle.towards(where.points[:, : context.dimension])
+    bad = np.flatnonzero(~np.all(np.isfinite(found), axis=1))
+    said = [where.spot(i) for i in bad[:1]]
+    for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
+        raise InputError(f"boundary.{where.part}.contact: no direction leads from {text} to the obstacle; state one")
+    return found
+
+
+def make_bounds(
+    context: DomainForms,
+    scales: Scales,
+    surfaces: Mapping[str, Surface],
+    contributions: Sequence[PlacedContribution],
+    prescribed: Array,
+    gaps: Mapping[str, Array],
+) -> tuple[Bounds, ...]:
+    """The bounds on u·n. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        scales: what one unit is in SI.
+        surfaces: by part.
+        contributions: of all effects.
+        prescribed: the prescribed values at the local scalar dofs, zero at the others.
+        gaps: of interfaces as they are meshed, m, by name.
+
+    Raises:
+        InputError: on all ranks alike: a bound that is not a finite number at some vertex, or a measured gap of a part
+            that is no interface.
+    """
+    wanted = [(surfaces[w], e, b) for w, e, c in contributions if w is not None for b in c.bounds]
+    for surface, key, bound in ((surface, effect.key, bound) for surface, effect, bound in wanted):
+        if bound.measured and surface.part not in gaps:
+            raise InputError(f'boundary.{surface.part}.{key}: gap = "measured" needs two bodies; give a number')
+        if bound.towards is not None and surface.part in gaps:
+            raise InputError(f'boundary.{surface.part}.{key}: an obstacle is no body; give gap = 0.0 or "measured"')
+    return tuple(
+        _along_normal(_bounds(context, surface, effect, bounds, scales, gaps), prescribed)
+        for surface, effect, bounds in wanted
+    )
+
+
+def _along_normal(stated: Bounds, prescribed: Array) -> Bounds:
+    """The bounds on u·n, from those on u·m along the normal m of the scene.
+
+    u·m = (m·n)(u·n) + u·(m - (m·n) n). Where n was turned towards a prescribed component the last summand is known.
+    """
+    surface = stated.surface
+    along = np.sum(surface.measured * surface.normals, axis=1, keepdims=True)
+    known = np.sum(surface.values(prescribed) * (surface.measured - along * surface.normals), axis=1)
+    lower, upper = ((bound - known) / along[:, 0] for bound in (stated.lower, stated.upper))
+    move = stated.move and replace(stated.move, by=stated.move.by / along[:, 0])
+    force = stated.force and replace(stated.force, rate=stated.force.rate / along[:, 0])
+    return replace(stated, lower=lower, upper=upper, move=move, force=force)
+
+
+def _bounds(
+    context: DomainForms,
+    where: Surface,
+    effect: Effect,
+    bounds: NormalBounds,
+    scales: Scales,
+    gaps: Mapping[str, Array],
+) -> Bounds:
+    """The bounds on u·m, m being the normal of the scene, that an effect puts on a part. Collective."""
+
+    def value(formula: SpatialValue | None) -> Array:
+        if formula is None:
+            return np.full(len(where.blocks), np.inf)
+        found = _coefficients(context, where, formula) / scales.displacement
+        if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
+            reason = "the gap is not finite everywhere there; see its formula, or where the obstacle lies"
+            raise InputError(f"boundary.{where.part}.{effect.key}: {reason}")
+        return np.asarray(found)
+
+    # lower ≤ -u·n ≤ upper
+    open_by = gaps[where.part] / scales.displacement if bounds.measured else 0.0
+    upper = open_by - value(bounds.lower) if bounds.lower else value(None)
+    move = None
+    if bounds.move is not None:
+        by = upper + value(bounds.move.before) if bounds.move.straight else np.zeros(len(upper))
+        move = BoundsMove(name=load_name(where.part, effect), by=by, straight=bounds.move.straight)
+    force = None
+    if bounds.force is not None:
+        ahead = -value(bounds.force.ahead) if bounds.force.straight else upper
+        force = _pressed(load_name(where.part, effect), bounds.force, ahead - upper, scales)
+        if not any(agree(context.domain.mesh.comm, bool(np.any(force.rate < 0.0)))):
+            raise InputError(f"boundary.{force.name}: the force moves the obstacle away from the body; turn it round")
+    return Bounds(where, -value(bounds.upper), upper, move, force)
+
+
+def _pressed(name: str, stated: ObstacleForce, moved: Array, scales: Scales) -> BoundsForce:
+    """The force on an obstacle, nondimensional.
+
+    Args:
+        name: of part and effect.
+        stated: SI.
+        moved: by what a metre of its way moves the bounds, (m,).
+        scales: what one unit is in SI.
+
+    Raises:
+        InputError: on all ranks alike: the gaps do not change in proportion to the way.
+    """
+    if not stated.straight:
+        raise InputError(
+            f"boundary.{name}: this obstacle's gaps do not change in proportion to the way that a force moves it; give "
+            "it a direction along the force"
+        )
+    size = float(np.linalg.norm(stated.vector))
+    return BoundsForce(
+        name=name,
+        rate=moved * scales.displacement,
+        force=size / scales.force,
+        direction=np.asarray(stated.vector) / size,
+    )
+
+
+def _coefficients(context: DomainForms, where: Surface, formula: SpatialValue) -> Array:
+    """The coefficients of a formula at the nodes of a part: bounds of those of the displacement, (m,)."""
+    if nodes.degree(context.space) == 1 or formula.is_number:
+        return np.asarray(formula.at(where.points))
+    points, share = context.points_on_curves, edge_share(context.space)
+    found = formula.at(points[where.blocks])
+    if share == 0.0:
+        return np.asarray(found)
+    ends = points[nodes.edge_ends(context.space)[where.blocks]]
+    return np.asarray((found - share * (formula.at(ends[:, 0]) + formula.at(ends[:, 1]))) / (1 - 2 * share))
+
+
+def check_bounds(
+    context: DomainForms,
+    bounds: Sequence[Bounds],
+    prescribed: Array,
+    fixed: Entities,
+    thresholds: CompositionThresholds,
+) -> None:
+    """Refuse bounds that exclude a prescribed value: PETSc would silently change it (solver-notes.md). Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        bounds: the bounds.
+        prescribed: the prescribed values at the local scalar dofs, zero at the others.
+        fixed: local scalar dofs that are prescribed.
+        thresholds: how far a value may be outside of its bounds.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    bad: list[str] = []
+    for b in bounds:
+        un = np.sum(b.surface.values(prescribed) * b.surface.normals, axis=1)
+        axis = np.argmax(np.abs(b.surface.normals), axis=1)
+        held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
+        out = held & ((un < b.lower - thresholds.outside_bounds) | (un > b.upper + thresholds.outside_bounds))
+        bad += [f"{b.surface.part} at {b.surface.spot(i)}" for i in np.flatnonzero(out)[:1]]
+    found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
+    if found:
+        raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
+
+
+def check_contradictions(
+    context: DomainForms, scales: Scales, bounds: Sequence[Bounds], thresholds: CompositionThresholds
+) -> None:
+    """Refuse bounds that no displacement satisfies: within a part, or of two parts at a vertex of both. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        scales: what one unit is in SI.
+        bounds: the bounds.
+        thresholds: by how much bounds may contradict each other.
+
+    Raises:
+        InputError: on all ranks alike, with the first such vertex.
+    """
+    pairs = combinations_with_replacement(bounds, 2)
+    bad = [text for one, other in pairs for text in _contradiction(one, other, scales.displacement, thresholds)]
+    found = [text for rank in agree(context.domain.mesh.comm, bad) for text in rank]
+    if found:
+        raise InputError(f"boundary.{found[0]}; change one of them, or leave the vertex out of one part")
+
+
+def _contradiction(one: Bounds, other: Bounds, unit: float, thresholds: CompositionThresholds) -> list[str]:
+    """The first vertex at which two bounds (or one and itself) contradict each other, in words."""
+    _, i, j = np.intersect1d(one.surface.blocks, other.surface.blocks, return_indices=True)
+    along = np.sum(one.surface.normals[i] * other.surface.normals[j], axis=1)  # 1, -1, or 0: independent bounds
+    low = np.where(along > 0, other.lower[j], -other.upper[j])
+    high = np.where(along > 0, other.upper[j], -other.lower[j])
+    low, high = np.maximum(low, one.lower[i]), np.minimum(high, one.upper[i])
+    bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > thresholds.outside_bounds * (1.0 + np.abs(low))))
+    shared = "" if one is other else f", a vertex of boundary.{other.surface.part} too"
+    return [
+        f"{one.surface.part}: at {one.surface.spot(i[k])}{shared}, u·n would have to be at least "
+        f"{low[k] * unit:.6g} m and at most {high[k] * unit:.6g} m"
+        for k in bad[:1]
+    ]
+
+
+def make_conditions(
+    context: DomainForms,
+    scales: Scales,
+    wanted: Sequence[tuple[str, Condition]],
+    thresholds: CompositionThresholds = DEFAULT,
+) -> tuple[fem.DirichletBC, ...]:
+    """The conditions, nondimensional. Collective.
+
+    Args:
+        context: spaces, parts and vertices.
+        scales: what one unit is in SI.
+        wanted: the conditions in SI, each with the part it stands on.
+        thresholds: which values are the same.
+
+    Raises:
+        InputError: on all ranks alike: two parts prescribe different values where they meet.
+    """
+    found = tuple(_condition(context, scales, part, condition) for part, condition in wanted)
+    named = [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)]
+    _check_agreement(context, scales, named, thresholds.same)
+    return found
+
+
+def values(context: DomainForms, conditions: Sequence[fem.DirichletBC]) -> Array:
+    """What the conditions prescribe at the local scalar dofs, zero at the others.
+
+    Args:
+        context: spaces, parts and vertices.
+        conditions: the conditions.
+    """
+    found = np.zeros(len(context.points) * context.dimension)
+    for condition in conditions:
+        condition.set(found)
+    return found
+
+
+def _condition(context: DomainForms, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
+    facets, dim = context.part_facets[part], context.dimension - 1
+    component = context.space.sub(condition.component)
+    if condition.value.is_number and edge_share(context.space) == 0.0:
+        value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
+        return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
+    collapsed, _ = component.collapse()
+    function = fem.Function(collapsed)
+    function.interpolate(lambda x: np.asarray(condition.value.at(x.T) / scales.displacement))
+    return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
+
+
+def _check_agreement(
+    context: DomainForms, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]], rounding: float
+) -> None:
+    """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
+    values = np.empty(len(context.points) * context.dimension)
+    prescribed = [(part, *_values(condition, values)) for part, condition in named]
+    size = max((float(np.max(np.abs(v), initial=0.0)) for _, _, v in prescribed), default=0.0)
+    bad: list[str] = []
+    for (one, dofs, these), (other, more, those) in combinations(prescribed, 2):
+        shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
+        apart = np.abs(these[i] - those[j]) > rounding * size
+        differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
+        bad += [_disagreement(context, int(dof), (one, other), pair, scales) for dof, *pair in differing]
+    found = [text for rank in agree(context.domain.mesh.comm, bad[:1]) for text in rank]
+    if found:
+        raise InputError(found[0])
+
+
+def _values(condition: fem.DirichletBC, values: Array) -> tuple[Entities, Array]:
+    """The dofs of a condition and what it prescribes; ``values`` is room for all dofs."""
+    dofs = condition.dof_indices()[0]
+    condition.set(values)
+    return dofs, values[dofs]
+
+
+def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
+    block, component = divmod(dof, context.dimension)
+    at = spot(context.points[block][: context.dimension])
+    one, other = (float(value) * scales.displacement for value in pair)
+    return (
+        f"boundary.{parts[0]} and boundary.{parts[1]} meet at {at} and prescribe displacements along "
+        f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'
+    )
