@@ -1,1 +1,1 @@
-"""How good a solution is: certificate, second order, warnings, error estimates."""
+"""How good a solution is: certificate, state of Γc, second order, uniqueness."""

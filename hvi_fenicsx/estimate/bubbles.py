@@ -1,4 +1,9 @@
-"""Forces on few of a space's blocks: what facets of Γc give, without arrays of the whole mesh."""
+"""The hierarchical complement of degree p in degree 2p: what a space of twice the degree has between the nodes.
+
+Each function belongs to a multi-index a of sum 2p over the corners of a cell; its point has the barycentric coordinates
+a/2p. The points at which all of a is even are the nodes of degree p. A bubble is the function of degree 2p that is 1 at
+its own point and 0 at all others. At degree 1 there is one for every edge, 4 λ_a λ_b.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Components along tangents that jump from one node of a facet to the next, as components along nearly equal ones.
-
-The tangents of files are fixed by the axes of space (:func:`.geometry.tangents`). On a curved part they change
-their sign, in space their direction, between two nodes; a component that is interpolated there means nothing.
-"""
+"""The facets of Γc between their nodes: displacements at quadrature points, and tractions tested there."""
 
 from __future__ import annotations
 

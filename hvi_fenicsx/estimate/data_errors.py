@@ -1,4 +1,7 @@
-"""The data on the boundary that vary in space, and samples of them within facets."""
+"""What the mesh does not see of the data on the boundary: tractions, prescribed displacements and gaps within facets.
+
+Data are sampled within facets in Legendre modes; the surface of a half-space says how far the body gives way to each.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""What the bubbles must meet: prescribed displacements, and the bounds of contact at the points of the bubbles.
+"""The defect of u_h in the bubbles: minimise ½a(e, e) - ρ(e) among the bubbles that the constraints admit.
 
-The constraints are those of the inequality at these points (Kornhuber 1996; Zou, Veeser, Kornhuber and Gräser 2011).
+ρ is the residual with all that the body feels pointwise: loads, thermal strain, the laws between the nodes. The
+constraints are supports and contact.
 """
 
 from __future__ import annotations

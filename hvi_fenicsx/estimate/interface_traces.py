@@ -1,6 +1,8 @@
-"""Quadrature points on the intersections of an interface's facets, and the functions of both sides there.
+"""Interfaces between the nodes of both sides: relative displacements at quadrature points, tractions tested there.
 
-The intersections are spread over the ranks.
+It is for an interface what :class:`.contact_facets.PartTrace` is for a part of the boundary. What the first side's
+nodes carry is a function of the elements' degree on its facets; a node that carries nothing has the mean of its
+neighbours. What the intersections of facets say of bubbles and nodes is summed over the ranks.
 """
 
 from __future__ import annotations

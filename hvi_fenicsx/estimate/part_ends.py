@@ -1,10 +1,8 @@
-"""Supports, contact and laws whose part ends within a facet: they act on this facet as a whole, or not at all.
+"""Parts with `where` that end within a facet: the mesh counts this facet as a whole, or not at all.
 
-Where a part ends that holds the body firmly, its traction is K/√(2πr), as at the tip of a crack. Moving the end by δ
-then costs the energy G δ for each length of the end, with G = K·L⁻¹·K/4 (Irwin; half of a crack, L⁻¹ of
-:mod:`.half_space`), and the squared energy norm of the difference is twice that. K follows from the mean traction over
-the facets at the end, 2K/√(2πh). A law that gives way has a bounded traction, which is too much beyond the end, or
-lacks before it, as a load does (:mod:`.part_ends`).
+A load that is too much there, or too little, is a load of its own, and so is the traction of a law that gives way. The
+displacement that they cause is found in u_h's space, and counts in the cells at these facets: smaller ones make it
+smaller, wherever the body gives way. What holds the body firmly is singular at its end (:mod:`.support_ends`).
 """
 
 from __future__ import annotations

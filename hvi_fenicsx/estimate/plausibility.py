@@ -1,4 +1,4 @@
-"""The keys in the scene of the effects that brought bounds and laws, for sentences about them."""
+"""Warnings of numbers that are not plausible, mostly for their units: of a problem, and of its solution."""
 
 from __future__ import annotations
 

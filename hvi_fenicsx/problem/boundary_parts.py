@@ -1,4 +1,4 @@
-"""The facets of the boundary parts of a model on a domain."""
+"""The boundary parts of a model: their facets, areas, centroids and second moments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parts with contact or laws: their surfaces and the bounds on u·n, nondimensional."""
+"""Bounds on u·n and prescribed displacements: the parts with contact or laws, their surfaces, Dirichlet conditions."""
 
 from __future__ import annotations
 

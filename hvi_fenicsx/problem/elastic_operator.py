@@ -1,4 +1,7 @@
-"""Which bilinear forms depend on strains alone, as a material's does: found from the form itself."""
+"""The elastic operator a(u, v): matrix, force, energy by cell, residual in other test spaces, stress by cell.
+
+How the volumetric part is treated is known here and nowhere else; the element itself in :mod:`.spaces`.
+"""
 
 from __future__ import annotations
 
