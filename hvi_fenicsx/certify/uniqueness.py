@@ -7,7 +7,7 @@ that the supports leave. There is no other one where such motions meet a compone
 order in each direction (a pressed contact, a kink that is not used up), or a law that is a spring.
 
 Where laws drop, the state itself may tell: no displacement has a lower energy if the stiffness outweighs by how much
-the laws' energies are below their tangents there (:mod:`.supporting_parabolas`).
+the laws' energies are below their tangents there.
 
 Where a force F presses an obstacle, E - F way takes the place of the energy E of the body, and contact bounds u·n by
 the way: what is convex stays so, and E(v) >= E(u) + E'(u)(v - u) gives E(v) - F way_v >= E(u) - F way_u, as contact

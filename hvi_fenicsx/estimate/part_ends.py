@@ -2,7 +2,7 @@
 
 A load that is too much there, or too little, is a load of its own, and so is the traction of a law that gives way. The
 displacement that they cause is found in u_h's space, and counts in the cells at these facets: smaller ones make it
-smaller, wherever the body gives way. What holds the body firmly is singular at its end (:mod:`.support_ends`).
+smaller, wherever the body gives way. What holds the body firmly is singular at its end.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ class Surface:
         facets: its local facets.
         blocks: local indices of its vertices (blocks of the space), (m,).
         points: the vertices, m, (m, 3).
-        normals: outward unit normals (:mod:`.contact_normals`), (m, d).
+        normals: outward unit normals, (m, d).
         measured: the unit normals along which the scene states the gap; they differ from `normals` only where the part
             shares a vertex with a prescribed component or with another part, (m, d).
         tangents: unit tangents (:func:`tangents`), (m, d-1, d).

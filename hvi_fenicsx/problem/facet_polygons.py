@@ -1,4 +1,4 @@
-"""Where the triangles of two sides in space lie over each other: polygons (:mod:`.triangle_clipping`).
+"""Where the triangles of two sides in space lie over each other: polygons.
 
 As in the plane (:mod:`.facet_overlaps`), a point of the second side belongs to the point of the first that it is
 projected onto along the first facet's normal. Each facet of the first side has coordinates of its own, in which it is

@@ -1,7 +1,7 @@
 """A superpotential at the vertices of Γc, and the UFL boundary term through which it enters the equations.
 
 The regularised (or selected) Clarke derivative is a P1 field τ on Γc; its weak form ∫ τ·v ds, with vertex quadrature,
-is compiled once and serves every law. The tangent ∫ (K du)·v ds is then block-diagonal (:mod:`.contact_rows`).
+is compiled once and serves every law. The tangent ∫ (K du)·v ds is then block-diagonal.
 """
 
 from __future__ import annotations
