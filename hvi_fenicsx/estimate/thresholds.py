@@ -43,7 +43,7 @@ class EstimateThresholds:
     near: float = thresholds.DEFAULT.near
     facet_degree: tuple[int, int] = (12, 30)
     tolerance: float = 0.1
-    rough_tolerance: float = 0.2
+    rough_tolerance: float = 0.3
     bubble_steps: int = 30
     rounds: int = 4
     foundation: float = 1e-8
