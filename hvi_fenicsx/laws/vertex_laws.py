@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, Integers
 from .base import Superpotential
 from .traction_graph import TractionGraph
 
@@ -40,7 +40,7 @@ class VertexLaws:
         """The same vertices, which remember, and have been nowhere yet; a linear law has nothing to remember."""
         return self if self.law.is_linear else replace(self, memory=np.zeros((len(self.weights), 4)))
 
-    def at(self, rows: Array | slice) -> VertexLaws:
+    def at(self, rows: Integers | slice) -> VertexLaws:
         """Some of the vertices.
 
         Args:

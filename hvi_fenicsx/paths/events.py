@@ -115,7 +115,7 @@ class Events(Equations):
             return self._moved(Outcome.END, point, self.correct(guess, self.at_end(point, end)))
         return self._returning(move, aim) or self._turning(move)
 
-    def _shares(self, move: Move) -> Array:
+    def _shares(self, move: Arc) -> Array:
         """The part of the step after which each point passed an end; 1 where it did not, (m,)."""
         points, s0, s1 = self.points, move.before.values.s, move.after.values.s
         found, way = np.ones(len(points)), np.where(s1 != s0, s1 - s0, 1.0)
@@ -154,7 +154,7 @@ class Events(Equations):
         """No step: a slower point passed its end by what rounding allows, and goes on from there."""
         return Arc(outcome=Outcome.END, point=point, before=self.here, after=self.here)
 
-    def _arrives(self, move: Move) -> bool:
+    def _arrives(self, move: Arc) -> bool:
         """Whether the point at an end of its segment goes outwards there, and does not come back to it."""
         k, after = move.point, move.after
         rate = float(self.points.rates(after.y[:-1], after.tangent[:-1])[k])
@@ -167,7 +167,7 @@ class Events(Equations):
         back = (move.after.y[-1] - self.here.y[-1]) * self.here.tangent[-1] < 0.0
         return self._up_to(move, Outcome.FACTOR, None) if began and back else None
 
-    def _turning(self, move: Move) -> Arc | None:
+    def _turning(self, move: Arc) -> Arc | None:
         """The step up to where the factor, or a bond with memory, turned on the way; None: none did."""
         if not self.points.bent or move.outcome in (Outcome.FOLD, Outcome.TURNED):
             return None

@@ -54,7 +54,8 @@ class Follower(LoadHistory):
         super().__init__(problem, options, resume, watch)
         self._points = ContactPoints(problem, options.remember, options.thresholds)
         self._empty_jumps = 0
-        self._blocked, self._untried = False, (np.empty(0), list[Way]())
+        self._blocked = False
+        self._untried: tuple[Array, list[Way]] = np.empty(0), []
         self._last: PathState
         self._branch: Branch
         self._cycles: Cycles

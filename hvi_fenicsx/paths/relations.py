@@ -225,8 +225,8 @@ class ContactPoints(PointStatuses):
             resists = ~self.moving | (np.abs(self.slope) > ZERO * self.stiffest)
             return unresisted(self.rigid, self.rigid[:, resists], rate)
         none = self.thresholds.flat * self.stiffest
-        resists = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
-        return unresisted(self.rigid, (self._axes(values.directions).sparse[resists] @ self.rigid.T).T, rate)
+        stiff = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
+        return unresisted(self.rigid, (self._axes(values.directions).sparse[stiff] @ self.rigid.T).T, rate)
 
     def held_stiffness(self, held: Array | None) -> Array:
         """The stiffness with springs against motions that are as stiff as the body, (n, n).

@@ -93,7 +93,7 @@ class VertexLaw:
 
     @property
     def _one(self) -> VertexLaws:
-        return self.laws.at([self.number])
+        return self.laws.at(slice(self.number, self.number + 1))
 
     def traction(self, x: float, side: str) -> float:
         """The limit of the traction along the coordinate, with memory.

@@ -96,11 +96,11 @@ class ReferenceSolution:
             points = {name: self._arrays.points[part.vertices] for name, part in self._arrays.parts.items()}
             along = {name: surface(found, found.parts[name], x) for name, x in points.items()}
             self._transfers = {key: (BodyTransfer(found, self._targets), along)}
-        in_bodies, along = self._transfers[key]
+        in_bodies, on_parts = self._transfers[key]
         assert found.displacement is not None
         u = in_bodies(found.displacement)
         rows = [np.empty((0, 2 * u.shape[1] + 3))]
-        for name, way in along.items():
+        for name, way in on_parts.items():
             width = np.full((way.shape[0], 1), _width(found, found.parts[name]))
             rows.append(np.hstack([self._slip(name, u), way @ _tractions(found.parts[name]), width]))
         slip, friction, others = np.split(np.vstack(rows), [u.shape[1], 2 * u.shape[1]], axis=1)

@@ -83,8 +83,8 @@ def _line(axes: Axes, rows: list[Row], along: str, quantity: str, name: str) -> 
     """Errors in the colour of the smoothing and with the marker of the degree; over time they are points alone."""
     known = sorted((getattr(r, along), max(e, LEAST)) for r in rows if (e := r.error(quantity)) is not None)
     marker = "D" if rows[0].method != "auto" else "o" if rows[0].degree == 1 else "s"
-    style = {"color": _COLOURS.get(rows[0].smoothing, GREY), "ms": 6, "mec": "white", "label": name}
-    axes.plot([x for x, _ in known], [e for _, e in known], marker + ("" if along == "seconds" else "-"), **style)
+    (line,) = axes.plot([x for x, _ in known], [e for _, e in known], marker + ("" if along == "seconds" else "-"))
+    line.set(color=_COLOURS.get(rows[0].smoothing, GREY), markersize=6, markeredgecolor="white", label=name)
 
 
 def _beside(axes: Axes, study: Study, along: str, quantity: str) -> None:

@@ -153,7 +153,8 @@ class SpaceCanvas(Canvas):
     def _clear(self, part: str, points: Array, normal: Array) -> Array:
         """How far out along its normal a part is drawn, m, (3,): not at all where it is seen, or closes on itself."""
         across = self.project(normal[None])[0]
-        length, away = float(np.linalg.norm(across)), np.zeros(3)
+        length = float(np.linalg.norm(across))
+        away: Array = np.zeros(3)
         if float(normal @ self.toward) < 0.15 and length > 0.1:
             ends, own = np.concatenate(self.reached) @ across / length, self.project(points) @ across / length
             margin = 0.05 * float(np.ptp(np.concatenate(self.reached), axis=0).max())
@@ -232,7 +233,7 @@ class SpaceCanvas(Canvas):
         depths = ways[:, 0] @ self.toward
         shown = [way for way, depth in zip(ways, depths, strict=True) if depth > depths.min() or len(ways) == 1]
         self._depths += [float((ways @ self.toward).min()), float((ways @ self.toward).max())]
-        self.follow(np.array([self.project(way) for way in shown]))
+        self.follow(np.array([self.project(np.asarray(way)) for way in shown]))
 
     def finish(self) -> Figure:
         """Lay out the picture, have VTK draw it, and write its labels."""
@@ -268,10 +269,10 @@ class SpaceCanvas(Canvas):
             "shrinkA": 0,
             "shrinkB": 0,
         }
-        foot = self.axes.transAxes + ScaledTranslation(*(origin / 72), self.fig.dpi_scale_trans)
+        foot = self.axes.transAxes + ScaledTranslation(origin[0] / 72, origin[1] / 72, self.fig.dpi_scale_trans)
         for name, end in zip("xyz", ends, strict=True):
             self.axes.annotate(
-                name, (0, 0), tuple(map(float, end)), xycoords=foot, textcoords="offset points", ha="center",
+                name, (0, 0), (float(end[0]), float(end[1])), xycoords=foot, textcoords="offset points", ha="center",
                 va="center", size=LETTERS, color=GREY, arrowprops=arrow,
             )  # fmt: skip
 
