@@ -170,7 +170,7 @@ def _steps(cells: Sequence[int] | Integers) -> list[int]:
     return [math.prod(int(n) + 1 for n in cells[:axis]) for axis in range(len(cells))]
 
 
-def _flat(places: Integers, cells: Sequence[int] | Integers) -> Integers:
+def _flat(places: Integers, cells: Sequence[int] | Numbers) -> Integers:
     """The numbers of the grid's vertices, x running fastest, (n,)."""
     return np.asarray(places @ np.array(_steps(cells), dtype=np.int64))
 

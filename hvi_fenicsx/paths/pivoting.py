@@ -76,6 +76,7 @@ class StraightBranch(Branch):
             driver = self._setting_out()
         self._basis = Basis(self.state, rate, driver, inverse)
         self._find_direction()
+        self._told = self.values.x, factor
 
     def _setting_out(self) -> int:
         """What drives where the path sets out with the factor: along a motion that nothing resists, the body does."""
@@ -187,10 +188,11 @@ class StraightBranch(Branch):
         if chosen is None:
             return Move(outcome=Outcome.AWAY)
         variable, length, small, tied = chosen
-        before, factor = self.values.x, self._factor
         self._go(length, small)
         if variable == FACTOR:
             self._factor = aim
+        before, factor = self._told  # not the state from which it went: that was refined since
+        self._told = self.values.x, self._factor
         self._driven = 0.5 * float(self.rate @ (before + self.values.x)) * (self._factor - factor)
         if variable == FACTOR:
             return Move(outcome=Outcome.FACTOR)

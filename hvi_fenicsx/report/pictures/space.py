@@ -270,9 +270,9 @@ class SpaceCanvas(Canvas):
             "shrinkB": 0,
         }
         foot = self.axes.transAxes + ScaledTranslation(origin[0] / 72, origin[1] / 72, self.fig.dpi_scale_trans)
-        for name, end in zip("xyz", ends, strict=True):
+        for name, (right, up) in zip("xyz", ends.tolist(), strict=True):
             self.axes.annotate(
-                name, (0, 0), (float(end[0]), float(end[1])), xycoords=foot, textcoords="offset points", ha="center",
+                name, (0, 0), (right, up), xycoords=foot, textcoords="offset points", ha="center",
                 va="center", size=LETTERS, color=GREY, arrowprops=arrow,
             )  # fmt: skip
 
