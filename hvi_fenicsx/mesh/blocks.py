@@ -170,7 +170,7 @@ def _steps(cells: Sequence[int] | Integers) -> list[int]:
     return [math.prod(int(n) + 1 for n in cells[:axis]) for axis in range(len(cells))]
 
 
-def _flat(places: Integers, cells: Sequence[int] | Numbers) -> Integers:
+def _flat(places: Integers, cells: Sequence[int] | Integers) -> Integers:
     """The numbers of the grid's vertices, x running fastest, (n,)."""
     return np.asarray(places @ np.array(_steps(cells), dtype=np.int64))
 
@@ -365,6 +365,8 @@ def _numbered(flat: Numbers, space: fem.FunctionSpace, points: Array, size: Sequ
     start, end = space.dofmap.index_map.local_range
     own = np.rint(_grid_places(points[: end - start], size, cells)).astype(PETSc.IntType)
     found = PETSc.AO().createMemoryScalable(
-        _flat(own, cells).astype(PETSc.IntType), np.arange(start, end, dtype=PETSc.IntType), comm=space.mesh.comm
+        _flat(own, np.asarray(cells, dtype=np.int64)).astype(PETSc.IntType),
+        np.arange(start, end, dtype=PETSc.IntType),
+        comm=space.mesh.comm,
     )
     return np.asarray(found.app2petsc(flat.ravel().astype(PETSc.IntType)).reshape(flat.shape))

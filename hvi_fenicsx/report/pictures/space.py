@@ -270,7 +270,7 @@ class SpaceCanvas(Canvas):
             "shrinkB": 0,
         }
         foot = self.axes.transAxes + ScaledTranslation(origin[0] / 72, origin[1] / 72, self.fig.dpi_scale_trans)
-        for name, (right, up) in zip("xyz", ends.tolist(), strict=True):
+        for name, right, up in zip("xyz", map(float, ends[:, 0]), map(float, ends[:, 1]), strict=True):
             self.axes.annotate(
                 name, (0, 0), (right, up), xycoords=foot, textcoords="offset points", ha="center",
                 va="center", size=LETTERS, color=GREY, arrowprops=arrow,
