@@ -20,16 +20,16 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LIMITS = {
-    "lines of code": 39000,
-    "tokens": 456000,
-    "files": 395,
-    "lines of the largest room": 3850,
+    "lines of code": 38400,
+    "tokens": 452000,
+    "files": 350,
+    "lines of the largest room": 3810,
     "flat modules": 12,
-    "tuning numbers": 390,
-    "class names used twice": 28,
+    "tuning numbers": 385,
+    "class names used twice": 26,
     "lines of the longest function": 46,
     "floors": 17,
-    "lines of tests": 28800,
+    "lines of tests": 28300,
     "lines of benchmarks": 2600,
 }
 """They go down with the house, never up without a reason that is written beside."""
