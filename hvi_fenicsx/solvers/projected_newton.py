@@ -24,7 +24,8 @@ from .convergence import Outcome
 from .method import Counts
 from .thresholds import ENERGY, EXACT, Thresholds
 
-_ROUNDING = float(np.finfo(np.float64).eps)
+_DIGITS = int(np.finfo(np.float64).nmant)
+"""Halvings or doublings of a length, at most: then its digits are used up."""
 
 
 class ProjectedNewton:
@@ -123,7 +124,9 @@ class ProjectedNewton:
         behind, ahead = self._slopes(x, step, begin), self._slopes(x, step, end)
         flat = -self._thresholds.flat * behind
         falls = behind < 0.0
-        while np.any(onward := falls & (ahead < -flat) & (end < self._thresholds.runaway)):
+        for _ in range(_DIGITS):
+            if not np.any(onward := falls & (ahead < -flat)):
+                break
             begin, behind = np.where(onward, end, begin), np.where(onward, ahead, behind)
             end = np.where(onward, 2.0 * end, end)
             ahead = self._slopes(x, step, end)
@@ -136,7 +139,9 @@ class ProjectedNewton:
         (begin, end), (behind, ahead) = ends, slopes
         found = np.where(flat > 0.0, end, 0.0)
         left = (flat > 0.0) & (np.abs(ahead) > flat) & (ahead > 0.0)
-        while np.any(left := left & (begin < end * (1.0 - _ROUNDING))):
+        for _ in range(_DIGITS):
+            if not np.any(left):
+                break
             middle = np.where(left, self._between(begin, end, behind, ahead), found)
             slope = self._slopes(x, step, middle)
             found = middle
