@@ -37,7 +37,7 @@ Condition = tuple[Callable[[Array], float], Callable[[Array], Array]]
 """What a corrected point satisfies beside the equations: a value that is zero there, and its gradient."""
 
 
-class Equations(Branch):
+class CurveEquations(Branch):
     """S x + r = f0 + λ f1 in coordinates along the graphs, at one point of the curve and around it.
 
     Args:

@@ -14,7 +14,7 @@ from scipy.optimize import toms748
 
 from ..typing import Array
 from .branch import Move, Outcome, Refused
-from .equations import Equations, Place
+from .equations import CurveEquations, Place
 from .relations import ContactPoints
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -79,7 +79,7 @@ def _cubic_rate(t: Array, ends: list[float]) -> Array:
     return np.asarray(6 * t * (1 - t) * (b - a) + (1 - t) * (1 - 3 * t) * da + t * (3 * t - 2) * db)
 
 
-class Events(Equations):
+class Events(CurveEquations):
     """The equations of a curve, and the events within a step from the present point."""
 
     def _after(self, y: Array) -> Place:

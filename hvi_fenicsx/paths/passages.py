@@ -17,7 +17,7 @@ import numpy as np
 
 from ..typing import Array, Mask
 from .branch import Move, Outcome, Passage, Refused
-from .equations import Equations
+from .equations import CurveEquations
 from .segments import piece_at
 
 
@@ -44,7 +44,7 @@ class Crossing:
         check: is called before each passage; it may raise an error to end them.
     """
 
-    def __init__(self, curve: Equations, check: Callable[[], None]) -> None:
+    def __init__(self, curve: CurveEquations, check: Callable[[], None]) -> None:
         self._curve, self._points, self._check, self._limits = curve, curve.points, check, curve.limits
         self._lag = self._points.order  # the ways, of the order ε, of the points to their ends
         self._left = self._lag.copy()

@@ -280,7 +280,7 @@ class PointStatuses(PointLaws):
 
     @property
     def slope(self) -> Array:
-        """Of the forces of points that move, else 0, (m,); of straight graphs."""
+        """How steeply the forces rise at points that move, else 0, (m,); of straight graphs."""
         return np.where(self._moves != 0.0, self._rises, 0.0)
 
     @property

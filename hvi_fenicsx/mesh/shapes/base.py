@@ -28,7 +28,7 @@ FEWEST_ADAPTIVE = 3
 FEWEST_STUDY = 2
 """Cells each way that a block of a study has at least."""
 LARGEST_PART = 1 / 6
-"""Of the extent of a shape, that the cells of its coarsest mesh have at most."""
+"""The largest share of the extent of a shape that the cells of its coarsest mesh have."""
 UNKNOWNS_OF_FILE = 5_000
 """What a mesh file is taken to have, unrefined; it is not opened for that."""
 LARGEST_BODY = 200.0

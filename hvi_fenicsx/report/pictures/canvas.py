@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -16,7 +17,10 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from matplotlib.transforms import Bbox, BboxBase
 
 from ...typing import Array
+from ..body_mesh import BodyMesh
 from ..reader import Result
+from .shape import DeformedBody, PartGeometry
+from .sides import HeldSide, LoadedSide, Side
 from .style import GREY, HEADING, INK, VERMILION, WIDTH, area, figure, heading
 
 MARGIN = 0.3
@@ -69,7 +73,7 @@ class Scale:
 
 
 @dataclass
-class Canvas:
+class Canvas(ABC):
     """What is drawn of a body, as far as that is alike in the plane and in space.
 
     Attributes:
@@ -95,6 +99,55 @@ class Canvas:
         self.fig = figure(HEADING)
         self.axes = area(self.fig, MARGIN, 0.0, WIDTH - 2 * MARGIN, HEADING)
         self.axes.set_axis_off()
+
+    @abstractmethod
+    def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
+        """Name the parts, and show what acts on them.
+
+        Args:
+            shape: the body as it is drawn.
+            sides: the parts.
+            contacts: the names of those with contact or a law.
+            held: the names of those with a support.
+        """
+
+    @abstractmethod
+    def supports(self, shape: DeformedBody, found: Sequence[HeldSide]) -> None:
+        """Draw the supports.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides that are held.
+        """
+
+    @abstractmethod
+    def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
+        """Draw arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides with loads.
+        """
+
+    @abstractmethod
+    def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry], *, pressure: bool) -> None:
+        """Draw the obstacles and the pressure on the parts.
+
+        Args:
+            shape: the body as it is drawn.
+            parts: those with contact or a law.
+            pressure: whether the body is painted with it where its parts are hidden.
+        """
+
+    @abstractmethod
+    def ghost(self, body: BodyMesh, points: Array, ways: Array) -> None:
+        """Draw a body where a motion brings it, and the ways of some of its points.
+
+        Args:
+            body: the body.
+            points: its points there, m, (n, d).
+            ways: m, (j, k, d).
+        """
 
     def key(self, *artists: Artist) -> None:
         """Add lines to the legend, each words once."""

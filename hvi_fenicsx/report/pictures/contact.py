@@ -105,7 +105,12 @@ def _drops(result: Result, part: ContactPart, kind: str) -> Array:
 
 @picture("contact", of_part=True, caption="Along {part}: displacement, friction and pressure.")
 def contact(result: Result, part: ContactPart) -> Figure:
-    """Draw what happens on a part of Γc."""
+    """Draw what happens on a part of Γc.
+
+    Args:
+        result: the result.
+        part: its part.
+    """
     return _curves(result, part) if result.body.dimension == 2 else _maps(result, part)
 
 
