@@ -109,7 +109,7 @@ class Coupled:
             unmet = -asked
             unmet -= self._force
             unmet[laws.blocks] += laws.values
-            step, length = inverse.solve(unmet, self._thresholds.rough_tolerance)
+            step, length = inverse.solve(unmet, self._thresholds.rough_tolerance[1])
             nodes.x.array[:] += step.x.array
             self._force = inverse.force(nodes)
             self._longest = max(self._longest, length)

@@ -249,7 +249,8 @@ class LeastEnergy:
         """Find them; from the second time on from those that were found before. Collective."""
         stiffness, limits, e = self._stiffness, self._thresholds, self._e
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
-        tolerance = limits.rough_tolerance if self._begun else limits.tolerance
+        rough = limits.rough_tolerance[nodes.degree(stiffness.problem.space) - 1]
+        tolerance = rough if self._begun else limits.tolerance
         goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), limits.rounding**2)
         for _ in range(limits.rounds):
             self._put_on_bounds()

@@ -98,7 +98,7 @@ def estimate(
     cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse, thresholds)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.rough_tolerance)
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.rough_tolerance[0])
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
