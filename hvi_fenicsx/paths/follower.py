@@ -222,9 +222,10 @@ class Follower(LoadHistory):
         found = self._cycles.note(state)
         if self._points.straight and found is Cycle.BLOCKED and self._takes_another_way(aim):
             return self._state(state.event, place=state.place, bifurcation=True)
+        most = np.inf if self._points.straight else self._options.thresholds.waits + 4 * len(self._points)
         if found is Cycle.CLOSED or (found is not None and self._points.straight):
             self._go_round(found)
-        elif self._cycles.standing > self._options.thresholds.waits + 4 * len(self._points):
+        elif self._cycles.standing > most:
             self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
         return state
 
