@@ -157,6 +157,7 @@ class Auto(BranchIteration):
             yield from self._from_rest()
         yield from self._on_other_pieces(most)
         self._limit.next_start()
+        yield from self._from_exact()
         growths = [term.exact.growth for term in self.system.terms]
         if any(min(growth.minus, growth.plus) < 0.0 for growth in growths):
             yield from self._attempt(newton_continuation.solve, self.context)
@@ -169,6 +170,15 @@ class Auto(BranchIteration):
             pieces.scale(factor)
             self._limit.next_start(most)
             yield from self._attempt(self._iteration().solve, None, pieces)
+
+    def _from_exact(self) -> Iterator[SolveResult]:
+        """Of smoothed laws, from the equilibrium of the laws themselves."""
+        exact = [term.exact for term in self.system.terms]
+        if all(law is true for law, true in zip(self._laws, exact, strict=True)):
+            return
+        for found in self._attempt(BranchIteration(self.context, exact, self._epsilon, check_bounded=True).solve):
+            if found.converged:
+                yield from self._attempt(self._iteration().solve, self.system.unknowns(found.u))
 
     def _from_rest(self) -> Iterator[SolveResult]:
         """From bodies at rest on their supports, since closed contact is no start where bodies roll.
