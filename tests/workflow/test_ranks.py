@@ -76,7 +76,7 @@ class Results:
         file = meshes.make(folder / "square.msh", meshes.GOOD)
         tables["of-a-mesh-file"]["domain"] = {"shape": "file", "file": str(file)}
         for name, changes in DEMOS.items():
-            tables[name] = read_scene(ROOT / "demos" / f"{name}.toml", changes).model_dump()
+            tables[name] = read_scene(ROOT / "demos" / f"{name}.toml", changes).tables()
         self.tables = tables
 
     def of(self, name: str, ranks: int) -> Path:
