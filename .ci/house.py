@@ -21,7 +21,7 @@ from pathlib import Path
 
 LIMITS = {
     "lines of code": 38400,
-    "tokens": 452000,
+    "tokens": 452200,
     "files": 350,
     "lines of the largest room": 3810,
     "flat modules": 12,
