@@ -5,15 +5,3 @@ from .solution import ModelSolution as Solution
 from .solving import check, solve
 from .stationary import Equilibria, equilibria
 from .studying import ModelStudy, study
-
-__all__ = [
-    "Equilibria",
-    "ModelPath",
-    "ModelStudy",
-    "Solution",
-    "check",
-    "equilibria",
-    "follow",
-    "solve",
-    "study",
-]

@@ -5,17 +5,3 @@ from .model import Mistakes, Model, dump_scene, is_portable
 from .options import PathTable, SolverTable
 from .reader import Scene, read_tables
 from .source import read_scene, with_place
-
-__all__ = [
-    "Body",
-    "Mistakes",
-    "Model",
-    "PathTable",
-    "Scene",
-    "SolverTable",
-    "dump_scene",
-    "is_portable",
-    "read_scene",
-    "read_tables",
-    "with_place",
-]

@@ -20,38 +20,3 @@ from .motions import (
 from .reduction import ContactCone, Resistance, RigidProblem, pressed, without_obstacles
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
 from .thresholds import RigidThresholds
-
-__all__ = [
-    "AnyBody",
-    "ContactCone",
-    "Directional",
-    "ExistenceState",
-    "FixedDirections",
-    "JoinedBodies",
-    "LoadFactors",
-    "Mode",
-    "MotionFields",
-    "Movable",
-    "OneSidedSupports",
-    "PaperConditions",
-    "Resistance",
-    "Rest",
-    "RigidBody",
-    "RigidProblem",
-    "RigidThresholds",
-    "Solvability",
-    "analyse",
-    "combine",
-    "combine_factors",
-    "fields_at",
-    "gives_way",
-    "kernel",
-    "least_energy",
-    "load_factors",
-    "modes",
-    "null_space",
-    "pressed",
-    "rigid_fields",
-    "undecided",
-    "without_obstacles",
-]

@@ -3,17 +3,3 @@
 from .preparation import DEFAULT, Preparation, Thresholds, prepare
 from .solution import LastBorne, Solution
 from .solving import certified, find_solution, finish, solve, unsolved
-
-__all__ = [
-    "DEFAULT",
-    "LastBorne",
-    "Preparation",
-    "Solution",
-    "Thresholds",
-    "certified",
-    "find_solution",
-    "finish",
-    "prepare",
-    "solve",
-    "unsolved",
-]

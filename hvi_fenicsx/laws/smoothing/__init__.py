@@ -5,20 +5,4 @@ from .base import SmoothedLaw, Smoothing, available, create, registered
 from .paper import PaperSmoothedLaw, PaperSmoothing
 from .smoothed_law import QUADRATIC, Chks, LogExp, PlusFunction, PlusSmoothedLaw, Quadratic
 
-__all__ = [
-    "QUADRATIC",
-    "Chks",
-    "LogExp",
-    "PaperSmoothedLaw",
-    "PaperSmoothing",
-    "PlusFunction",
-    "PlusSmoothedLaw",
-    "Quadratic",
-    "SmoothedLaw",
-    "Smoothing",
-    "available",
-    "create",
-    "registered",
-]
-
 load_modules(__name__)

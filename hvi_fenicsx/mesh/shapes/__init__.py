@@ -15,22 +15,4 @@ from .plane import PlaneShape
 from .several import PlacedShape, SeveralBodies
 # isort: on
 
-__all__ = [
-    "Box",
-    "Disk",
-    "DomainShape",
-    "FixedMesh",
-    "GivenMesh",
-    "HalfDisk",
-    "LShape",
-    "MeshFile",
-    "NotchedStrip",
-    "OnlyMesh",
-    "PlacedShape",
-    "PlaneShape",
-    "Rectangle",
-    "Refinements",
-    "SeveralBodies",
-]
-
 load_modules(__name__)

@@ -1,6 +1,6 @@
 """The scene reference, written from the classes that read a scene, so that it cannot drift from them.
 
-``python3 -m hvi_fenicsx.model.reference_doc > docs/scene.md`` renews the document.
+``python3 docs/scene_reference.py > docs/scene.md`` renews the document.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from ..effects import Effect, Place
-from ..formula import FUNCTIONS, Formula
-from ..laws.base import registered
-from ..mesh.shapes import DomainShape, PlacedShape
-from ..schema import OneOf, descriptions
-from .options import PathTable, SolverTable
-from .reader import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, TopLevel
+from hvi_fenicsx.effects import Effect, Place
+from hvi_fenicsx.formula import FUNCTIONS, Formula
+from hvi_fenicsx.laws.base import registered
+from hvi_fenicsx.mesh.shapes import DomainShape, PlacedShape
+from hvi_fenicsx.model.options import PathTable, SolverTable
+from hvi_fenicsx.model.reader import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, TopLevel
+from hvi_fenicsx.schema import OneOf, descriptions
 
 T = TypeVar("T")
 
@@ -31,7 +31,7 @@ _FORMULAS = (
 _INTRODUCTION = """\
 # Scene reference
 
-*This page is written by `python3 -m hvi_fenicsx.model.reference_doc` from the classes that read a scene. A test
+*This page is written by `python3 docs/scene_reference.py` from the classes that read a scene. A test
 checks that it is up to date.*
 
 A scene is a TOML file in SI units. An unknown key is an error. A whole number may stand where a number is expected;
@@ -135,7 +135,7 @@ def _literals(field: FieldInfo) -> list[str]:
 
 def _provided(registry: Mapping[str, type[T]]) -> dict[str, type[T]]:
     """Those of the program itself; a user's own may be registered too."""
-    program = __package__.split(".")[0]
+    program = "hvi_fenicsx"
     return {name: kind for name, kind in registry.items() if kind.__module__.startswith(program)}
 
 
