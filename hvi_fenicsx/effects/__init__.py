@@ -6,8 +6,6 @@ from .base import (
     Effect,
     Evaluate,
     FormContext,
-    In,
-    On,
     Place,
     SideMoments,
     Sides,

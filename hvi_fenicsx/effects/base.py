@@ -432,39 +432,3 @@ def plain(given: Any) -> Any:
     if isinstance(given, list | tuple):
         return [plain(one) for one in given]
     return {key: plain(value) for key, value in given.items()} if isinstance(given, dict) else given
-
-
-def On(side: Sides, effect: Effect) -> Effect:
-    """An effect on a side, such as one of your own class. Not collective.
-
-    Args:
-        side: the side's name, or a list of sides.
-        effect: any effect that acts on a boundary.
-
-    Raises:
-        InputError: it is no effect, or acts in the volume.
-    """
-    if _known("On", effect).place is not Place.BOUNDARY:
-        raise InputError(f"On: {effect.key} acts in a {effect.place.value}: write hvi.In(effect, region)")
-    return effect.at(side)
-
-
-def In(effect: Effect, region: Sides | None = None) -> Effect:
-    """An effect in the volume, or a material, such as one of your own class. Not collective.
-
-    Args:
-        effect: any effect that acts in a body.
-        region: where, a name or a list; None: in the whole body.
-
-    Raises:
-        InputError: it is no effect, or acts on a side.
-    """
-    if _known("In", effect).place is Place.BOUNDARY:
-        raise InputError(f"In: {effect.key} acts on a side: write hvi.On(side, effect)")
-    return effect.at(region)
-
-
-def _known(user: str, given: Any) -> Effect:
-    if not isinstance(given, Effect):
-        raise InputError(f"{user}: {given!r} is no effect; give an object of a subclass of hvi_fenicsx.effects.Effect")
-    return given

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Protocol
@@ -159,7 +158,6 @@ class BoundaryLaw:
         multiplier: what its tractions are multiplied by, positive.
         length_multiplier: what its lengths are multiplied by, positive: at c times the displacement it has the traction
             that it had.
-        contradictions: what keeps formulas in the place of its numbers from being one law at points (n, 3), in words.
         slip: β, what a slip is multiplied by where it is taken together with an opening.
         mixity: how the energy of separation depends on the mode; None: it does not.
     """
@@ -170,7 +168,6 @@ class BoundaryLaw:
     length_multiplier: SpatialValue = ONE
     slip: float = 1.0
     mixity: Mixity | None = None
-    contradictions: Callable[[Array], list[str]] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,31 +224,3 @@ class Contribution:
     conditions: tuple[Condition, ...] = ()
     bounds: tuple[NormalBounds, ...] = ()
     laws: tuple[BoundaryLaw, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Refuse entries of a wrong kind: what is done with them would fail far from the effect that made them.
-
-        Raises:
-            TypeError: with the entry's name.
-        """
-        import ufl  # reading a scene needs none of it
-
-        forms = dict.fromkeys((*_ARGUMENTS, "across"), ufl.Form)
-        for name, kind in {**_KINDS, **forms}.items():
-            for entry in getattr(self, name):
-                if not isinstance(entry, kind):
-                    raise TypeError(f"Contribution.{name} holds a {type(entry).__name__}, not a {kind.__name__}")
-        for name, arguments in _ARGUMENTS.items():
-            for form in getattr(self, name):
-                if len(form.arguments()) != arguments:
-                    raise TypeError(f"Contribution.{name} holds a form of {len(form.arguments())} arguments")
-
-
-_KINDS: dict[str, type] = {
-    "averaged": Averaged,
-    "conditions": Condition,
-    "bounds": NormalBounds,
-    "laws": BoundaryLaw,
-}
-_ARGUMENTS = {"bilinear": 2, "linear": 1, "strains": 1}
-"""How many of test and trial function the forms have."""

@@ -10,32 +10,28 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
-    ModelWrapValidatorHandler,
     PlainSerializer,
-    PrivateAttr,
     SerializerFunctionWrapHandler,
     ValidationError,
     model_serializer,
     model_validator,
 )
-from pydantic_core import InitErrorDetails
 from typing_extensions import override
 
 from .. import laws
 from ..errors import InputError
-from ..formula import Formula, SpatialValue
+from ..formula import SpatialValue
 from ..laws import Mixity, mixities
-from ..schema import OneOf, refusal, shown
-from . import law_formulas
+from ..schema import OneOf, refusal
 from .base import Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python, names_in_python
 from .contribution import ONE, BoundaryLaw, Contribution, Direction
-from .law_formulas import PlacedLaw
 from .values import FormulaField, Value
 
 
-def _law(value: Any) -> PlacedLaw:
+def _law(value: Any) -> laws.Superpotential:
+    """The law of a table, or an object that is one."""
     if isinstance(value, laws.Superpotential):
-        return PlacedLaw(law=value)
+        return value
     if not isinstance(value, dict):
         raise refusal('must be a table, like { law = "name", ... }')
     parameters = dict(value)
@@ -43,30 +39,17 @@ def _law(value: Any) -> PlacedLaw:
     if not isinstance(name, str):
         raise refusal(f'the law\'s name is missing: law = "name"; allowed: {", ".join(laws.available())}')
     try:
-        return law_formulas.create(name, parameters)
+        return laws.create(name, parameters)
     except InputError as error:
         if isinstance(error.__cause__, ValidationError):
-            raise _explained(error.__cause__) from None  # it knows the place of each wrong parameter
+            raise error.__cause__ from None  # it knows the place of each wrong parameter
         raise refusal(str(error)) from None
-
-
-def _explained(error: ValidationError) -> ValidationError:
-    """What is wrong with a law's parameters; if one is a text, why it is no formula."""
-    for found in error.errors():
-        if found["type"] == "float_type" and isinstance(text := found["input"], str):
-            try:
-                Formula(text)
-            except InputError as wrong:
-                said = refusal(f"must be a number (is {shown(text)}) or a formula in x, y, z: {wrong}")
-                details = InitErrorDetails(type=said, loc=found["loc"], input=text)
-                return ValidationError.from_exception_data(error.title, [details])
-    return error
 
 
 LawField = Annotated[
     laws.Superpotential,
-    BeforeValidator(lambda value: _law(value).law),
-    PlainSerializer(lambda law: laws.describe(law)),
+    BeforeValidator(_law),
+    PlainSerializer(laws.describe),
 ]
 """A superpotential as a field of a scene model: ``{ law = "name", ...parameters }``."""
 
@@ -104,8 +87,6 @@ class LawEffect(Effect):
     """what all tractions of the law are multiplied by, a positive number or a formula in x, y, z"""
     length_multiplier: Multiplier = ONE
     """what all displacements of the law are multiplied by, a positive number or a formula in x, y, z"""
-    _placed: PlacedLaw | None = PrivateAttr(default=None)
-    _given: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     @from_python
     def __init__(
@@ -119,37 +100,21 @@ class LawEffect(Effect):
             raise self.refused(text, names_in_python(side))
         self._make(side, law=law, **keys)
 
-    @model_validator(mode="wrap")
+    @model_validator(mode="before")
     @classmethod
-    def _from_table(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        law = data.get("law") if isinstance(data, dict) else None
-        if isinstance(data, cls) or isinstance(law, laws.Superpotential):
-            return handler(data)
+    def _from_table(cls, data: Any) -> Any:
+        if isinstance(data, cls) or (isinstance(data, dict) and isinstance(data.get("law"), laws.Superpotential)):
+            return data
         if not isinstance(data, dict):
-            return handler({"law": _law(data).law})
+            return {"law": _law(data)}
         own = {key: data[key] for key in cls.model_fields if key != "law" and key in data}
-        placed = _law({key: value for key, value in data.items() if key not in own})
-        effect = handler({"law": placed.law, **own})
-        return effect._multiplied_by(placed, data) if placed.parameters else effect
-
-    def _multiplied_by(self, placed: PlacedLaw, given: dict[str, Any]) -> Self:
-        """The effect with what formulas in the place of numbers make of its law; it is stored as it was given."""
-        changed = self.model_copy(
-            update={
-                "multiplier": law_formulas.times(self.multiplier, placed.multiplier),
-                "length_multiplier": law_formulas.times(self.length_multiplier, placed.length_multiplier),
-            }
-        )
-        changed._placed, changed._given = placed, given
-        return changed
+        return {**own, "law": _law({key: value for key, value in data.items() if key not in own})}
 
     @model_serializer(mode="wrap")
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
         table = handler(self)
-        for key in ("multiplier", "length_multiplier"):
-            if self._given or getattr(self, key) == ONE:
-                table.pop(key, None)  # pydantic may have been told to leave it out
-        return {**table.pop("law"), **table, **self._given}
+        unit = [key for key in ("multiplier", "length_multiplier") if getattr(self, key) == ONE]
+        return {**table.pop("law"), **{key: value for key, value in table.items() if key not in unit}}
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -157,14 +122,7 @@ class LawEffect(Effect):
         return Contribution(laws=(self._brought(),))
 
     def _brought(self, slip: float = 1.0) -> BoundaryLaw:
-        return BoundaryLaw(
-            self.direction,
-            self.law,
-            self.multiplier,
-            self.length_multiplier,
-            slip,
-            contradictions=self._placed.contradictions if self._placed else None,
-        )
+        return BoundaryLaw(self.direction, self.law, self.multiplier, self.length_multiplier, slip)
 
     @override
     def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:

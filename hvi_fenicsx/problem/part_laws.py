@@ -136,7 +136,6 @@ def _term(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
             "ring that bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
-    _check_formulas(context, where, key, law)
     density = _density(context)
     return LawTerm(
         surface=where,
@@ -153,18 +152,6 @@ def _term(
         mixity=law.mixity,
         energies=np.ones(len(where.weights)),
     )
-
-
-def _check_formulas(context: DomainForms, where: Surface, key: str, law: BoundaryLaw) -> None:
-    """Refuse formulas in the place of a law's numbers that are not one law at the vertices of its part. Collective.
-
-    Raises:
-        InputError: on all ranks alike.
-    """
-    if law.contradictions is None:
-        return
-    for text in (text for rank in agree(context.domain.mesh.comm, law.contradictions(where.points)) for text in rank):
-        raise InputError(f"boundary.{where.part}.{key}: {text}")
 
 
 def _factor(

@@ -99,10 +99,6 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
         ),
         (lambda: hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: give a point and a normal"),  # type: ignore[arg-type]
         (lambda: hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
-        (lambda: hvi.On("bottom", 3), "^On: 3 is no effect"),  # type: ignore[arg-type]
-        (lambda: hvi.In(3), "^In: 3 is no effect"),  # type: ignore[arg-type]
-        (lambda: hvi.On("bottom", Weight()), r"^On: weight of a test acts in a body: write hvi.In\("),
-        (lambda: hvi.In(Pull()), r"^In: pull of a test acts on a side: write hvi.On\("),
         (lambda: hvi.Cohesion("bottom", hvi.laws.Tresca(1.0), mixity="power_law"), "mixity: give a crit"),  # type: ignore[arg-type]
         (
             lambda: hvi.Traction("right", np.array(3.0)),
@@ -208,7 +204,7 @@ def test_an_effect_of_the_users_own_acts_in_the_volume(square: hvi.Body) -> None
     held = hvi.Displacement("bottom", [0.0, 0.0])
     known = hvi.BodyForce([0.0, -7850.0 * 9.81])
     energies = [
-        hvi.solve(hvi.Model(square, [STEEL, held, load]), estimate=False).energy for load in (known, hvi.In(Weight()))
+        hvi.solve(hvi.Model(square, [STEEL, held, load]), estimate=False).energy for load in (known, Weight().at(None))
     ]
     assert energies[1] == pytest.approx(energies[0], rel=1e-10)
     assert energies[0] < 0.0
