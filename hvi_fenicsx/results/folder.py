@@ -10,27 +10,25 @@ from typing import Any, NamedTuple, Self
 
 from mpi4py import MPI
 
-from ..errors import InputError, NotWrittenError
+from ..errors import NotWrittenError
 from ..model import Model, dump_scene
 from ..runtime import manifest
-from ..runtime.manifest import MARKS
+from ..runtime.manifest import MARKS, Kind
 from ..runtime.mpi import on_root
 from .output_folder import Existing, OutputFolder, placed
 
-_XML, _PNG = b"</VTKFile>", b"IEND\xaeB`\x82"
-_ENDS = {".pvd": _XML, ".vtu": _XML, ".pvtu": _XML, ".png": _PNG, ".html": b"</html>"}
-_LONGEST_END = 64
 _READ = ("scene.toml", MARKS["result"])
 
 
 class ResultFolder:
-    """A folder for one result. As a context it is discarded where an exception leaves it.
+    """A folder for one result, or a study. As a context it is discarded where an exception leaves it.
 
     Args:
         comm: the ranks that write.
         target: where the result goes.
         existing: what to do with a result that is there already.
         inputs: files that must not be replaced.
+        kind: what goes into it.
 
     Attributes:
         target: where the result goes, without symbolic links; the same on all ranks, as all attributes.
@@ -43,12 +41,23 @@ class ResultFolder:
     """
 
     def __init__(
-        self, comm: MPI.Comm, target: Path, existing: Existing = "refuse", inputs: Iterable[Path] = ()
+        self,
+        comm: MPI.Comm,
+        target: Path,
+        existing: Existing = "refuse",
+        inputs: Iterable[Path] = (),
+        kind: Kind = "result",
     ) -> None:
         self.comm = comm
         self.kept: tuple[str, ...] = ()
         self._folder: OutputFolder | None = None
-        self.target, self.work = on_root(comm, lambda: self._open(target, existing, inputs))
+
+        def opened() -> tuple[Path, Path]:
+            self._folder = OutputFolder(target, kind)
+            self._folder.check(existing, inputs)
+            return self._folder.target, self._folder.stage()
+
+        self.target, self.work = on_root(comm, opened)
 
     def __enter__(self) -> Self:
         return self
@@ -62,15 +71,14 @@ class ResultFolder:
         if kind is not None:
             self.discard()
         if isinstance(error, NotWrittenError):
-            raise self._in_words(error) from None
+            words = placed(error, self.target, self.work) if self._folder is None else self._folder.in_words(error)
+            raise words from None
 
-    def _in_words(self, error: NotWrittenError) -> NotWrittenError:
-        return placed(error, self.target, self.work) if self._folder is None else self._folder.in_words(error)
-
-    def _open(self, target: Path, existing: Existing, inputs: Iterable[Path]) -> tuple[Path, Path]:
-        self._folder = OutputFolder(target, "result")
-        self._folder.check(existing, inputs)
-        return self._folder.target, self._folder.stage()
+    @property
+    def _own(self) -> OutputFolder:
+        """The folder itself. Rank 0 only."""
+        assert self._folder is not None
+        return self._folder
 
     def announce(self, name: str) -> Path:
         """A file in the target itself that grows while the result is made. Rank 0 only.
@@ -81,36 +89,26 @@ class ResultFolder:
         Raises:
             InputError: it cannot be listed.
         """
-        assert self._folder is not None
-        return self._folder.announce(name)
+        return self._own.announce(name)
 
-    def commit(self, scene: Model) -> None:
+    def commit(self, scene: Model, keep: Iterable[str] = ()) -> None:
         """Make the written files the result, all at once. Collective.
 
         Args:
             scene: what was solved.
+            keep: the announced files that stay.
 
         Raises:
-            InputError: the files are not whole or cannot be moved, on all ranks alike.
+            InputError: the files cannot be moved, on all ranks alike.
         """
+
+        def move() -> tuple[str, ...]:
+            kept = self._own.move_in(inputs_of(scene, self.target), dict.fromkeys(keep))
+            self._own.close()
+            return kept
+
         self.comm.barrier()
-        self.kept = on_root(self.comm, lambda: self._commit(scene))
-
-    def _commit(self, scene: Model) -> tuple[str, ...]:
-        assert self._folder is not None
-        with self._folder.told():
-            self._refuse_torn()
-        kept = self._folder.move_in(inputs_of(scene, self.target))
-        self._folder.close()
-        return kept
-
-    def _refuse_torn(self) -> None:
-        """VTK's writers do not say that a disk was full."""
-        for file in sorted(self.work.iterdir()):
-            if file.name.startswith(".") and file.is_file():  # of a picture that was not drawn in time
-                file.unlink()
-            elif not _is_whole(file):
-                raise InputError(f"--out {self.target}: {file.name} could not be written whole; is the disk full?")
+        self.kept = on_root(self.comm, move)
 
     def discard(self) -> None:
         """Remove what was written, with the folders around it that were made for it. Rank 0 acts; not collective."""
@@ -127,16 +125,6 @@ def inputs_of(scene: Model, folder: Path) -> dict[str, str]:
     """
     files = [*scene.files(), *map(Path, scene.plugins or ())]
     return {os.path.relpath(file, folder): manifest.digest(file) or "" for file in files}
-
-
-def _is_whole(file: Path) -> bool:
-    """Whether a file ends as files of its kind do."""
-    end = _ENDS.get(file.suffix)
-    if end is None:
-        return True
-    with file.open("rb") as stream:
-        stream.seek(max(0, file.stat().st_size - _LONGEST_END))
-        return stream.read().rstrip().endswith(end)
 
 
 class Finished(NamedTuple):

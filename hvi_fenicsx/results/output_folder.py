@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import glob
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
@@ -183,20 +182,6 @@ class OutputFolder:
             ) from None
         return kept
 
-    def clear(self) -> None:
-        """Remove all that the program wrote into the folder, with what killed processes left half-written.
-
-        Raises:
-            InputError: a file cannot be removed.
-        """
-        found = manifest.read(self.target)
-        with self.told():
-            for file in [self.target / name for name in sorted(found.owned if found else ())]:
-                for half in file.parent.glob(f".{glob.escape(file.name)}.*"):
-                    half.unlink()
-                if not is_folder(file):
-                    file.unlink(missing_ok=True)
-
     def close(self) -> None:
         """Let the folder go, and remove what was not moved in, with the empty folders around it that were made."""
         if self.work is not None and not self._left:
@@ -237,8 +222,7 @@ class OutputFolder:
             error: of a file that could not be written.
         """
         found = placed(error, self.target, self.work)
-        kept = [manifest.NAME] if self.kind == "study" else self._announced
-        if found is error or not any((self.target / name).exists() for name in kept):
+        if found is error or not any((self.target / name).exists() for name in self._announced):
             return found
         words = f"{found}; what is finished is kept, --resume goes on from there"
         return NotWrittenError(found.file, found.reason, words)

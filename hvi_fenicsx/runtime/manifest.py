@@ -89,8 +89,8 @@ def write(folder: Path, manifest: Manifest) -> None:
 
 
 def listed(folder: Path) -> dict[str, str | None]:
-    """All files of a folder with their SHA-256, as a manifest lists them."""
-    names = (path.name for path in sorted(folder.iterdir()) if path.name != NAME)
+    """The files of a folder with their SHA-256, as a manifest lists them; not what was left half-written."""
+    names = (path.name for path in sorted(folder.iterdir()) if path.name != NAME and not path.name.startswith("."))
     return {name: digest(folder / name) for name in names}
 
 

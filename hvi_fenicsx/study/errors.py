@@ -19,7 +19,7 @@ from ..report.solution_arrays import SolutionArrays
 from ..runtime.mpi import joined
 from ..typing import Array, Mask
 from ..workflow import Solution
-from .transfer import BodyTransfer, Targets, edge_ends, rows_of, surface
+from .transfer import BodyTransfer, edge_ends, rows_of, surface
 
 NORMS: Mapping[str, tuple[str, str]] = {
     "energy_norm": ("displacement, energy norm", "the energy norm"),
@@ -79,12 +79,12 @@ class ReferenceSolution:
     """
 
     def __init__(self, arrays: SolutionArrays, stiffness: sparse.csr_array, joints: Collection[str] = ()) -> None:
-        self._arrays, self._stiffness, self._targets = arrays, stiffness, Targets(arrays, joints)
+        self._arrays, self._stiffness, self._joints = arrays, stiffness, joints
         self._ends, self._transfers = edge_ends(arrays), dict[bytes, _Transfer]()
         self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[arrays.points.shape[1]]
-        parts = arrays.parts.values()
+        parts, d = arrays.parts.values(), arrays.points.shape[1]
         self._weights = np.concatenate([np.empty(0), *(part.weight for part in parts)])
-        self._normals = np.vstack([np.empty((0, arrays.points.shape[1])), *(part.normal for part in parts)])
+        self._normals = np.vstack([np.empty((0, d)), *(part.normal for part in parts)])
         self._bounded = any("contact" in part.columns for part in parts)
         self._from_jump = np.concatenate([np.empty(0), *(_from_jump(arrays, part) for part in parts)])
         self.own = self.transfer(arrays)
@@ -95,22 +95,23 @@ class ReferenceSolution:
         if key not in self._transfers:
             points = {name: self._arrays.points[part.vertices] for name, part in self._arrays.parts.items()}
             along = {name: surface(found, found.parts[name], x) for name, x in points.items()}
-            self._transfers = {key: (BodyTransfer(found, self._targets), along)}
+            self._transfers = {key: (BodyTransfer(found, self._arrays), along)}
         in_bodies, on_parts = self._transfers[key]
         assert found.displacement is not None
         u = in_bodies(found.displacement)
         rows = [np.empty((0, 2 * u.shape[1] + 3))]
         for name, way in on_parts.items():
-            width = np.full((way.shape[0], 1), _width(found, found.parts[name]))
-            rows.append(np.hstack([self._slip(name, u), way @ _tractions(found.parts[name]), width]))
+            part, width = found.parts[name], np.full((way.shape[0], 1), _width(found, found.parts[name]))
+            slip = way @ part.vectors("slip") if name in self._joints else self._slip(name, u)
+            rows.append(np.hstack([slip, way @ _tractions(part), width]))
         slip, friction, others = np.split(np.vstack(rows), [u.shape[1], 2 * u.shape[1]], axis=1)
         pressure, contact, widths = others.T
-        return Fields(u[: len(self._arrays.points)], slip, friction, pressure, contact > 0.5, widths)
+        return Fields(u, slip, friction, pressure, contact > 0.5, widths)
 
     def _slip(self, name: str, u: Array) -> Array:
-        """The tangential part of a displacement on a part, at a joint relative to the other body, (m, d)."""
-        part, other = self._arrays.parts[name], self._targets.others.get(name)
-        found = u[part.vertices] - (0.0 if other is None else u[other])
+        """The tangential part of a displacement on a part, (m, d)."""
+        part = self._arrays.parts[name]
+        found = u[part.vertices]
         return np.asarray(found - np.sum(found * part.normal, axis=1)[:, None] * part.normal)
 
     def energy(self, u: Array) -> float:
@@ -137,12 +138,12 @@ class ReferenceSolution:
         true, other, weights = self.own, other or self.own, self._weights
         away = ~self.near_jump(found)
         friction, normal = found.friction - other.friction, found.pressure - other.pressure
-        lengths = [(_lengths(found.slip - other.slip), _lengths(true.slip))]
-        lengths += [(_lengths(friction), _lengths(true.friction)), (np.abs(normal), np.abs(true.pressure))]
-        slips, frictions, pressures = ([_norms(values, weights) for values in pair] for pair in lengths)
-        forces = weights @ friction, weights @ (normal[:, None] * self._normals)
+        slips = _norms(found.slip - other.slip, weights), _norms(true.slip, weights)
+        frictions = _norms(friction, weights), _norms(true.friction, weights)
+        pressures = _norms(normal[:, None], weights), _norms(true.pressure[:, None], weights)
+        largest = _norms(friction[away], weights[away])[2] if away.any() else None
         wrong, closed = weights[found.closed != other.closed].sum(), weights[true.closed].sum()
-        largest = float(lengths[1][0][away].max()) if away.any() else None
+        forces = [np.linalg.norm(weights @ force) for force in (normal[:, None] * self._normals, friction)]
         return {
             "energy_norm": _ratio(self.energy(found.u - other.u), self.energy(true.u)),
             "u_t_l2": _ratio(slips[0][1], slips[1][1]),
@@ -153,8 +154,8 @@ class ReferenceSolution:
             "pressure_l1": _ratio(pressures[0][0], pressures[1][0]),
             "pressure_l2": _ratio(pressures[0][1], pressures[1][1]),
             "contact_set": _ratio(wrong, closed) if self._bounded else None,
-            "resultant": _ratio(float(np.linalg.norm(forces[1])), pressures[1][0]),
-            "friction_force": _ratio(float(np.linalg.norm(forces[0])), frictions[1][0]),
+            "resultant": _ratio(float(forces[0]), pressures[1][0]),
+            "friction_force": _ratio(float(forces[1]), frictions[1][0]),
         }
 
 
@@ -186,12 +187,9 @@ def _from_jump(arrays: SolutionArrays, part: ContactPart) -> Array:
     return np.asarray(spatial.KDTree(part.x[facets[passed]].mean(axis=1)).query(part.x)[0])
 
 
-def _lengths(vectors: Array) -> Array:
-    return np.asarray(np.linalg.norm(vectors, axis=1))
-
-
-def _norms(lengths: Array, weights: Array) -> tuple[float, float, float]:
-    """L1, L2 and the largest."""
+def _norms(vectors: Array, weights: Array) -> tuple[float, float, float]:
+    """L1, L2 and the largest length of vectors (m, d)."""
+    lengths = np.linalg.norm(vectors, axis=1)
     return float(weights @ lengths), math.sqrt(float(weights @ lengths**2)), float(np.max(lengths, initial=0.0))
 
 

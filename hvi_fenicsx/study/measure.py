@@ -1,51 +1,46 @@
-"""The points of a study, solved one after the other by the ranks that ask for it, and kept in files.
+"""The points of a study, solved one after the other and measured against the reference; what is found is kept.
 
-A point's name is a digest of its scene, the mesh file's content, the number of ranks and the program's version; so a
-study that is resumed, or widened by further axes, finds what it has.
+A point's name is a digest of its scene and the mesh file's content. The journal of a folder has a record for each
+finished point, so a study that is resumed, or widened by further axes, finds what it has; the reference itself is
+solved again where a point is missing.
 """
 
 from __future__ import annotations
 
 import gc
 import hashlib
-import json
 import statistics
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
-from scipy import sparse
 
 from ..accuracy.adaptive import AdaptiveSolver
 from ..accuracy.control import solve_to_goal
 from ..accuracy.goal import Goal
-from ..errors import ExitCode, HviError, NotWrittenError
+from ..errors import ExitCode, HviError
 from ..model import dump_scene
-from ..report import solution_arrays as archive
-from ..report.errors import ResultError
-from ..report.solution_arrays import SolutionArrays
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
-from ..runtime import log, manifest, writing
-from ..runtime.manifest import Manifest
+from ..runtime import log
+from ..runtime.journal import Journal, Record
 from ..runtime.mpi import largest, on_root, time_over
 from ..runtime.timing import Timer
 from ..runtime.versions import __version__
 from ..solvers.context import never
 from ..workflow import Solution, find_solution, prepare
-from .errors import stiffness
+from .errors import Fields, ReferenceSolution, stiffness
 from .plan import Plan, Point
 from .transfer import mesh_width
 
 PHASES = ("mesh", "assembly", "setup", "solve", "certificate")
 """What a point costs: compilation is paid once for all, and a study writes no results."""
-PATIENCE = 15.0
+PATIENCE = 15
 """Seconds after which no further repetition of a point begins."""
-RECORDED = ("dofs", "converged", "reason", "exit_code", "energy", "epsilon", "iterations")
+_RECORDED = ("dofs", "converged", "reason", "exit_code", "energy", "epsilon", "iterations")
 """What is kept of a point's summary."""
-_POINTS, _ENDINGS = "points", (".json", ".npz", ".stiffness.npz")
 _LOG = log.logger("study")
 
 
@@ -63,123 +58,60 @@ class StudyInterruptedError(HviError):
     exit_code = ExitCode.INTERRUPTED
 
 
-@dataclass(frozen=True)
-class Store:
-    """The points in the folder of a study; rank 0 alone uses it.
+def name_of(point: Point) -> str:
+    """The name of a point."""
+    digest = hashlib.sha256(f"{point.accuracy}\n{dump_scene(point.scene)}".encode())
+    for file in point.scene.files():
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@dataclass(kw_only=True)
+class Records:
+    """What finished points cost and found, by their names; on rank 0 alone.
 
     Attributes:
-        folder: the folder.
-        ranks: that solve its points.
+        known: the records.
+        journal: in which they are kept; None: nowhere.
     """
 
-    folder: Path
-    ranks: int
+    known: dict[str, Record] = field(default_factory=dict)
+    journal: Journal | None = None
 
-    def open(self) -> None:
-        """Make the folder ready for points.
+    @classmethod
+    def of(cls, file: Path, plan: Plan, ranks: int) -> Records:
+        """Those of a journal, if they were measured against the reference of a plan."""
+        journal = Journal(file, f"{__version__} {ranks} {name_of(plan.reference[0])}")
+        return cls(known={record["point"]: record for record in journal.records}, journal=journal)
 
-        Raises:
-            OSError: it cannot be written.
-        """
-        self.folder.mkdir(parents=True, exist_ok=True)
-        if manifest.read(self.folder) is None:  # first of all: without it the folder would be one of others
-            manifest.write(self.folder, Manifest(kind="study", files={}))
-        (self.folder / _POINTS).mkdir(exist_ok=True)
+    def add(self, record: Record) -> None:
+        """Keep a record."""
+        self.known[record["point"]] = record
+        if self.journal is not None:
+            self.journal.append(record)
 
-    def name(self, point: Point) -> str:
-        """The name of a point."""
-        text = f"{__version__} {self.ranks} {point.accuracy}\n{dump_scene(point.scene)}"
-        digest = hashlib.sha256(text.encode())
-        for file in point.scene.files():
-            digest.update(file.read_bytes())
-        return digest.hexdigest()[:16]
-
-    def file(self, point: Point, ending: str) -> Path:
-        """A file of a point.
-
-        Args:
-            point: the point.
-            ending: ``.json`` of its record, ``.npz`` of its solution, ``.stiffness.npz`` of a reference's stiffness.
-        """
-        return self.folder / _POINTS / f"{self.name(point)}{ending}"
-
-    def record(self, point: Point) -> dict[str, Any] | None:
-        """What a finished point cost and found; None where it is not finished, or its record is damaged."""
-        try:
-            found = json.loads(self.file(point, ".json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
-        return found if isinstance(found, dict) and found.keys() >= {*RECORDED, "seconds", "phases"} else None
-
-    def solution(self, point: Point) -> SolutionArrays | None:
-        """The solution of a certified point; None for another.
-
-        Raises:
-            ResultError: it is missing or damaged.
-        """
-        return archive.load(self.file(point, ".npz")) if (self.record(point) or {}).get("converged") else None
-
-    def stiffness(self, reference: Point) -> sparse.csr_array:
-        """The stiffness of a reference.
-
-        Raises:
-            ResultError: it is missing or damaged.
-        """
-        file = self.file(reference, ".stiffness.npz")
-        try:
-            return sparse.csr_array(sparse.load_npz(file))
-        except Exception as error:  # whatever a damaged archive makes numpy raise
-            raise ResultError(f"{file}: damaged ({error})") from None
-
-    def finished(self, point: Point, limit: float | None, *, is_reference: bool) -> bool:
-        """Whether a point is there, whole and with all that is wanted, or was given up after no less time.
-
-        Args:
-            point: the point.
-            limit: seconds after which it would be given up; None: never.
-            is_reference: whether its stiffness is wanted.
-        """
-        record = self.record(point)
-        if record is None or (record.get("limit") is not None and (limit is None or record["limit"] < limit)):
+    def has(self, point: Point, limit: float | None) -> bool:
+        """Whether a point is finished, or was given up after no less time than now."""
+        record = self.known.get(name_of(point))
+        if record is None:
             return False
-        try:
-            self.solution(point)
-            if is_reference and record["converged"]:
-                self.stiffness(point)
-        except ResultError:
-            return False
-        return True
-
-    def announce(self, point: Point) -> None:
-        """List a point's files as the program's own, before they are there.
-
-        Raises:
-            NotWrittenError: the list cannot be written.
-        """
-        names = [f"{_POINTS}/{self.name(point)}{ending}" for ending in _ENDINGS]
-        manifest.add(self.folder, names, changing=True)
-        self.file(point, ".json").unlink(missing_ok=True)
-
-    def listed(self) -> dict[str, str | None]:
-        """The files of all points, as a manifest lists them."""
-        found = manifest.read(self.folder)
-        files = found.files if found else {}
-        return {name: known for name, known in files.items() if name.startswith(f"{_POINTS}/")}
+        given_up = record.get("limit")
+        return given_up is None or (limit is not None and given_up >= limit)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class Measurement:
     """How the points of a study are solved.
 
     Attributes:
-        store: where they go.
+        records: what is known, and is added; of rank 0.
         comm: the ranks that solve them.
         repeats: solves of each at most, for the median of its time.
         limit: seconds after which a point is given up; never the reference.
         interrupted: whether to stop; collective.
     """
 
-    store: Store
+    records: Records
     comm: MPI.Comm
     repeats: int
     limit: float | None = None
@@ -191,58 +123,95 @@ class Measurement:
         Raises:
             NoReferenceError: no solution exists (3), or the reference is not certified (4); on all ranks alike.
             StudyInterruptedError: it was asked to stop; on all ranks alike.
-            NotWrittenError: files cannot be written; on all ranks alike.
+            NotWrittenError: a record cannot be written; on all ranks alike.
         """
-        on_root(self.comm, self.store.open)
         finest, *coarser = plan.reference
-        self._one(finest, "reference", is_reference=True)
-        _check(finest, on_root(self.comm, lambda: self.store.record(finest) or {}))
-        points = [*coarser, *plan.points]
-        for number, point in enumerate(points):
-            self._one(point, f"{number} of {len(points)} points are finished")
-
-    def _one(self, point: Point, progress: str, *, is_reference: bool = False) -> None:
-        """Measure a point, unless it is finished; one that fails is a result too. Collective."""
-        limit, store = None if is_reference else self.limit, self.store
-        if on_root(self.comm, lambda: store.finished(point, limit, is_reference=is_reference)):
+        points, has = [*coarser, *plan.points], self.records.has
+        missing = on_root(self.comm, lambda: [n for n, point in enumerate(points) if not has(point, self.limit)])
+        if not missing and on_root(self.comm, lambda: has(finest, None)):
             return
-        _LOG.info("%s: %s", progress, point, extra={"moving": True})
-        on_root(self.comm, lambda: store.announce(point))
-        over = time_over(self.comm, limit)
-        try:
-            record = self._measured(point, over, is_reference=is_reference)
-        except NotWrittenError:
-            raise
-        except HviError as error:
-            record = _failed(str(error), error.exit_code)
-        if self.interrupted():
-            words = f"interrupted; what is finished is kept in {store.folder}; --resume goes on from there"
-            raise StudyInterruptedError(words)
-        if not record["converged"] and over():
-            reason = f"not finished after {limit:g} s; --limit SECONDS --resume gives it longer"
-            record = _failed(reason, ExitCode.NOT_CONVERGED) | {"limit": limit}
-        on_root(self.comm, lambda: write_json(store.file(point, ".json"), record))
+        self._reference: ReferenceSolution | None = None
+        self._exact: tuple[Point | None, Fields | None] = (None, None)
+        self._begin(finest)
+        for number in missing:
+            _LOG.info("%s of %s points: %s", number + 1, len(points), points[number], extra={"moving": True})
+            self._one(plan, points[number])
 
-    def _measured(self, point: Point, over: Callable[[], bool], *, is_reference: bool) -> dict[str, Any]:
-        """Solve it once to fill caches, and again for the median of its time; its record. Collective."""
-        first = self._solved(point, Timer(), over)
-        whole = summary(first)
-        record = {key: whole[key] for key in RECORDED} | {"h": None}
-        if first.converged:
-            record["h"] = self._keep(point, first, is_reference=is_reference)
+    def _begin(self, finest: Point) -> None:
+        """Solve the reference. Collective."""
+        _LOG.info("reference: %s", finest, extra={"moving": True})
+        record, solution = self._measured(finest, None)
+        if solution is None:
+            text = (
+                f"the reference ({finest.mesh}, exact law) has no certified solution: {record['reason']}; "
+                "see `hvi run`, or choose coarser meshes with --axis mesh=..."
+            )
+            raise NoReferenceError(text, record["exit_code"] or ExitCode.NOT_CONVERGED)
+        arrays, matrix = solution_arrays(solution), stiffness(solution)
+        if arrays is not None and matrix is not None:
+            self._reference = ReferenceSolution(arrays, matrix, finest.scene.body.interfaces)
+        on_root(self.comm, lambda: self.records.add(record))
+
+    def _one(self, plan: Plan, point: Point) -> None:
+        """Measure a point; one that fails is a result too. Collective."""
+        record, solution = self._measured(point, self.limit)
+        found, exact = self._fields(solution), plan.exact_like(point)
+        if point == exact:
+            self._exact = point, found
+        smoothed = point.scene.solver.smoothing and point.accuracy is None and solution is not None
+        if smoothed and self._exact[0] != exact:
+            self._exact = exact, self._fields(self._measured(exact, None, repeats=0)[1])
+        on_root(self.comm, lambda: self.records.add({**record, **self._errors(found, smoothed=bool(smoothed))}))
+
+    def _errors(self, found: Fields | None, *, smoothed: bool) -> Record:
+        """What is measured of a point's fields, which a failed one has not. Rank 0 only."""
+        reference, exact = self._reference, self._exact[1]
+        if found is None or reference is None:
+            return {}
+        part = reference.errors(found, exact) if smoothed and exact is not None else None
+        return {"errors": reference.errors(found), "epsilon_part": part, "left_out": reference.left_out(found)}
+
+    def _fields(self, solution: Solution | None) -> Fields | None:
+        """A certified solution on the reference's nodes, on rank 0; None for another. Collective."""
+        arrays, reference = None if solution is None else solution_arrays(solution), self._reference
+        return None if arrays is None or reference is None else reference.transfer(arrays)
+
+    def _measured(
+        self, point: Point, limit: float | None, repeats: int | None = None
+    ) -> tuple[Record, Solution | None]:
+        """A point's record and, if it is certified, its solution. Collective."""
+        over, name = time_over(self.comm, limit), {"point": name_of(point)}
+        try:
+            record, solution = self._timed(point, over, self.repeats if repeats is None else repeats)
+        except HviError as error:
+            record, solution = _failed(str(error), error.exit_code), None
+        if self.interrupted():
+            raise StudyInterruptedError("interrupted; what is finished is kept, --resume goes on from there")
+        if solution is None and over():
+            reason = f"not finished after {limit:g} s; --limit SECONDS --resume gives it longer"
+            return {**name, **_failed(reason, ExitCode.NOT_CONVERGED), "limit": limit}, None
+        return {**name, **record}, solution
+
+    def _timed(self, point: Point, over: Callable[[], bool], repeats: int) -> tuple[Record, Solution | None]:
+        """Solve it once to fill caches, and again for the median of its time. Collective."""
+        solution = self._solved(point, Timer(), over)
+        whole = summary(solution)
+        record: dict[str, Any] = {key: whole[key] for key in _RECORDED}
         times = [whole["time"]]
-        del first
-        while not is_reference and record["converged"] and self._again(times):
+        while record["converged"] and self._again(times, repeats):
             gc.collect()
             timer = Timer()
             self._solved(point, timer, never)
             times.append({phase: largest(self.comm, seconds) for phase, seconds in timer.report().items()})
-        return record | _cost(times[1:] or times)
+        record |= _cost(times[1:] or times)
+        if not record["converged"]:
+            return record, None
+        arrays = solution_arrays(solution)
+        return record | {"h": None if arrays is None else mesh_width(arrays)}, solution
 
-    def _again(self, times: Sequence[Mapping[str, float]]) -> bool:
+    def _again(self, times: Sequence[Mapping[str, float]], repeats: int) -> bool:
         """Whether one more run is wanted; rank 0 decides. Collective."""
-        spent = sum(map(seconds_of, times[1:] or times))
-        wanted = len(times) <= self.repeats and spent < PATIENCE and not self.interrupted()
+        wanted = len(times) <= repeats and sum(map(_seconds, times[1:] or times)) < PATIENCE and not self.interrupted()
         return bool(self.comm.bcast(wanted, root=0))
 
     def _solved(self, point: Point, timer: Timer, over: Callable[[], bool]) -> Solution:
@@ -260,40 +229,14 @@ class Measurement:
         timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the refinement: part of what it costs
         return reached.solution
 
-    def _keep(self, point: Point, solution: Solution, *, is_reference: bool) -> float | None:
-        """Write the solution and, of a reference, its stiffness; the mesh width. Collective."""
-        found = solution_arrays(solution)
-        matrix = stiffness(solution) if is_reference else None
-
-        def write() -> float:
-            assert found is not None
-            archive.save(self.store.file(point, ".npz"), found)
-            if matrix is not None:
-                path = self.store.file(point, ".stiffness.npz")
-                with writing.whole(path) as aside, aside.open("wb") as file:
-                    sparse.save_npz(file, matrix, compressed=False)
-            return mesh_width(found)
-
-        return on_root(self.comm, write)
-
-
-def _check(reference: Point, record: Mapping[str, Any]) -> None:
-    """Refuse a reference that is not certified."""
-    if not record.get("converged"):
-        text = (
-            f"the reference ({reference.mesh}, exact law) has no certified solution: {record.get('reason')}; "
-            "see `hvi run`, or choose coarser meshes with --axis mesh=..."
-        )
-        raise NoReferenceError(text, record.get("exit_code") or ExitCode.NOT_CONVERGED)
-
 
 def _failed(reason: str, code: int) -> dict[str, Any]:
     """The record of a point that has no certified solution."""
-    empty = dict.fromkeys((*RECORDED, "h", "seconds", "runs", "phases"))
+    empty = dict.fromkeys((*_RECORDED, "seconds", "runs", "phases"))
     return empty | {"converged": False, "reason": reason, "exit_code": code}
 
 
-def seconds_of(times: Mapping[str, float]) -> float:
+def _seconds(times: Mapping[str, float]) -> float:
     """The cost of one run by its times by phase, s."""
     return sum(times[phase] for phase in PHASES)
 
@@ -301,17 +244,4 @@ def seconds_of(times: Mapping[str, float]) -> float:
 def _cost(times: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     """The median cost and the median of each phase, s, and the number of runs."""
     phases = {phase: statistics.median(t[phase] for t in times) for phase in PHASES}
-    return {"seconds": statistics.median(map(seconds_of, times)), "runs": len(times), "phases": phases}
-
-
-def write_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write JSON, whole or not at all.
-
-    Args:
-        path: the file.
-        data: what it says.
-
-    Raises:
-        NotWrittenError: it cannot be written.
-    """
-    writing.text(path, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    return {"seconds": statistics.median(map(_seconds, times)), "runs": len(times), "phases": phases}

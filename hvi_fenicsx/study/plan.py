@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -91,7 +91,7 @@ class Plan:
     Attributes:
         own: the scene as it is.
         exact: the scene with the law itself; the same where nothing is smoothed.
-        points: all that is measured, cheapest mesh first; ``own`` and ``exact`` are among them.
+        points: all that is measured, cheapest mesh first, on each the exact law; ``own`` and ``exact`` are among them.
         reference: what is measured against and the next coarser levels, finest first.
         left_out: combinations that are no scene, in words.
     """
@@ -121,22 +121,7 @@ def read_axis(text: str) -> tuple[str, tuple[str, ...]]:
         raise InputError(f"--axis {text}: {unknown('axis', name, axes)}")
     if not values:
         raise InputError(f"--axis {text}: needs values, like --axis epsilon=1,0.1,0.01,exact")
-    for value in values:
-        _check(name, value)
     return name, values
-
-
-def _check(name: str, value: str) -> None:
-    """Refuse a value that an axis does not have."""
-    try:
-        if name == "accuracy":
-            SolverTable.model_validate({"tolerance": _value(value)})  # a tolerance is what is between 0 and 1
-        elif name != "mesh" and not (name in _WIDTHS and value == EXACT):
-            width = {"epsilon": 1.0} if name == "smoothing" else {}
-            options_of(SolverTable.model_validate({**width, name: _value(value)}))
-    except (ValidationError, InputError) as error:
-        mistake = str(input_error(error, SolverTable) if isinstance(error, ValidationError) else error)
-        raise InputError(f"--axis {name}={value}: {mistake.partition(': ')[2] or mistake}") from None
 
 
 def _value(text: str) -> Any:
@@ -147,48 +132,43 @@ def _value(text: str) -> Any:
         return text
 
 
-@dataclass
-class _Planner:
-    """Makes the points of a study of a scene."""
+def _combinations(scene: Model, axes: Values, left_out: list[str]) -> Iterator[Point]:
+    """The points of all combinations of values; those that are no scenes are noted."""
+    for values in itertools.product(*axes.values()):
+        pairs = dict(zip(axes, values, strict=True))
+        on_mesh = _on_mesh(scene, pairs.pop("mesh", scene.domain))
+        accuracy = pairs.pop("accuracy", None)
+        if accuracy is not None and not _can_be_refined(on_mesh):
+            raise InputError("--axis accuracy: this mesh cannot be refined; leave the axis out")
+        try:  # an accuracy is between 0 and 1, as a tolerance is
+            least = None if accuracy is None else _solved(scene, {"tolerance": accuracy}).solver.tolerance
+            yield Point(_solved(on_mesh, pairs), least)
+        except InputError as error:
+            left_out.append(f"{', '.join(f'{name} {value}' for name, value in pairs.items())}: {error}")
 
-    scene: Model
-    left_out: list[str] = field(default_factory=list)
 
-    def combinations(self, axes: Values) -> Iterator[Point]:
-        """The points of all combinations of values; those that are no scenes are noted."""
-        for values in itertools.product(*axes.values()):
-            pairs = dict(zip(axes, values, strict=True))
-            scene = self._on_mesh(pairs.pop("mesh", self.scene.domain))
-            accuracy = pairs.pop("accuracy", None)
-            if accuracy is not None and not _can_be_refined(scene):
-                raise InputError("--axis accuracy: this mesh cannot be refined; leave the axis out")
-            try:
-                yield Point(_solved(scene, pairs), None if accuracy is None else float(accuracy))
-            except InputError as error:
-                self.left_out.append(f"{', '.join(f'{name} {value}' for name, value in pairs.items())}: {error}")
+def _on_mesh(scene: Model, mesh: str | DomainShape) -> Model:
+    try:
+        return scene.changed(domain=scene.domain.with_mesh(mesh) if isinstance(mesh, str) else mesh)
+    except (ValidationError, InputError) as error:
+        mistake = input_error(error, type(scene.domain)) if isinstance(error, ValidationError) else error
+        raise InputError(f"--axis mesh: {mistake}") from None
 
-    def _on_mesh(self, mesh: str | DomainShape) -> Model:
-        try:
-            shape = self.scene.domain.with_mesh(mesh) if isinstance(mesh, str) else mesh
-            return self.scene.changed(domain=shape)
-        except (ValidationError, InputError) as error:
-            mistake = input_error(error, type(self.scene.domain)) if isinstance(error, ValidationError) else error
-            raise InputError(f"--axis mesh: {mistake}") from None
 
-    def default(self) -> Iterator[Values]:
-        """Meshes by widths; on the scene's own mesh smoothings, methods, tolerances; both degrees; adaptive meshes."""
-        exact, meshes = {"epsilon": (EXACT,)}, {"mesh": _default_meshes(self.scene)}
-        widths = {"epsilon": (EXACT, "0.1", "0.01")} if self.scene.laws() else exact
-        yield {**meshes, **widths}
-        if self.scene.laws():
-            yield {"epsilon": ("1", "0.001")}
-            yield {**widths, "smoothing": smoothing.available()}
-        yield {"method": registry.available()}
-        yield {**exact, "tolerance": ("1e-4", "1e-10")}
-        yield {**exact, "linear_solver": ("lu", "gamg")}
-        yield {**meshes, **exact, "degree": ("2",)}
-        if _can_be_refined(self.scene):
-            yield {"accuracy": ("0.1", "0.03"), "degree": ("1", "2")}
+def _default(scene: Model) -> Iterator[Values]:
+    """Meshes by widths; on the scene's own mesh smoothings, methods, tolerances; both degrees; adaptive meshes."""
+    exact, meshes = {"epsilon": (EXACT,)}, {"mesh": _default_meshes(scene)}
+    widths = {"epsilon": (EXACT, "0.1", "0.01")} if scene.laws() else exact
+    yield {**meshes, **widths}
+    if scene.laws():
+        yield {"epsilon": ("1", "0.001")}
+        yield {**widths, "smoothing": smoothing.available()}
+    yield {"method": registry.available()}
+    yield {**exact, "tolerance": ("1e-4", "1e-10")}
+    yield {**exact, "linear_solver": ("lu", "gamg")}
+    yield {**meshes, **exact, "degree": ("2",)}
+    if _can_be_refined(scene):
+        yield {"accuracy": ("0.1", "0.03"), "degree": ("1", "2")}
 
 
 def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
@@ -205,19 +185,18 @@ def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
     """
     _check_axes(scene, axes)
     scene = scene.with_solver(degree=scene.solver.degree or 1)
-    planner, asked = _Planner(scene), dict(axes)
-    products = list(_asked(asked) if asked else planner.default())
-    wanted = [point for product in products for point in planner.combinations(product)]
+    left_out, products = list[str](), list(_asked(dict(axes)) if axes else _default(scene))
+    wanted = [point for product in products for point in _combinations(scene, product, left_out)]
     if not wanted:
-        raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(planner.left_out))
+        raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(left_out))
     own = Point(scene)
-    plan = Plan(own, own.exact(), (), (), tuple(dict.fromkeys(planner.left_out)))
+    plan = Plan(own, own.exact(), (), (), tuple(dict.fromkeys(left_out)))
     uniform = [own, *(point for point in wanted if point.accuracy is None)]
     everything = [*wanted, own, plan.exact, *map(plan.exact_like, uniform)]
     distinct = {(dump_scene(p.scene), p.accuracy): p for p in everything}.values()
     finest = max(uniform, key=lambda p: p.scene.domain.unknowns(scene.dimension))
     degree = max(point.degree for point in everything)
-    points = tuple(sorted(distinct, key=lambda p: p.unknowns))
+    points = tuple(sorted(distinct, key=lambda p: (p.unknowns, p.scene.solver.smoothing is not None)))
     return Plan(plan.own, plan.exact, points, _reference(finest, degree), plan.left_out)
 
 

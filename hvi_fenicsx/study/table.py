@@ -14,8 +14,8 @@ from ..model import SolverTable
 from ..runtime.terminal import percent
 from ..runtime.versions import __version__, versions
 from ..schema import unknown
-from .errors import NORMS, Certainty, Errors, Fields, ReferenceSolution, certainty
-from .measure import PHASES, RECORDED, Store
+from .errors import NORMS, Certainty, Errors, certainty
+from .measure import PHASES, Records, name_of
 from .plan import Plan, Point, law_text
 
 Certain = Mapping[str, Certainty]
@@ -32,7 +32,7 @@ class Row:
     """A point: its setting, what it cost, how far off it is.
 
     Attributes:
-        point: its name in the folder ``points``.
+        point: its name.
         mesh: as people name it.
         accuracy: that an adaptive mesh is made for; None of any other.
         degree: of the elements.
@@ -163,32 +163,21 @@ class Study:
                 found.append(row)
         return found
 
-    def over_h(self, quantity: str, like: Row) -> list[tuple[float, float]]:
-        """(h, error) of the points with the scene's own method, coarse to fine.
+    def order(self, quantity: str, like: Row) -> float | None:
+        """The order in h of the error, by the scene's own method, from the two finest meshes that are resolved.
 
         Args:
             quantity: one of ``NORMS``.
             like: whose law and degree the points have.
         """
-        own = self.own
+        own, least = self.own, RESOLVED * (self.certain[quantity].error or 0.0)
         wanted = (like.law, like.degree, own.method, own.tolerance, own.linear_solver)
         alike = [r for r in self.rows if (r.law, r.degree, r.method, r.tolerance, r.linear_solver) == wanted]
-        found = {r.h: e for r in alike if r.h is not None and (e := r.error(quantity)) is not None}
-        return sorted(found.items(), reverse=True)
-
-    def order(self, quantity: str, like: Row) -> float | None:
-        """The order in h of the error over :meth:`over_h`, from the two finest meshes that the reference resolves.
-
-        Args:
-            quantity: one of ``NORMS``.
-            like: whose law and degree the points have.
-        """
-        own = self.certain[quantity].error or 0.0
-        known = [(h, e) for h, e in self.over_h(quantity, like) if e > RESOLVED * own][-2:]
-        if len(known) < 2:
+        errors = {r.h: e for r in alike if r.h is not None and (e := r.error(quantity)) is not None and e > least}
+        if len(errors) < 2:
             return None
-        (h, far), (finer, near) = known
-        return math.log(near / far) / math.log(finer / h)
+        (h, near), (coarser, far) = sorted(errors.items())[:2]
+        return math.log(near / far) / math.log(h / coarser)
 
     def share_of_epsilon(self, quantity: str) -> float | None:
         """ε's part of the scene's own error: its distance from the exact law on its mesh, beside that law's error."""
@@ -245,76 +234,43 @@ def _flat(row: Row) -> dict[str, Any]:
     return {**plain, "beyond_reference": " ".join(row.beyond_reference)}
 
 
-def evaluate(plan: Plan, store: Store) -> Study:
-    """Measure all points that are in a store against the reference.
+def evaluate(plan: Plan, records: Records, ranks: int) -> Study:
+    """The study of points that were measured; rank 0 only.
 
     Args:
-        plan: what was to be run.
-        store: the points; it must hold the reference.
-
-    Raises:
-        ResultError: a point's solution is missing or damaged.
+        plan: what was run.
+        records: what was found.
+        ranks: that solved the points.
     """
     finest, *coarser = plan.reference
-    arrays = store.solution(finest)
-    assert arrays is not None
-    reference = ReferenceSolution(arrays, store.stiffness(finest), plan.own.scene.body.interfaces)
-    levels = [reference.errors(found) for point in coarser if (found := _fields(reference, store, point)) is not None]
+    known = [records.known[name_of(point)].get("errors") for point in coarser]
+    levels = tuple(errors for errors in known if errors is not None)
     certain = certainty(levels)
-    rows = tuple(_rows(plan, store, reference, certain))
-    own, exact = (next(r for r in rows if r.point == store.name(p)) for p in (plan.own, plan.exact))
+    rows = {name_of(point): _row(point, records, certain) for point in plan.points}
     return Study(
         title=plan.own.scene.title,
-        rows=rows,
-        own=own,
-        exact=exact,
+        rows=tuple(rows.values()),
+        own=rows[name_of(plan.own)],
+        exact=rows[name_of(plan.exact)],
         certain=certain,
-        reference=Row(**_measured(store, finest)),
-        coarser=tuple(levels),
+        reference=_row(finest, records, certain),
+        coarser=levels,
         left_out=plan.left_out,
-        ranks=store.ranks,
+        ranks=ranks,
     )
 
 
-def _fields(reference: ReferenceSolution, store: Store, point: Point) -> Fields | None:
-    """A certified point on the reference's nodes; None for another."""
-    arrays = store.solution(point)
-    return None if arrays is None else reference.transfer(arrays)
-
-
-def _rows(plan: Plan, store: Store, reference: ReferenceSolution, certain: Certain) -> Iterator[Row]:
-    partner, beside = None, None
-    for point in plan.points:
-        exact = plan.exact_like(point)
-        if partner != exact:
-            partner, beside = exact, _fields(reference, store, exact)
-        measured, found = _measured(store, point), _fields(reference, store, point)
-        if found is None:
-            yield Row(**measured)
-            continue
-        own, smoothed = reference.errors(found), point.scene.solver.smoothing and point.accuracy is None
-        part = reference.errors(found, beside) if smoothed and beside is not None else None
-        pairs = ((q, own[q], certain[q].error) for q in NORMS)
-        beyond = tuple(q for q, error, least in pairs if error is not None and least is not None and error < least)
-        yield Row(
-            **measured,
-            errors=own,
-            epsilon_part=part,
-            left_out=reference.left_out(found),
-            beyond_reference=beyond,
-        )
-
-
-def _measured(store: Store, point: Point) -> dict[str, Any]:
-    """What a row has of a point's setting and record."""
-    record, solver = store.record(point) or {}, point.scene.solver
-    keys = (*RECORDED, "seconds", "runs", "phases")
-    return {key: record.get(key) for key in keys} | {
-        "point": store.name(point),
+def _row(point: Point, records: Records, certain: Certain) -> Row:
+    """A point's setting, and its record."""
+    record: dict[str, Any] = {key: value for key, value in records.known[name_of(point)].items() if key != "limit"}
+    solver, errors = point.scene.solver, record.get("errors") or {}
+    found = [(q, error, certain[q].error) for q, error in errors.items()]
+    h = None if point.accuracy is not None else point.scene.domain.width() or record.get("h")
+    setting = {
         "mesh": point.mesh,
         "accuracy": point.accuracy,
         "degree": point.degree,
-        "h": None if point.accuracy is not None else point.scene.domain.width() or record.get("h"),
+        "h": h,
         "smoothing": solver.smoothing,
         "epsilon": (record.get("epsilon") or solver.epsilon) if solver.smoothing else None,
         "epsilon_absolute": solver.epsilon_absolute,
@@ -322,6 +278,8 @@ def _measured(store: Store, point: Point) -> dict[str, Any]:
         "linear_solver": solver.linear_solver,
         "tolerance": solver.tolerance,
     }
+    beyond = tuple(q for q, error, least in found if error is not None and least is not None and error < least)
+    return Row(**{**record, **setting, "beyond_reference": beyond})
 
 
 def _sentences(study: Study) -> Iterator[str]:

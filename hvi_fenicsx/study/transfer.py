@@ -6,8 +6,6 @@ boundaries, meshes made anew) a node outside of all cells takes its nearest cell
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import basix
 import numpy as np
 from dolfinx import fem, geometry
@@ -47,38 +45,30 @@ def mesh_width(arrays: SolutionArrays) -> float:
     return float((largest * (2.0 / np.sqrt(3.0) if d == 2 else np.sqrt(2.0))) ** (1.0 / d))
 
 
-class Targets:
-    """The nodes of a solution, and the places on the other side of its joints, each with its body.
+class BodyTransfer:
+    """From the nodes of a mesh to those of another one of the same bodies. On this process alone.
 
     Args:
-        arrays: the solution.
-        joints: the parts of Γc at which two bodies meet.
-
-    Attributes:
-        points: m, (n + k, d): the nodes, then the vertices of the joints as places in the other body.
-        bodies: a number of the body of each of these, (n + k,).
-        middles: the middle of each cell, m, (c, d).
-        cell_bodies: the body of each cell, (c,).
-        others: by joint, the rows of ``points`` of its vertices in the other body.
+        source: a solution on the mesh.
+        target: one on the other mesh.
     """
 
-    def __init__(self, arrays: SolutionArrays, joints: Collection[str]) -> None:
-        cells, own = cells_of(arrays), _bodies(arrays)
-        self.middles = arrays.points[cells[:, : arrays.points.shape[1] + 1]].mean(axis=1)
-        self.cell_bodies = own[cells[:, 0]]
-        self.points, self.bodies = arrays.points, own
-        self.others: dict[str, Integers] = {}
-        for name in sorted(arrays.parts.keys() & set(joints)):
-            vertices = arrays.parts[name].vertices
-            beyond = cells[self.cell_bodies != own[vertices[0]]]
-            holding = beyond[
-                _Mesh(arrays.points, beyond).containing(arrays.points[vertices]), : self.middles.shape[1] + 1
-            ]
-            corners = arrays.points[holding]
-            weights = transfer.clipped(transfer.barycentric_weights(corners, arrays.points[vertices]))
-            self.others[name] = np.arange(len(self.points), len(self.points) + len(vertices))
-            self.points = np.vstack([self.points, np.einsum("mc,mcd->md", weights, corners)])
-            self.bodies = np.append(self.bodies, own[holding[:, 0]])
+    def __init__(self, source: SolutionArrays, target: SolutionArrays) -> None:
+        self._shape = target.points.shape
+        cells, bodies, wanted = cells_of(source), _bodies(source), _bodies(target)
+        boxes = _boxes(source, bodies)
+        self._pieces: list[tuple[Integers, _Body]] = []
+        for body, box in enumerate(_boxes(target, wanted)):
+            same = np.argmin(np.linalg.norm(boxes - box, axis=1))
+            rows = np.flatnonzero(wanted == body)
+            self._pieces.append((rows, _Body(source.points, cells[bodies[cells[:, 0]] == same], target.points[rows])))
+
+    def __call__(self, values: Array) -> Array:
+        """Vectors at the nodes of the target, from those at the nodes of the source."""
+        found = np.empty(self._shape)
+        for rows, body in self._pieces:
+            found[rows] = body(values)
+        return found
 
 
 def _bodies(arrays: SolutionArrays) -> Integers:
@@ -89,63 +79,31 @@ def _bodies(arrays: SolutionArrays) -> Integers:
     return np.asarray(csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-class BodyTransfer:
-    """From the nodes of a mesh to points in its bodies. On this process alone.
+def _boxes(arrays: SolutionArrays, bodies: Integers) -> Array:
+    """The ends of each body along the axes, m, (bodies, 2d)."""
+    points = (arrays.points[bodies == body] for body in range(bodies.max() + 1))
+    return np.array([np.concatenate([own.min(axis=0), own.max(axis=0)]) for own in points])
 
-    Args:
-        source: a solution on the mesh.
-        targets: the points.
-    """
 
-    def __init__(self, source: SolutionArrays, targets: Targets) -> None:
-        self._shape = targets.points.shape
-        own, cells = _bodies(source), cells_of(source)
-        everything = _Mesh(source.points, cells)
-        holding = own[cells[everything.containing(targets.middles), 0]]
-        self._pieces: list[tuple[Integers, _Mesh, Array, Integers]] = []
-        for body in np.unique(targets.bodies):
-            same = np.bincount(holding[targets.cell_bodies == body]).argmax()
-            mesh_of = everything if own.max() == 0 else _Mesh(source.points, cells[own[cells[:, 0]] == same])
-            rows = np.flatnonzero(targets.bodies == body)
-            points = targets.points[rows]
-            self._pieces.append((rows, mesh_of, points, mesh_of.local(points)))
+class _Body:
+    """A body's mesh, on this process alone, and points in it; its functions have the degree of its cells."""
+
+    def __init__(self, vertices: Array, cells: Integers, points: Array) -> None:
+        self._kept, local = np.unique(cells, return_inverse=True)
+        d, degree = vertices.shape[1], 1 if cells.shape[1] == vertices.shape[1] + 1 else 2
+        mesh = compat.simplex_mesh(
+            MPI.COMM_SELF, local.reshape(cells.shape), vertices[self._kept], _KINDS[d], degree=degree
+        )
+        self._points = _in_space(points)
+        self._cells = transfer.containing_cells(mesh, self._points).astype(np.int32)
+        self._field = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, (d,))))
+        self._nodes = self._kept[mesh.geometry.input_global_indices[compat.geometry_dofmap(mesh)]]
 
     def __call__(self, values: Array) -> Array:
-        """Vectors at the points, from those at the nodes."""
-        found = np.empty(self._shape)
-        for rows, mesh_of, points, cells in self._pieces:
-            found[rows] = mesh_of.at(values, points, cells)
-        return found
-
-
-class _Mesh:
-    """A mesh of cells by their nodes, on this process alone; its functions have the degree of the cells."""
-
-    def __init__(self, points: Array, cells: Integers) -> None:
-        self._kept, local = np.unique(cells, return_inverse=True)
-        d, count = points.shape[1], cells.shape[1]
-        self._mesh = compat.simplex_mesh(
-            MPI.COMM_SELF, local.reshape(cells.shape), points[self._kept], _KINDS[d], degree=1 if count == d + 1 else 2
-        )
-        self._space: fem.FunctionSpace | None = None
-
-    def containing(self, points: Array) -> Integers:
-        """The number, as they were given, of the cell that holds each point, or of the nearest one."""
-        return np.asarray(self._mesh.topology.original_cell_index[self.local(points)])
-
-    def local(self, points: Array) -> Integers:
-        """The number in the mesh of the cell that holds each point, or of the nearest one."""
-        return transfer.containing_cells(self._mesh, _in_space(points))
-
-    def at(self, values: Array, points: Array, cells: Integers) -> Array:
-        """Vectors (m, d) at points in cells, from those at all nodes."""
+        """Vectors (m, d) at the points, from those at all nodes of the source."""
         d = values.shape[1]
-        if self._space is None:
-            self._space = fem.functionspace(self._mesh, ("Lagrange", compat.geometry_degree(self._mesh), (d,)))
-        field, numbers = fem.Function(self._space), self._mesh.geometry.input_global_indices
-        dofs = compat.geometry_dofmap(self._mesh)
-        field.x.array.reshape(-1, d)[self._space.dofmap.list] = values[self._kept[numbers[dofs]]]
-        return np.asarray(field.eval(_in_space(points), cells.astype(np.int32))).reshape(-1, d)
+        self._field.x.array.reshape(-1, d)[self._field.function_space.dofmap.list] = values[self._nodes]
+        return np.asarray(self._field.eval(self._points, self._cells)).reshape(-1, d)
 
 
 def rows_of(arrays: SolutionArrays, part: ContactPart) -> Integers:

@@ -19,7 +19,7 @@ from hvi_fenicsx.report.solution_arrays import SolutionArrays
 from hvi_fenicsx.results import gathering
 from hvi_fenicsx.study import transfer
 from hvi_fenicsx.study.errors import NORMS, ReferenceSolution, certainty, stiffness
-from hvi_fenicsx.study.transfer import BodyTransfer, Targets
+from hvi_fenicsx.study.transfer import BodyTransfer
 from hvi_fenicsx.typing import Array
 from hvi_fenicsx.workflow import finish
 
@@ -87,7 +87,7 @@ def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: 
     coarse_vector, fine_vector = step.createVecs()
     coarse_vector.array[:] = values.ravel()
     step.mult(coarse_vector, fine_vector)
-    found = BodyTransfer(source, Targets(target, ()))(values)
+    found = BodyTransfer(source, target)(values)
     np.testing.assert_allclose(found, fine_vector.array.reshape(-1, d), atol=1e-12)
 
 
@@ -107,13 +107,13 @@ def test_where_two_bodies_meet_each_node_takes_the_field_of_its_own(shape: str) 
 
     (source, given), (target, wanted) = mesh_of(2), mesh_of(4)
     assert len(np.unique(source.points, axis=0)) < len(source.points)
-    np.testing.assert_allclose(BodyTransfer(source, Targets(target, ()))(given), wanted, atol=1e-12)
+    np.testing.assert_allclose(BodyTransfer(source, target)(given), wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_quadratic_fields_are_taken_to_finer_meshes_exactly(dimension: int) -> None:
     source, target = taken(with_law(dimension, 2, 2)), taken(with_law(dimension, 4, 1))
-    found = BodyTransfer(source, Targets(target, ()))(quadratic(source.points))
+    found = BodyTransfer(source, target)(quadratic(source.points))
     np.testing.assert_allclose(found, quadratic(target.points), atol=1e-12)
     (near,), (far,) = source.parts.values(), target.parts.values()
     along = transfer.surface(source, near, target.points[far.vertices])

@@ -26,7 +26,7 @@ from hvi_fenicsx.mesh import gmsh_file, nodes, refinement
 from hvi_fenicsx.mesh.curved import mesh_of
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.report.solution_arrays import SolutionArrays
-from hvi_fenicsx.study.transfer import BodyTransfer, Targets
+from hvi_fenicsx.study.transfer import BodyTransfer
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from rings import RING
@@ -257,4 +257,4 @@ def test_fields_are_compared_at_places_of_curved_cells(tmp_path: Path) -> None:
         x = nodes.points(space)[:, :2]
         found.append(SolutionArrays(points=x, cells=nodes.parts(space.dofmap.list.astype(np.int64)), degree=2))
     coarse, fine = found
-    assert np.abs(BodyTransfer(coarse, Targets(fine, ()))(coarse.points) - fine.points).max() < 1e-9
+    assert np.abs(BodyTransfer(coarse, fine)(coarse.points) - fine.points).max() < 1e-9
