@@ -36,34 +36,24 @@ _ROUNDING = float(np.sqrt(np.finfo(float).eps))
 
 @dataclass(frozen=True, kw_only=True)
 class ControlThresholds:
-    """How degree, mesh and smoothing follow from the estimated error.
+    """How mesh and smoothing follow from the estimated error.
 
     Attributes:
-        bulk_in_plane: share of the squared error that one step refines in 2D, for the energy norm.
-        bulk: the same in 3D, and for errors on Γc: they fall as the square of the energy norm's, so a smaller share
-            goes as far.
-        last_bulk_of_degree_2: the share up to which one step at degree 2 goes in 2D if that reaches the energy norm
-            asked for: a mesh less is worth more than some cells.
+        bulk: share of the squared error that one step refines in 2D; its square in 3D, and for errors on Γc.
         aim: part of the accuracy asked for at which the last step aims.
-        smoothing: part of the accuracy asked for that smoothing may take.
-        narrower: factor on ε in one step: what smoothing changes may fall much faster than ε.
+        smoothing: part of the accuracy asked for that smoothing may take, and the factor on ε in one step.
         failures: meshes in a row without a certified solution after which no equilibrium is expected.
         unresolved: root mean square deviation of a value on the boundary from its linear interpolation, as a part of
             its range, from which the first mesh is refined.
-        small: unknowns up to which the first mesh is refined for that, and degree 2 is begun with.
-        price: how many times as much an unknown of degree 2 costs as one of degree 1.
+        small: unknowns up to which the first mesh is refined for that.
     """
 
-    bulk_in_plane: float = 0.75
-    bulk: float = 0.5
-    last_bulk_of_degree_2: float = 0.9
+    bulk: float = 0.7
     aim: float = 0.9
     smoothing: float = 0.3
-    narrower: float = 1 / 3
     failures: int = 3
     unresolved: float = 0.1
     small: int = 20_000
-    price: float = 2.0
 
 
 CONTROL = ControlThresholds()
@@ -246,31 +236,6 @@ def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
         if estimate is None or bulk >= 1.0 or estimate.discretisation == 0.0:
             return refinement.uniform(domain)
         return refinement.marked(domain, marked(level.comm, estimate, bulk))
-
-
-def refined_with_neighbours(level: AdaptiveLevel, share: float) -> Refinement:
-    """Refine a part of the squared error, including the neighbours that are cut with marked cells. Collective.
-
-    On coarse meshes these neighbours are many: with that part marked, far more than it would be refined.
-
-    Args:
-        level: the mesh, with its estimate.
-        share: part of the squared error to be refined in all.
-    """
-    step = refined(level, share)
-    reached = _refined_share(level, step, share)
-    return step if reached <= share else refined(level, share * share / reached)
-
-
-def _refined_share(level: AdaptiveLevel, step: Refinement, bulk: float) -> float:
-    """Part of the squared error that is refined: marked cells count in full, others by their number of cuts."""
-    found = level.solution.estimate
-    if found is None or found.discretisation == 0.0:
-        return 0.0
-    squares, chosen = found.cells**2, marked(level.comm, found, bulk)
-    cuts = squares * (np.bincount(step.transfer.parents, minlength=len(squares))[: len(squares)] - 1.0)
-    own, cut, all_cut = (total(level.comm, float(a.sum())) for a in (squares[chosen], cuts[chosen], cuts))
-    return own / found.discretisation**2 * all_cut / cut
 
 
 def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:

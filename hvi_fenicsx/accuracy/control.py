@@ -1,4 +1,4 @@
-"""Solve to a given accuracy: degree, mesh, ε and tolerances follow from the estimated error."""
+"""Solve to a given accuracy: mesh, ε and tolerances follow from the estimated error."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from ..runtime.mpi import largest
 from . import adaptive, quantities
 from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, ControlThresholds
 from .error_balance import Elements, ErrorBalance
-from .goal import AccuracyResult, AdaptiveStep, DegreeChoice, Goal
+from .goal import AccuracyResult, AdaptiveStep, Goal
 
+_INTERRUPTED = "interrupted"
 _LARGEST = 2**31 - 1
 """Unknowns that PETSc's default integers can number."""
 
@@ -31,7 +32,9 @@ def solve_to_goal(
     report: Callable[[str], None],
     thresholds: ControlThresholds = CONTROL,
 ) -> AccuracyResult:
-    """Refine until the goal is reached, or cannot be; at the cheaper degree where the scene states none. Collective.
+    """Refine until the goal is reached, or cannot be. Collective.
+
+    Where the scene states no degree it is 2; 1 for a quantity that is compared from mesh to mesh.
 
     Args:
         scene: what to solve; its mesh sets where to begin (:func:`.adaptive.coarsest`), its ε is the largest.
@@ -39,64 +42,25 @@ def solve_to_goal(
         goal: what is asked for.
         solver: timer, progress and interruption.
         report: called with a line about each mesh.
-        thresholds: how degree, mesh and smoothing follow from the error.
+        thresholds: how mesh and smoothing follow from the error.
 
     Raises:
         InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
     """
-    domain = solver.first_domain(scene, comm)
-
-    def begun(degree: int) -> AdaptiveRun:
-        run = AdaptiveRun(
-            scene=scene.with_solver(degree=degree),
-            domain=domain,
-            goal=goal,
-            solver=solver,
-            report=report,
-            thresholds=thresholds,
-        )
-        run.begin()
-        return run
-
-    run, choice = _at_cheaper_degree(scene, goal, domain, begun, thresholds)
-    if choice is not None:
-        report(str(choice))
-    found = run.finish()
-    return replace(found, solution=replace(found.solution, scene=scene), choice=choice)
-
-
-def _at_cheaper_degree(
-    scene: Model, goal: Goal, domain: Domain, begun: Callable[[int], AdaptiveRun], thresholds: ControlThresholds
-) -> tuple[AdaptiveRun, DegreeChoice | None]:
-    """The run on its first mesh, and how its degree was chosen where both were tried. Collective.
-
-    A run begins at degree 2 where the first mesh is small: there to try degree 1 first costs as much. Else both are
-    solved on the first mesh, and from its error each is expected to converge at its best rate.
-    """
-    if scene.solver.degree is not None:
-        return begun(scene.solver.degree), None
-    unknowns = domain.dimension * nodes.count(domain.mesh, 2)
-    quadratic = None
-    if quantities.find(goal.quantity).estimated and unknowns <= thresholds.small:
-        quadratic = begun(2)
-        if quadratic.steps and quadratic.quantity.known_from_one_mesh:
-            return quadratic, None
-    linear = begun(1)
-    undecided = linear.open and linear.steps and linear.quantity.known_from_one_mesh
-    if not undecided or Elements(dimension=domain.dimension, degree=2).memory(unknowns) > linear.room:
-        return linear, None
-    quadratic = quadratic or begun(2)
-    choice = DegreeChoice(unknowns={1: linear.needed(), 2: quadratic.needed()}, price=thresholds.price)
-    return (quadratic if choice.degree == 2 else linear), choice
+    degree = scene.solver.degree or (2 if quantities.find(goal.quantity).estimated else 1)
+    run = AdaptiveRun(
+        scene=scene.with_solver(degree=degree), goal=goal, solver=solver, report=report, thresholds=thresholds
+    )
+    found = run.finish(solver.first_domain(scene, comm))
+    return replace(found, solution=replace(found.solution, scene=scene))
 
 
 @dataclass(kw_only=True)
 class AdaptiveRun:
-    """One run to a goal at one degree. Everything it decides on is the same on all ranks.
+    """One run to a goal. Everything it decides on is the same on all ranks.
 
     Attributes:
         scene: what to solve; its ε is the largest.
-        domain: the body on the first mesh (:meth:`.AdaptiveSolver.first_domain`).
         goal: what is asked for.
         solver: timer, progress and interruption.
         report: called with a line about each mesh.
@@ -105,7 +69,6 @@ class AdaptiveRun:
     """
 
     scene: Model
-    domain: Domain
     goal: Goal
     solver: AdaptiveSolver
     report: Callable[[str], None]
@@ -113,69 +76,51 @@ class AdaptiveRun:
     steps: list[AdaptiveStep] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.comm: MPI.Comm = self.domain.mesh.comm
         self.elements = Elements(dimension=self.scene.dimension, degree=self.scene.solver.degree or 1)
-        self.room = memory.room(self.comm) - memory.peak(self.comm)
         self.quantity = quantities.find(self.goal.quantity)()
         self.solver = replace(self.solver, existence=self.quantity.needs_existence)
         self.balance = ErrorBalance(
             accuracy=self.goal.accuracy, quantity=self.quantity, elements=self.elements, thresholds=self.thresholds
         )
         self._failures = 0
-        self._why: str | None = None
-        self.level: AdaptiveLevel
         self._estimated: AdaptiveLevel | None = None
 
-    def begin(self) -> None:
-        """Solve on the first mesh, the coarsest that sees the data. Collective.
+    def finish(self, domain: Domain) -> AccuracyResult:
+        """Refine the coarsest mesh that sees the data until the goal is reached, or cannot be. Collective.
 
-        Raises:
-            InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
+        Args:
+            domain: the body on the first mesh (:meth:`.AdaptiveSolver.first_domain`).
         """
-        start = time.perf_counter()
-        self.level = self.solver.begin_resolved(adaptive.coarsest(self.scene), self.domain, self.thresholds)
-        self._why = self._record(self.level, start)
-
-    @property
-    def open(self) -> bool:
-        """Whether there is more to do."""
-        return self._why is None and not (self._known and self.steps[-1].error <= self.goal.accuracy)
+        self.comm, start = domain.mesh.comm, time.perf_counter()
+        self.room = memory.room(self.comm) - memory.peak(self.comm)
+        level = self.solver.begin_resolved(adaptive.coarsest(self.scene), domain, self.thresholds)
+        why = self._record(level, start)
+        while why is None and not (self._known and self.steps[-1].error <= self.goal.accuracy):
+            start, stopped = time.perf_counter(), self._estimated is not None and self.solver.interrupted()
+            found = _INTERRUPTED if stopped else self._next(level)
+            if isinstance(found, str):
+                why = found
+            elif self._estimated is not None and _is_stopped(found):
+                why = _INTERRUPTED
+            else:
+                level, why = found, self._record(found, start)
+        if why == _INTERRUPTED and self._estimated is not None:  # the last mesh with an error is given
+            level = self._estimated
+            self.report(why)
+        return AccuracyResult(
+            goal=self.goal,
+            level=level,
+            solution=level.solution,
+            degree=self.elements.degree,
+            steps=tuple(self.steps),
+            why=why,
+            interrupted=why is not None and self.solver.interrupted(),
+        )
 
     @property
     def _known(self) -> bool:
         """Whether the last mesh has an error."""
         return bool(self.steps) and not self._failures
-
-    def needed(self) -> float:
-        """The unknowns that the accuracy takes at the best rate of convergence; infinite where no error is known."""
-        error = self.steps[-1].error if self.steps else math.inf
-        return self.elements.needed(self.level.dofs, error / self.goal.accuracy, self.quantity)
-
-    def finish(self) -> AccuracyResult:
-        """Refine until the goal is reached, or cannot be. Collective."""
-        while self.open:
-            start = time.perf_counter()
-            interrupted = self._estimated is not None and self.solver.interrupted()
-            found = "interrupted" if interrupted else self._next(self.level)
-            if not isinstance(found, str) and self._estimated is not None and _is_stopped(found):
-                found = "interrupted"
-            if not isinstance(found, str):
-                self.level = found
-                self._why = self._record(found, start)
-                continue
-            self._why = found
-            if found == "interrupted" and self._estimated is not None:  # the last mesh with an error is given
-                self.level, self._failures = self._estimated, 0
-                self.report(found)
-        return AccuracyResult(
-            goal=self.goal,
-            level=self.level,
-            solution=self.level.solution,
-            degree=self.elements.degree,
-            steps=tuple(self.steps),
-            why=self._why,
-            interrupted=self._why is not None and self.solver.interrupted(),
-        )
 
     def _record(self, level: AdaptiveLevel, start: float) -> str | None:
         """Record a level; why to stop at it, or None. Collective."""
@@ -212,16 +157,16 @@ class AdaptiveRun:
 
     def _next(self, level: AdaptiveLevel) -> AdaptiveLevel | str:
         """The next level, or why there is none. Collective."""
-        if self._known and math.isfinite(self.steps[-1].error) and (too_many := self._too_many(self.needed())):
-            return too_many
+        if self._known and math.isfinite(error := self.steps[-1].error):
+            needed = self.elements.needed(level.dofs, error / self.goal.accuracy, self.quantity)
+            if too_many := self._too_many(needed):
+                return too_many
         scene = level.solution.scene
         if self.steps:
             scene = self.balance.next_scene(scene, self.steps[-1])
         if self._known and self.balance.mesh_suffices(self.steps):
             return self.solver.again(level, scene)
-        most = self.balance.largest_bulk
-        bulk = self.balance.bulk(self.steps[-1]) if self._known else most
-        refined = adaptive.refined(level, bulk) if bulk == most else adaptive.refined_with_neighbours(level, bulk)
+        refined = adaptive.refined(level, self.balance.bulk(self.steps[-1] if self._known else None))
         unknowns = refined.domain.dimension * nodes.count(refined.domain.mesh, self.elements.degree)
         return self._too_many(unknowns) or self.solver.refine(level, refined, scene, self.quantity.ahead())
 

@@ -62,32 +62,23 @@ class ErrorBalance:
     elements: Elements
     thresholds: ControlThresholds = CONTROL
 
-    @property
-    def largest_bulk(self) -> float:
-        """Part of the squared error that a step refines, unless it is the last one."""
-        on_contact = self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm
-        in_plane = self.elements.dimension == 2 and not on_contact
-        return self.thresholds.bulk_in_plane if in_plane else self.thresholds.bulk
-
-    def bulk(self, last: AdaptiveStep) -> float:
+    def bulk(self, last: AdaptiveStep | None) -> float:
         """Part of the squared error to refine: no more than the aim needs.
 
-        Args:
-            last: the last step.
-        """
-        mesh, smoothing, _ = self.quantity.parts(last)
-        if not self.quantity.known_from_one_mesh or mesh <= 0.0:
-            return self.largest_bulk
-        left = self._beside(smoothing) / mesh
-        # On Γc errors fall as the square of the energy norm's. Halving the edges of marked cells leaves 4^-p of it.
-        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.elements.degree)
-        return needed if 0.0 < needed <= self._largest_last_bulk else self.largest_bulk
+        In space, and on Γc, where errors fall as the square of the energy norm's, a smaller part goes as far.
 
-    @property
-    def _largest_last_bulk(self) -> float:
-        """Part of the squared error that a step may refine if that is enough for the aim."""
-        goes_far = self.elements == Elements(dimension=2, degree=2) and self.quantity.in_energy_norm
-        return self.thresholds.last_bulk_of_degree_2 if goes_far else self.largest_bulk
+        Args:
+            last: the last step; None where no error is known.
+        """
+        on_contact = self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm
+        most = self.thresholds.bulk ** (1 if self.elements.dimension == 2 and not on_contact else 2)
+        mesh, smoothing, _ = (0.0, 0.0, 0.0) if last is None else self.quantity.parts(last)
+        if not self.quantity.known_from_one_mesh or mesh <= 0.0:
+            return most
+        left = self._beside(smoothing) / mesh
+        # Halving the edges of marked cells leaves 4^-p of it.
+        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.elements.degree)
+        return min(needed, most) if needed > 0.0 else most
 
     def _beside(self, part: float) -> float:
         """The largest error beside a part with which both together are no larger than the aim."""
@@ -126,7 +117,7 @@ class ErrorBalance:
         solver, values = scene.solver, dict[str, float]()
         if smoothing > self._allowed_smoothing(mesh):
             widths = {name: getattr(solver, name) for name in ("epsilon", "epsilon_absolute")}
-            values = {name: self.thresholds.narrower * width for name, width in widths.items() if width is not None}
+            values = {name: self.thresholds.smoothing * width for name, width in widths.items() if width is not None}
         if 10 * last.algebraic > max(last.discretisation, self.accuracy):
             values["tolerance"] = solver.tolerance / 10
         return scene.with_solver(**values)

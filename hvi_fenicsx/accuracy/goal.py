@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -54,32 +53,6 @@ class AdaptiveStep:
     seconds: float
     memory: float
 
-    def as_dict(self) -> dict[str, float | None]:
-        """For ``summary.json``."""
-        return asdict(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class DegreeChoice:
-    """The degree that was chosen, and why.
-
-    Attributes:
-        unknowns: that each degree is expected to need.
-        price: how many times as much an unknown of degree 2 costs as one of degree 1.
-    """
-
-    unknowns: Mapping[int, float]
-    price: float
-
-    @property
-    def degree(self) -> int:
-        """1 or 2."""
-        return 2 if self.price * self.unknowns[2] < self.unknowns[1] else 1
-
-    def __str__(self) -> str:
-        needed = ", ".join(f"degree {degree} about {count:.1e}" for degree, count in self.unknowns.items())
-        return f"degree {self.degree} is chosen; unknowns needed, by the first mesh: {needed}"
-
 
 @dataclass(frozen=True, kw_only=True)
 class AccuracyResult:
@@ -93,7 +66,6 @@ class AccuracyResult:
         steps: all adaptive steps.
         why: why it ended without reaching the goal; None where it was reached.
         interrupted: whether it ended because it was to stop.
-        choice: how the degree was chosen; None where the scene states it, or there was no choice.
     """
 
     goal: Goal
@@ -103,7 +75,6 @@ class AccuracyResult:
     steps: tuple[AdaptiveStep, ...]
     why: str | None
     interrupted: bool
-    choice: DegreeChoice | None = None
 
     @property
     def exit_code(self) -> int:
@@ -121,8 +92,7 @@ class AccuracyResult:
             "reached": self.why is None,
             "why": self.why,
             "degree": self.degree,
-            "unknowns_needed": self.choice and {f"degree_{p}": count for p, count in self.choice.unknowns.items()},
             "tolerance": last.tolerance if last else None,
             "epsilon": last.epsilon if last else None,
-            "levels": [step.as_dict() for step in self.steps],
+            "levels": [asdict(step) for step in self.steps],
         }

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse, spatial
 
+from ..accuracy.quantity_base import ORDERS
 from ..problem import spaces
 from ..report.contact_part import ContactPart
 from ..report.solution_arrays import SolutionArrays
@@ -39,8 +40,6 @@ Errors = Mapping[str, float | None]
 """Relative errors by the keys of :data:`NORMS`; None where there is nothing to measure."""
 JUMP_FACETS = 2
 """So many facets of the coarser mesh about a jump of the law count as near it."""
-ORDERS = (0.5, 2.0)
-"""The orders in h that are believed of the reference's own error."""
 _ROUNDING = 1e-12
 """Relative: no smaller error can be measured."""
 

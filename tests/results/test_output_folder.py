@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import itertools
 import json
 import os
 import signal
 import threading
-import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from mpi4py import MPI
-from scenes import model
 
-from hvi_fenicsx import InputError, Scene
+from hvi_fenicsx import InputError
 from hvi_fenicsx.results import output_folder
-from hvi_fenicsx.results.folder import ResultFolder
 from hvi_fenicsx.results.output_folder import OutputFolder
 from hvi_fenicsx.runtime import manifest
 
@@ -457,17 +452,3 @@ def test_a_damaged_file_is_found_whichever_it_is(tmp_path: Path) -> None:
     (out / "a.json").unlink()
     assert found.damaged(out) == "a.json"
     assert json.loads((out / "manifest.json").read_text())["kind"] == "result"
-
-
-@pytest.mark.parametrize(("end", "whole"), [(b"</VTKFile>\n", True), (b"</VTKFi", False)])
-def test_of_large_files_the_end_alone_is_read(end: bytes, whole: bool, tmp_path: Path) -> None:
-    """They were read into memory as a whole, those of all ranks by rank 0."""
-    with ResultFolder(MPI.COMM_SELF, tmp_path / "out") as folder:
-        with (folder.work / "displacement_0.vtu").open("wb") as file:
-            file.seek(1 << 26)
-            file.write(end)
-        tracemalloc.start()
-        with contextlib.nullcontext() if whole else pytest.raises(InputError, match="displacement_0"):
-            folder.commit(Scene.model_validate(model(2)))
-        assert tracemalloc.get_traced_memory()[1] < 4 << 20
-        tracemalloc.stop()
