@@ -47,7 +47,7 @@ def _run(call: Session) -> int:
     say(console.path_wanted(call.scene.path, run.scaled))
     if known:
         say([f"{len(known)} rows are there already; on from factor {known[-1]['factor']:.6g}"])
-    control = Control(keep=kept.keep, progress=_tell, interrupted=call.interrupted, jumping=_tell_jump)
+    control = Control(keep=kept.keep, progress=_tell, interrupted=call.interrupted)
     path = run.follow(control, known)
     on_root(COMM, kept.close)
     say(console.path_outcome(path))
@@ -83,11 +83,6 @@ class _StateFile:
         """Close the file, if there is one. Rank 0 only."""
         for opened in self._journal:
             opened.close()
-
-
-def _tell_jump(factor: float, steps: int) -> None:
-    """The moving line in the middle of a long jump."""
-    tell_moving("jump at the factor %.6g, step %d", factor, steps)
 
 
 def _tell(number: int, row: PathRow) -> None:

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..model import PathTable
 from ..paths.follower import Follower
 from ..paths.load_path import LoadPath, PathRow
-from ..paths.state import End, Event, Follow, PathOptions, PathState, Watch
+from ..paths.state import End, Event, Follow, PathOptions, PathState
 from ..paths.vertex_laws import is_straight
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
@@ -37,13 +37,11 @@ class Control:
         keep: is given the record of each new state, on all ranks.
         progress: is told each new row.
         interrupted: whether to stop (collective); asked at each state, and at each step of a jump.
-        jumping: is told the factor of a long jump and its steps so far.
     """
 
     keep: Callable[[Record], None] = lambda record: None
     progress: Callable[[int, PathRow], None] = lambda number, row: None
     interrupted: Callable[[], bool] = lambda: False
-    jumping: Callable[[float, int], None] = lambda factor, steps: None
 
 
 class PathRun:
@@ -143,8 +141,7 @@ class PathRun:
             **self._limits(),
         )
         resume = self.states[-1] if self.states else None
-        watch = Watch(control.interrupted, control.jumping)
-        return Follower(self._condensation.problem, options, resume, watch)
+        return Follower(self._condensation.problem, options, resume, control.interrupted)
 
     def _limits(self) -> dict[str, Any]:
         """With which factors there is an equilibrium, and with which none, where rigid motions tell. Collective.

@@ -33,7 +33,6 @@ class Curve(Events):
         points: where all points are; changed.
         z: their coordinates, (n,).
         factor: λ.
-        fineness: of the steps; 0.1 for a tenth of their length.
 
     Attributes:
         length: of the next step.
@@ -41,11 +40,9 @@ class Curve(Events):
         disagreement: of the work along a step with the energies, 1 where it is as large as is allowed.
     """
 
-    def __init__(
-        self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float, fineness: float = 1.0
-    ) -> None:
+    def __init__(self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float) -> None:
         super().__init__(constant, rate, points, z, factor)
-        self._fineness, self.length, self.shortest = fineness, 0.1 * fineness, self.limits.standing
+        self.length, self.shortest = 0.1, self.limits.standing
         self._next, self._crossed = self.length, False
         self.disagreement: Callable[[Arc], float] = lambda move: 0.0
         self._size = self._extent()
@@ -135,8 +132,7 @@ class Curve(Events):
         if not self.points.bent:
             return np.inf
         rates = np.abs(self.points.rates(self.here.y[:-1], self.here.tangent[:-1]))
-        allowed = self._fineness * self.points.reach(self.here.values)
-        reach = np.min(allowed / np.maximum(rates, 1e-300), initial=np.inf)
+        reach = np.min(self.points.reach(self.here.values) / np.maximum(rates, 1e-300), initial=np.inf)
         return float(min(self.length / largest, reach))
 
     def _refuse_far(self, predicted: Array, y: Array, way: float) -> None:
@@ -147,8 +143,7 @@ class Curve(Events):
         size = way * float(np.max(np.abs(self.here.tangent)))
         if off > 0.3 * size + 1e-12 * float(np.max(np.abs(y))):
             raise Refused
-        wanted = 0.05 * self._fineness
-        grown = min(4.0, np.sqrt(wanted * size / off)) if off > 0.0 else 4.0
+        grown = min(4.0, np.sqrt(0.05 * size / off)) if off > 0.0 else 4.0
         self._next = max(size, self.length if grown > 1.0 else 0.0) * max(grown, 0.3)
 
     @override

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 from typing_extensions import override
 
+from ..reduced.condensed_stiffness import ProductInverse
 from ..typing import Array, Integers
 from .branch import Branch, Refused
 from .relations import ContactPoints, Values
@@ -332,25 +333,6 @@ class CurveEquations(Branch):
         self.head(along if np.any(driven) else self._factor_row, sign)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Exchange:
-    """Columns that were exchanged.
-
-    Attributes:
-        columns: their numbers, (k,).
-        spike: the new ones as combinations of those before, less the identity in their own places, (n + 1, k).
-        own: the inverse of these combinations' part in their own places, (k, k).
-    """
-
-    columns: Integers
-    spike: Array
-    own: Array
-
-    def applied(self, found: Array) -> Array:
-        """A solution with the new columns from that with the old ones, (n + 1,)."""
-        return np.asarray(found - self.spike @ (self.own @ found[self.columns]))
-
-
 class Bordered:
     """The factors.
 
@@ -366,24 +348,17 @@ class Bordered:
     """
 
     def __init__(self, matrix: Array, thresholds: FollowingThresholds = DEFAULT) -> None:
-        self._thresholds = thresholds
-        self._row = matrix[-1].copy()
-        self._exchanges: list[_Exchange] = []
-        self._factors, self._pivots, singular = dgetrf(matrix, overwrite_a=1)
+        self._thresholds, self._row = thresholds, matrix[-1].copy()
+        factors, pivots, singular = dgetrf(matrix, overwrite_a=1)
+        self._inverse = ProductInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), thresholds.many)
         if singular or not self._has_tangent():
             raise np.linalg.LinAlgError("the equations have no tangent here")
 
     def _has_tangent(self) -> bool:
         """Find the direction in which the equations stay satisfied; whether there is one."""
-        self.along = self._solved(np.eye(1, len(self._row), len(self._row) - 1)[0])
+        self.along = self._inverse.solve(np.eye(1, len(self._row), len(self._row) - 1)[0])
         self._length = float(np.linalg.norm(self.along))
         return 0.5 < float(self._row @ self.along) < 2.0  # it is 1 where any digit is left
-
-    def _solved(self, right: Array) -> Array:
-        found = np.asarray(dgetrs(self._factors, self._pivots, right)[0])
-        for exchange in self._exchanges:
-            found = exchange.applied(found)
-        return found
 
     def exchange(self, columns: Integers, values: Array) -> bool:
         """Put other columns into the equations; whether that went well. If not, the factors are good for nothing.
@@ -392,17 +367,11 @@ class Bordered:
             columns: their numbers, (k,).
             values: the new ones, (n, k).
         """
-        if len(self._exchanges) == self._thresholds.many:
-            return False
-        spike = np.stack([self._solved(np.append(v, self._row[i])) for i, v in zip(columns, values.T, strict=True)], 1)
-        own = spike[columns]
-        size = float(np.max(np.abs(spike)))
-        if not np.isfinite(size) or np.linalg.svd(own, compute_uv=False)[-1] <= self._thresholds.small * size:
-            return False
-        spike[columns] -= np.eye(len(columns))
-        self._exchanges.append(
-            _Exchange(columns=columns, spike=spike, own=np.asarray(np.linalg.inv(own), dtype=np.float64))
-        )
+        for place, value in zip(columns, values.T, strict=True):
+            spread = self._inverse.solve(np.append(value, self._row[place]))
+            if self._inverse.is_long or not abs(spread[place]) > self._thresholds.small * np.max(np.abs(spread)):
+                return False
+            self._inverse.exchange(spread, int(place))
         return self._has_tangent() and self.takes(self._row)
 
     def across(self, left: Array) -> Array:
@@ -411,7 +380,7 @@ class Bordered:
         Args:
             left: what is left, (n,).
         """
-        return self._solved(np.append(left, 0.0))
+        return self._inverse.solve(np.append(left, 0.0))
 
     def takes(self, row: Array) -> bool:
         """Whether another row can stand beside the equations.

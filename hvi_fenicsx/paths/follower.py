@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from typing_extensions import override
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
@@ -20,7 +19,7 @@ from .jumps import jump_from
 from .load_history import Cycle, Cycles, LoadHistory
 from .pivoting import StraightBranch
 from .relations import ContactPoints
-from .state import End, Event, Follow, PathOptions, PathState, Place, Stopped, Watch, place_of
+from .state import End, Event, Follow, PathOptions, PathState, Place, Stopped, place_of
 from .straight_state import coordinates_at
 from .substitutions import factors, multiplied
 
@@ -32,7 +31,7 @@ class Follower(LoadHistory):
         problem: the problem.
         options: what path is wanted.
         resume: the state after which to go on; by default the path begins at factor 0.
-        watch: whether to stop, asked at each state and within jumps, and who is told of these.
+        interrupted: whether to stop, asked at each state, at each step of a jump, and as each point passes.
 
     Attributes:
         end: how the path ended; None before.
@@ -47,11 +46,13 @@ class Follower(LoadHistory):
         problem: CondensedProblem,
         options: PathOptions,
         resume: PathState | None = None,
-        watch: Watch | None = None,
+        interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
+        super().__init__(options)
         self._factors = factors(problem)
-        problem = multiplied(problem, self._factors)
-        super().__init__(problem, options, resume, watch)
+        self._problem = problem = multiplied(problem, self._factors)
+        self._resume, self._interrupted = resume, interrupted
+        self._events, self._peak, self._adrift = 0, 0.0, False
         self._points = ContactPoints(problem, options.remember, options.thresholds)
         self._empty_jumps = 0
         self._blocked = False
@@ -61,8 +62,8 @@ class Follower(LoadHistory):
         self._cycles: Cycles
 
     @property
-    @override
     def factor(self) -> float:
+        """λ."""
         return self._branch.factor
 
     @property
@@ -70,10 +71,62 @@ class Follower(LoadHistory):
         """The displacements of the problem as it was given, (n,)."""
         return self._branch.values.x / self._factors
 
+    def _check(self) -> None:
+        """Go on, or not.
+
+        Raises:
+            Stopped: the path is to stop.
+        """
+        if self._interrupted():
+            raise Stopped
+
+    # -- the load history
+
+    def states(self) -> Iterator[PathState]:
+        """The states from start to end; the first one of a path that is resumed is the next one."""
+        try:
+            yield from self._all_states()
+        except Stopped:
+            self._finish(End.INTERRUPTED, "interrupted")
+        except np.linalg.LinAlgError:
+            self._finish(End.LOST, "after the last state the equations of the path are singular")
+
+    def _all_states(self) -> Iterator[PathState]:
+        programme = self._options.programme
+        if self._resume is None:
+            yield from self._begun()
+        else:
+            self._restore(self._resume)
+            self._peak = max(map(abs, programme[: self._leg]), default=0.0)
+            self._adrift = self._resume.event not in (Event.START, Event.JUMP) and self._is_adrift()
+        while self.end is None and self._leg < len(programme):
+            yield from self._gone_to(programme[self._leg])
+            self._leg += 1
+            if self.end is None and self._leg < len(programme):
+                yield self._state(Event.TURN)
+            elif self.end is None:
+                self._finish(End.REACHED, "the programme is done")
+                yield self._state(Event.END)
+        if self.end is None:  # resumed from its last state
+            self._finish(End.REACHED, "the programme is done")
+
+    def _gone_to(self, aim: float) -> Iterator[PathState]:
+        """A leg; none where no factor on it is borne."""
+        limit, way = self._limit(self.factor), 1.0 if aim >= self.factor else -1.0
+        if way * (aim - limit) > 0.0 and way * (self.factor - limit) >= -self._small:
+            self._finish(End.ESCAPES, self._not_borne(limit))
+            yield self._state(Event.END)
+        else:
+            yield from self._towards(aim)
+
     # -- beginning
 
-    @override
     def _begun(self) -> Iterator[PathState]:
+        """The first state; none where its factor is not borne, or the path ends before."""
+        low, high = self._options.borne
+        if low > self._small or high < -self._small:
+            self._finish(End.ESCAPES, "no equilibrium bears the constant loads alone: a body comes off")
+            return
         z = self._first()
         if z is None:
             return
@@ -92,25 +145,25 @@ class Follower(LoadHistory):
             return rest.z
         z = self._at_no_load(rest.z, self._options.programme[0])
         if isinstance(z, Nowhere):
-            self._end_before(z.value, escapes=z is Nowhere.AWAY)
+            (self._come_off if z is Nowhere.AWAY else self._lose)(0.0, z.value)
             return None
         return z
 
     def _at_no_load(self, z: Array, towards: float) -> Array | Nowhere:
         held = self._is_held(self._options.thresholds.small * towards)
-        return settled(self._problem, self._points, z, towards, self._watcher, held=held)
+        return settled(self._problem, self._points, z, towards, self._check, held=held)
 
     def _loaded(self, constant: CondensedProblem) -> Array | None:
         """From rest to the constant loads, as stable as it goes; where the points are then."""
         options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
-        follower = Follower(constant, options, watch=self._watcher)
+        follower = Follower(constant, options, interrupted=self._interrupted)
         for _ in follower.states():
             pass
         if follower.end is End.INTERRUPTED:
             raise Stopped
         if follower.end is not End.REACHED:
             reason = f"under the constant loads alone: {follower.reason}"
-            self._end_before(reason, escapes=follower.end is End.ESCAPES)
+            (self._come_off if follower.end is End.ESCAPES else self._lose)(0.0, reason)
             return None
         self._points = follower._points
         return follower._branch.z
@@ -129,15 +182,14 @@ class Follower(LoadHistory):
             loads = problem.force, problem.force_rate
             self._branch = StraightBranch(points, *loads, z, factor, position, inverse, heading)
             return
-        fineness = self._options.fineness
-        curve = Curve(problem.force, problem.force_rate, points, z.copy(), factor, fineness)
+        curve = Curve(problem.force, problem.force_rate, points, z.copy(), factor)
         curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
         self._branch = curve
         if resumed is not None and resumed.event not in (Event.START, Event.TURN):
             curve.resume(resumed.position)
 
-    @override
     def _restore(self, state: PathState) -> None:
+        """Go on after a state."""
         self._follow_from(coordinates_at(self._problem, self._points, state), state.factor, state)
         self._branch.unstable, self._leg, self._last = state.unstable, state.position.leg, state
         self._balance = EnergyBalance(self._problem, self._points, state.work, state.dissipated)
@@ -145,8 +197,8 @@ class Follower(LoadHistory):
 
     # -- one leg of the load history
 
-    @override
     def _towards(self, aim: float) -> Iterator[PathState]:
+        """From event to event until the factor reaches its aim or the path ends."""
         self._orient(aim)
         self._cycles = Cycles(self._x, self._options.thresholds.undecided)
         while self.end is None and self.factor != aim:
@@ -165,6 +217,24 @@ class Follower(LoadHistory):
                 self._watch()
             if self.end is not None:
                 yield self._state(Event.END)
+
+    def _watch(self) -> None:
+        """Count an event; end the path where it has a reason to."""
+        self._events += 1
+        self._peak = max(self._peak, abs(self.factor))
+        self._adrift = self._is_adrift()
+        if self._adrift and not self._is_held(self.factor):
+            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
+        elif self._interrupted():
+            self._finish(End.INTERRUPTED, "interrupted")
+        elif self._events > self._options.most_events:
+            self._lose(self.factor, f"no end after {self._options.most_events} events")
+
+    def _is_adrift(self) -> bool:
+        """Whether the load is back at zero and nothing would resist the next; where that is borne, it takes up all."""
+        if self._peak == 0.0 or not len(self._points.rigid) or not self._branch.at_rest(self._peak):
+            return False
+        return bool(np.any(self._points.unresisted(self._branch.values, self._problem.force_rate).driven))
 
     def _must_jump(self, aim: float) -> bool:
         if self._blocked or self._options.follow is Follow.EXACT:
@@ -185,7 +255,7 @@ class Follower(LoadHistory):
         if resumed is not None and resumed.event not in (Event.START, Event.TURN):
             return
         try:
-            self._branch.set_out(1.0 if aim > self.factor else -1.0, self._watcher.check)
+            self._branch.set_out(1.0 if aim > self.factor else -1.0, self._check)
         except Refused:
             self._lose_among_ends()
         self._branch.watch_folds()
@@ -195,7 +265,7 @@ class Follower(LoadHistory):
         if move.outcome not in (Outcome.END, Outcome.TURNED):
             return []
         try:
-            return self._branch.pass_on(move, self._watcher.check)
+            return self._branch.pass_on(move, self._check)
         except Refused:
             self._lose_among_ends()
             return []
@@ -224,7 +294,7 @@ class Follower(LoadHistory):
             return self._state(state.event, place=state.place, bifurcation=True)
         most = np.inf if self._points.straight else self._options.thresholds.waits + 4 * len(self._points)
         if found is Cycle.CLOSED or (found is not None and self._points.straight):
-            self._go_round(found)
+            self._go_round(self.factor, found)
         elif self._cycles.standing > most:
             self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
         return state
@@ -246,28 +316,28 @@ class Follower(LoadHistory):
         return way is not None or stable
 
     def _ended(self, outcome: Outcome) -> None:
+        """End where no step is short enough, or nothing ends the curve: where the factor stands, a body comes off."""
         if outcome is Outcome.STUCK:
             self._lose(self.factor, f"at the factor {self.factor:.6g} no step is short enough to stay on the path")
+        elif self._branch.stands:
+            self._come_off(self.factor, f"at the factor {self.factor:.6g} a body comes off")
         else:
-            self._end_for_ever(stands=self._branch.stands)
-
-    @override
-    def _is_off(self) -> bool:
-        rate, values = self._problem.force_rate, self._branch.values
-        return self._branch.at_rest(self._peak) and bool(np.any(self._points.unresisted(values, rate).driven))
+            self._lose(self.factor, "the path leads away from the wanted factor for ever")
 
     # -- jumps
 
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
         factor = self.factor
-        self._watcher.jumps(factor)
         heading, held = (1 if aim > factor else -1), self._is_held(factor)
-        landing = jump_from(self._problem, self._branch, heading, held=held, step=self._watcher.step)
+        landing = jump_from(self._problem, self._branch, heading, held=held, step=self._check)
         if landing is not None and landing.z is not None:
             yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
             return
-        self._end_jump(escapes=landing is not None)
+        if landing is None:
+            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
+        else:
+            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
         yield replace(self._last, event=Event.END, place=None, released=0.0, bifurcation=False)
 
     def _goes_on(self, landed: PathState) -> Iterator[PathState]:
@@ -301,7 +371,6 @@ class Follower(LoadHistory):
 
     # -- reports
 
-    @override
     def _state(
         self,
         event: Event,
@@ -310,6 +379,7 @@ class Follower(LoadHistory):
         *,
         bifurcation: bool = False,
     ) -> PathState:
+        """The present state."""
         stored = self._balance.stored
         self._last = PathState(
             factor=self.factor,

@@ -3,31 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .follower import Follower
-from .state import End, Follow, PathOptions, PathState, Watch
-from .substitutions import without_fixed
-from .thresholds import DEFAULT, FollowingThresholds
+from .state import End, Follow, PathOptions, PathState
 from .vertex_laws import is_straight
-
-
-@dataclass(frozen=True, kw_only=True)
-class Loaded:
-    """An equilibrium under a part of the load.
-
-    Attributes:
-        x: the unknowns, (n,).
-        factor: of the load.
-    """
-
-    x: Array
-    factor: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,53 +25,48 @@ class FullLoad:
 
     x: Array | None
     reason: str
-    borne: Loaded | None = None
+    borne: PathState | None = None
+
+
+_Follow = Callable[[Follow], "tuple[Follower, list[PathState]]"]
 
 
 def at_full_load(
-    problem: CondensedProblem, most_events: int, watch: Watch | None = None, thresholds: FollowingThresholds = DEFAULT
+    problem: CondensedProblem, options: PathOptions, interrupted: Callable[[], bool] = lambda: False
 ) -> FullLoad | None:
     """The equilibrium to which a path leads. None where this says nothing: the path is lost, or does not begin.
 
     Args:
         problem: the problem; its factor scales all loads.
-        most_events: events at most, of each path.
-        watch: whether to stop.
-        thresholds: the numbers that tune how it is followed.
+        options: how many events at most each path may have, and what tunes it.
+        interrupted: whether to stop.
     """
-    fewer, kept = without_fixed(problem)
-    options = PathOptions(most_events=most_events, thresholds=thresholds)
-    found = (_event_by_event if is_straight(fewer) else _along_the_curve)(fewer, options, watch)
-    if found is None:
-        return None
 
-    def whole(x: Array) -> Array:
-        values = np.where(np.isfinite(problem.lower), problem.lower, 0.0)
-        values[kept] = x
-        return values
+    def followed(follow: Follow) -> tuple[Follower, list[PathState]]:
+        follower = Follower(problem, replace(options, follow=follow), interrupted=interrupted)
+        return follower, list(follower.states())
 
-    borne = None if found.borne is None else replace(found.borne, x=whole(found.borne.x))
-    return replace(found, x=None if found.x is None else whole(found.x), borne=borne)
+    return (_event_by_event if is_straight(problem) else _along_the_curve)(followed)
 
 
-def _event_by_event(problem: CondensedProblem, options: PathOptions, watch: Watch | None) -> FullLoad | None:
+def _event_by_event(followed: _Follow) -> FullLoad | None:
     """Where piecewise linear laws lead: as stable as it goes, or else along the whole curve of equilibria.
 
     Where a body comes off on the way, the curve is followed on, through the limit point, since its factor may rise to 1
     again.
     """
-    follower, states = _followed(problem, Follow.STABLE, options, watch)
+    follower, states = followed(Follow.STABLE)
     if follower.end is End.ESCAPES and _begins(states):
         ended = FullLoad(x=None, reason=follower.reason, borne=_largest(states))
-        follower, states = _followed(problem, Follow.EXACT, options, watch)
+        follower, states = followed(Follow.EXACT)
         if follower.end not in (End.REACHED, End.INTERRUPTED):
             return ended
     return _reached(follower, states)
 
 
-def _along_the_curve(problem: CondensedProblem, options: PathOptions, watch: Watch | None) -> FullLoad | None:
+def _along_the_curve(followed: _Follow) -> FullLoad | None:
     """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
-    follower, states = _followed(problem, Follow.EXACT, options, watch)
+    follower, states = followed(Follow.EXACT)
     if (follower.end is End.ESCAPES or follower.is_closed) and _begins(states):
         largest, stable = _largest(states), list(itertools.takewhile(lambda state: state.stable, states))
         first = len(stable) == len(states) or states[len(stable)].factor == largest.factor
@@ -106,21 +84,12 @@ def _begins(states: Sequence[PathState]) -> bool:
     return 0.0 < max((state.factor for state in states), default=0.0) <= 1.0
 
 
-def _largest(states: Sequence[PathState]) -> Loaded:
+def _largest(states: Sequence[PathState]) -> PathState:
     """The state of the largest factor."""
-    state = max(states, key=lambda one: one.factor)
-    return Loaded(x=state.x, factor=state.factor)
+    return max(states, key=lambda one: one.factor)
 
 
 def _reached(follower: Follower, states: Sequence[PathState]) -> FullLoad | None:
     if follower.end is not End.REACHED or not states:
         return None
     return FullLoad(x=states[-1].x, reason="the whole load is reached")
-
-
-def _followed(
-    problem: CondensedProblem, follow: Follow, options: PathOptions, watch: Watch | None
-) -> tuple[Follower, list[PathState]]:
-    """The follower at the end of its path, and the states."""
-    follower = Follower(problem, replace(options, follow=follow), watch=watch)
-    return follower, list(follower.states())

@@ -5,6 +5,7 @@ Where nothing holds a body at rest, a small part of the loads takes it to where 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -17,7 +18,6 @@ from .branching import branch_from
 from .motion import Relaxation
 from .relations import ContactPoints
 from .segments import Kind, Segment
-from .state import Watch
 from .thresholds import FollowingThresholds
 
 
@@ -76,7 +76,7 @@ def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int,
 
 
 def settled(
-    problem: CondensedProblem, points: ContactPoints, z: Array, towards: float, watch: Watch, *, held: bool
+    problem: CondensedProblem, points: ContactPoints, z: Array, towards: float, step: Callable[[], None], *, held: bool
 ) -> Array | Nowhere:
     """The coordinates at the factor 0, (n,), or why there are none.
 
@@ -87,21 +87,20 @@ def settled(
         points: where they are at rest; after it, where they are then.
         z: their coordinates at rest, (n,).
         towards: the factor of which a small part acts.
-        watch: whether to stop, and who is told of the motion.
+        step: called before each step; it may raise an error to end the motion.
         held: whether there is an equilibrium at this factor, so that no way leads off.
     """
     limits = points.thresholds
     first = limits.small * towards
-    watch.jumps(first)
-    motion = Relaxation(problem, points, z, problem.load(first), held=held, step=watch.step)
+    motion = Relaxation(problem, points, z, problem.load(first), held=held, step=step)
     if not motion.run(np.zeros(len(points))) or motion.escapes:
         return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
     heading, most = -int(np.sign(first)), limits.many + limits.waits * len(points)
     try:
         branch = branch_from(points, problem.force, problem.force_rate, motion.z, first, heading=heading)
-        branch.set_out(heading, watch.step)
+        branch.set_out(heading, step)
         none = no_load(problem, branch.values.x, first, limits)
-        for move in advancing(branch, -heading * none, watch.step, most):
+        for move in advancing(branch, -heading * none, step, most):
             if move.outcome is Outcome.FACTOR:
                 return branch.balanced(0.0)
             if move.outcome in (Outcome.AWAY, Outcome.STUCK):

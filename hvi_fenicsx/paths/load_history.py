@@ -1,26 +1,20 @@
-"""A history of load factors, gone to one after the other, and why a path ends on its way: cycles are detected."""
+"""Where a path is in its history of load factors, and why it ends on its way: cycles are detected."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
 from enum import Enum
 
 import numpy as np
 
-from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
-from .state import End, Event, PathOptions, PathState, Stopped, Watch
+from .state import End, PathOptions, PathState
 
 
-class LoadHistory(ABC):
-    """Goes through a history of load factors.
+class LoadHistory:
+    """A history of load factors that are gone to one after the other, and the end of a path through it.
 
     Args:
-        problem: the problem.
         options: what path is wanted.
-        resume: the state after which to go on; by default the path begins at factor 0.
-        watch: whether to stop, asked at each state and within jumps, and who is told of these.
 
     Attributes:
         end: how the path ended; None before.
@@ -28,62 +22,10 @@ class LoadHistory(ABC):
         is_closed: whether it is lost because its equilibria form a closed curve, which it has gone round.
     """
 
-    def __init__(
-        self,
-        problem: CondensedProblem,
-        options: PathOptions,
-        resume: PathState | None = None,
-        watch: Watch | None = None,
-    ) -> None:
-        self._problem, self._options = problem, options
-        self._resume, self._watcher = resume, watch or Watch()
-        self._leg, self._events, self._peak = 0, 0, 0.0
-        self._floats = len(problem.elastic.rigid) > 0
-        self._adrift = False
+    def __init__(self, options: PathOptions) -> None:
+        self._options, self._leg = options, 0
         self.end: End | None = None
         self.reason, self.is_closed = "", False
-
-    def states(self) -> Iterator[PathState]:
-        """The states from start to end; the first one of a path that is resumed is the next one."""
-        try:
-            yield from self._all_states()
-        except Stopped:
-            self._finish(End.INTERRUPTED, "interrupted")
-        except np.linalg.LinAlgError:
-            self._finish(End.LOST, "after the last state the equations of the path are singular")
-
-    def _all_states(self) -> Iterator[PathState]:
-        if self._resume is None:
-            yield from self._first_states()
-        else:
-            self._restore(self._resume)
-            self._peak = max(map(abs, self._options.programme[: self._leg]), default=0.0)
-            self._adrift = self._resume.event not in (Event.START, Event.JUMP) and self._is_adrift()
-        programme = self._options.programme
-        while self.end is None and self._leg < len(programme):
-            yield from self._gone_to(programme[self._leg])
-            self._leg += 1
-            if self.end is None:
-                yield self._after_leg(programme)
-        if self.end is None:  # resumed from its last state
-            self._finish(End.REACHED, "the programme is done")
-
-    def _first_states(self) -> Iterator[PathState]:
-        """The first state; none where its factor is not borne."""
-        low, high = self._options.borne
-        if low <= self._small and high >= -self._small:
-            yield from self._begun()
-        else:
-            self._finish(End.ESCAPES, "no equilibrium bears the constant loads alone: a body comes off")
-
-    def _gone_to(self, aim: float) -> Iterator[PathState]:
-        """A leg; none where no factor on it is borne."""
-        limit, way = self._limit(self.factor), 1.0 if aim >= self.factor else -1.0
-        if way * (aim - limit) > 0.0 and way * (self.factor - limit) >= -self._small:
-            self._finish(End.ESCAPES, self._not_borne(limit))
-            yield self._state(Event.END)
-        else:
-            yield from self._towards(aim)
 
     @property
     def _small(self) -> float:
@@ -102,58 +44,10 @@ class LoadHistory(ABC):
         shown = 0.0 if abs(limit) <= self._small else limit
         return f"no factor {side} {shown:.6g} is borne by any equilibrium: a body comes off"
 
-    def _after_leg(self, programme: Sequence[float]) -> PathState:
-        if self._leg < len(programme):
-            return self._state(Event.TURN)
-        self._finish(End.REACHED, "the programme is done")
-        return self._state(Event.END)
-
-    @property
-    @abstractmethod
-    def factor(self) -> float:
-        """λ."""
-
-    @abstractmethod
-    def _begun(self) -> Iterator[PathState]:
-        """The first state; none where the path ends before."""
-
-    @abstractmethod
-    def _restore(self, state: PathState) -> None:
-        """Go on after a state."""
-
-    @abstractmethod
-    def _towards(self, aim: float) -> Iterator[PathState]:
-        """From event to event until the factor reaches its aim or the path ends."""
-
-    @abstractmethod
-    def _state(self, event: Event) -> PathState:
-        """The present state."""
-
-    @abstractmethod
-    def _is_off(self) -> bool:
-        """Whether no load, law or bound acts any more, and nothing would resist the next load."""
-
-    def _is_adrift(self) -> bool:
-        """Whether the load is back at zero and the body free; where any load is borne, the next one takes it up."""
-        return self._floats and self._peak > 0.0 and self._is_off()
-
-    def _watch(self) -> None:
-        """Count an event; end the path where it has a reason to."""
-        self._events += 1
-        self._peak = max(self._peak, abs(self.factor))
-        self._adrift = self._is_adrift()
-        if self._adrift and not self._is_held(self.factor):
-            self._finish(End.ESCAPES, "the load is back at zero, and nothing holds the body any more")
-        elif self._watcher.interrupted():
-            self._finish(End.INTERRUPTED, "interrupted")
-        elif self._events > self._options.most_events:
-            self._lose(self.factor, f"no end after {self._options.most_events} events")
-
-    def _go_round(self, found: Cycle) -> None:
+    def _go_round(self, factor: float, found: Cycle) -> None:
         """End where the path has come back to where it was."""
         self.is_closed = found is Cycle.CLOSED
-        where = f"at the factor {self.factor:.6g} the path comes back to where it was"
-        self._lose(self.factor, f"{where}: {found.value}")
+        self._lose(factor, f"at the factor {factor:.6g} the path comes back to where it was: {found.value}")
 
     def _finish(self, end: End, reason: str) -> None:
         self.end, self.reason = end, reason
@@ -163,30 +57,12 @@ class LoadHistory(ABC):
         low, high = self._options.held
         return low + self._small < factor < high - self._small
 
-    def _end_before(self, reason: str, *, escapes: bool) -> None:
-        """End before the first state."""
-        (self._come_off if escapes else self._lose)(0.0, reason)
-
     def _come_off(self, factor: float, reason: str) -> None:
         """End where the way that was tried leads off; that proves nothing where the body is held."""
         if self._is_held(factor):
             self._finish(End.LOST, f"{reason}, on the way that was tried; the body is held there, so the path is lost")
         else:
             self._finish(End.ESCAPES, reason)
-
-    def _end_for_ever(self, *, stands: bool) -> None:
-        """End where nothing ends the curve: where the factor stands, a body comes off."""
-        if stands:
-            self._come_off(self.factor, f"at the factor {self.factor:.6g} a body comes off")
-        else:
-            self._lose(self.factor, "the path leads away from the wanted factor for ever")
-
-    def _end_jump(self, *, escapes: bool) -> None:
-        """End in a jump that leads to no equilibrium."""
-        if escapes:
-            self._come_off(self.factor, f"at the factor {self.factor:.6g} no equilibrium is left: a body comes off")
-        else:
-            self._lose(self.factor, f"no stable equilibrium found at the factor {self.factor:.6g}")
 
     def _lose(self, factor: float, reason: str) -> None:
         """End without an answer; where no factor beyond is borne, that is one."""

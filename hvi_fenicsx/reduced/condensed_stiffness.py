@@ -12,6 +12,8 @@ S is an array (:class:`DenseStiffness`), or known by factorisations of the whole
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -281,6 +283,52 @@ class DenseInverse(CellInverse):
     @override
     def is_long(self) -> bool:
         return False
+
+
+class ProductInverse(CellInverse):
+    """An inverse that is known by what it does, and the columns that were exchanged since.
+
+    Args:
+        first: what all variables were for a right-hand side before.
+        most: columns to exchange before it is long.
+    """
+
+    def __init__(self, first: Callable[[Array], Array], most: int) -> None:
+        self._first, self._most = first, most
+        self._changes: tuple[Callable[[Array], None], ...] = ()
+
+    @override
+    def solve(self, right: Array) -> Array:
+        found = self._first(right)
+        for change in self._changes:
+            change(found)
+        return found
+
+    @override
+    def exchange(self, values: Array, place: int) -> None:
+        spread, pivot = values.copy(), float(values[place])
+        spread[place] -= 1.0
+
+        def change(found: Array) -> None:
+            found -= (found[place] / pivot) * spread
+
+        self._changes = (*self._changes, change)
+
+    @override
+    def swap(self, one: int, other: int) -> None:
+        def change(found: Array) -> None:
+            found[[one, other]] = found[[other, one]]
+
+        self._changes = (*self._changes, change)
+
+    @override
+    def copy(self) -> Self:
+        return copy(self)  # the changes are never changed
+
+    @property
+    @override
+    def is_long(self) -> bool:
+        return len(self._changes) > self._most
 
 
 ZERO = 1e-11

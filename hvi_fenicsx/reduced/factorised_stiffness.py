@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable
 from copy import copy
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -25,7 +25,7 @@ from ..system.interior import Interior
 from ..system.petsc_options import CHOLESKY
 from ..system.system import System
 from ..typing import Array, Mask
-from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
+from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness, ProductInverse
 
 _T = TypeVar("_T")
 _KNOWN = 8
@@ -92,9 +92,7 @@ class FactorisedStiffness(CondensedStiffness):
 
     @override
     def inverse(self, columns: CellColumns) -> CellInverse:
-        return ProductInverse(
-            self.factorised(_moving(columns), columns.slope), columns, self._system.thresholds.exchanges
-        )
+        return _inverse(self.factorised(_moving(columns), columns.slope), columns, self._system.thresholds.exchanges)
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
@@ -202,70 +200,21 @@ _INDEFINITE = {**CHOLESKY, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_24": 1}
 """Options of the factorisation: the pivots of the last block are counted too, and those that are zero are found."""
 
 
-class ProductInverse(CellInverse):
-    """A factorised cell, and the columns that were exchanged since.
-
-    Args:
-        cell: the cell; the unknown in whose place is the factor stands in it.
-        columns: what the equations are.
-        most: columns to exchange before it is long.
-
-    Raises:
-        numpy.linalg.LinAlgError: they are singular.
-    """
-
-    def __init__(self, cell: FactorisedCell, columns: CellColumns, most: int) -> None:
-        self._cell, self._most = cell, most
-        if cell.is_singular:
-            raise np.linalg.LinAlgError("the tangent is singular")
-        self._signs = np.where(_moving(columns), 1.0, columns.rise)
-        self._changes: tuple[_Change, ...] = ()
-        driver = columns.driver
-        if driver is not None:
-            self._signs[driver] = 1.0
-            values = self.solve(columns.factor)
-            if not values[driver] or not np.all(np.isfinite(values)):
-                raise np.linalg.LinAlgError("the tangent is singular")
-            self.exchange(values, driver)
-
-    @override
-    def solve(self, right: Array) -> Array:
-        found = self._signs * self._cell.solve(right)
-        for change in self._changes:
-            change(found)
-        return found
-
-    @override
-    def exchange(self, values: Array, place: int) -> None:
-        spread, pivot = values.copy(), float(values[place])
-        spread[place] -= 1.0
-
-        def change(found: Array) -> None:
-            found -= (found[place] / pivot) * spread
-
-        self._changes = (*self._changes, change)
-
-    @override
-    def swap(self, one: int, other: int) -> None:
-        def change(found: Array) -> None:
-            found[[one, other]] = found[[other, one]]
-
-        self._changes = (*self._changes, change)
-
-    @override
-    def copy(self) -> Self:
-        found = object.__new__(type(self))
-        found._cell, found._most, found._signs = self._cell, self._most, self._signs
-        found._changes = self._changes
-        return found
-
-    @property
-    @override
-    def is_long(self) -> bool:
-        return len(self._changes) > self._most
-
-
-_Change = Callable[[Array], None]
+def _inverse(cell: FactorisedCell, columns: CellColumns, most: int) -> CellInverse:
+    """The inverse of a cell's equations; the unknown in whose place is the factor stands in the cell."""
+    singular, driver = np.linalg.LinAlgError("the tangent is singular"), columns.driver
+    if cell.is_singular:
+        raise singular
+    signs = np.where(_moving(columns), 1.0, columns.rise)
+    if driver is not None:
+        signs[driver] = 1.0
+    found = ProductInverse(lambda right: signs * cell.solve(right), most)
+    if driver is not None:
+        values = found.solve(columns.factor)
+        if not values[driver] or not np.all(np.isfinite(values)):
+            raise singular
+        found.exchange(values, driver)
+    return found
 
 
 def _moving(columns: CellColumns) -> Mask:

@@ -18,7 +18,7 @@ from ..errors import InputError, SolverError
 from ..laws import Superpotential
 from ..laws.smoothing.base import SmoothedLaw
 from ..paths.full_load import FullLoad, at_full_load
-from ..paths.state import Watch
+from ..paths.state import PathOptions
 from ..paths.vertex_laws import is_straight
 from ..reduced.condensation import Condensation
 from ..reduced.condensed_problem import CondensedProblem
@@ -116,7 +116,8 @@ def _on_first_rank(
 
     def followed(ask: Callable[[], bool]) -> FullLoad | None:
         with suppress(np.linalg.LinAlgError, InputError):  # some edges in space have no path
-            return at_full_load(problem, thresholds.most_events, Watch(ask), thresholds.following)
+            options = PathOptions(most_events=thresholds.most_events, thresholds=thresholds.following)
+            return at_full_load(problem, options, ask)
         return None
 
     return on_root_asking(system.comm, followed, interrupted)

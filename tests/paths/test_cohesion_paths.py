@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from condensed import bonds, chain, graph, problem
-from test_curved_paths import events, folds, largest_distance, path, peak
+from test_curved_paths import FINER, events, folds, largest_distance, path, peak
 from test_exact_paths import largest_imbalance
 
 from hvi_fenicsx.effects import Direction
@@ -163,7 +163,7 @@ def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential, mixity: Mix
     given = replace(given, bonds=(replace(given.bonds[0], mixity=mixity),))
     options: dict[str, Any] = {"programme": (3.0,), "follow": Follow.EXACT, "remember": (0,)}
     _, states = path(given, **options)
-    _, finer = path(given, **options, fineness=0.1)
+    _, finer = path(given, **options, thresholds=FINER)
     assert events(finer) == events(states)
     assert folds(finer) == pytest.approx(folds(states), rel=1e-8)
     assert states[-1].x == pytest.approx(finer[-1].x, abs=1e-8)

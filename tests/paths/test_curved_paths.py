@@ -31,13 +31,14 @@ from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]
 DROP = [(0, 0), (1, 1), (1, 0.4)]
+FINER = FollowingThresholds(reach=0.025)
 SMOOTHED = create("quadratic", graph(DROP), epsilon=1e-2)
 
 
 def path(
-    given: CondensedProblem, resume: PathState | None = None, fineness: float = 1.0, **options: Any
+    given: CondensedProblem, resume: PathState | None = None, **options: Any
 ) -> tuple[CurvedFollower, list[PathState]]:
-    follower = CurvedFollower(given, PathOptions(fineness=fineness, **options), resume)
+    follower = CurvedFollower(given, PathOptions(**options), resume)
     return follower, list(follower.states())
 
 
@@ -329,7 +330,9 @@ def test_a_closed_curve_is_gone_round_once() -> None:
     np.testing.assert_allclose([s.factor for s in states], [s.factor for s in wanted], atol=1e-9)
 
     smoothed = tuple(replace(b, law=create("chks", b.law, epsilon=1e-4)) for b in given.bonds)
-    found = at_full_load(replace(given, force_rate=5.0 * given.force_rate, bonds=smoothed), 1000)
+    found = at_full_load(
+        replace(given, force_rate=5.0 * given.force_rate, bonds=smoothed), PathOptions(most_events=1000)
+    )
     assert found is not None
     assert found.x is None
     assert "form a closed curve" in found.reason
@@ -616,7 +619,7 @@ def test_loading_and_unloading_in_the_plane_with_memory(law: Superpotential) -> 
 def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential) -> None:
     given = oblique(law)
     _, states = path(given, programme=(1.5,), follow=Follow.EXACT)
-    _, finer = path(given, programme=(1.5,), follow=Follow.EXACT, fineness=0.1)
+    _, finer = path(given, programme=(1.5,), follow=Follow.EXACT, thresholds=FINER)
     assert len(finer) >= len(states)
     assert events(finer) == events(states)
     for one, other in zip(folds(states), folds(finer), strict=True):

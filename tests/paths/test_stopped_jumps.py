@@ -1,4 +1,4 @@
-"""Jumps that are asked to stop: the path ends with the state before, and goes on there; what they tell on their way."""
+"""Jumps that are asked to stop: the path ends with the state before, and goes on there."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ from test_curved_paths import DROP, line
 from test_exact_paths import bar, spring
 
 from hvi_fenicsx.paths.follower import Follower
-from hvi_fenicsx.paths.state import End, Event, PathOptions, Watch
+from hvi_fenicsx.paths.state import End, Event, PathOptions
 
 
-class StopsInJump(Watch):
-    """Asks a path to stop at a step of its first jump."""
+class Asked:
+    """Asks a path to stop when it is asked whether to for the n-th time; by default never."""
 
-    def __init__(self, most: int) -> None:
-        super().__init__(lambda: self.taken == most)
-        self.taken = 0
+    def __init__(self, last: int = 0) -> None:
+        self.times, self.last = 0, last
 
-    def step(self) -> None:
-        self.taken += 1
-        super().step()
+    def __call__(self) -> bool:
+        self.times += 1
+        return self.times == self.last
 
 
 SCENES = {"spring": (spring(), 3.0), "drops": (line(graph(DROP), 4), 9.0), "bar that comes off": (bar(50.0, 12), 1e3)}
@@ -35,9 +34,10 @@ SCENES = {"spring": (spring(), 3.0), "drops": (line(graph(DROP), 4), 9.0), "bar 
 def test_a_jump_that_is_stopped_leaves_the_state_before_it(kind: Any, most: int, name: str) -> None:
     given, aim = SCENES[name]
     options = PathOptions(programme=(aim,))
-    whole = list(kind(given, options).states())
+    asked = Asked()
+    whole, times = zip(*((state, asked.times) for state in kind(given, options, None, asked).states()), strict=True)
     first = next(number for number, state in enumerate(whole) if state.event in (Event.JUMP, Event.END))
-    follower = kind(given, options, watch=StopsInJump(most))
+    follower = kind(given, options, None, Asked(times[first - 1] + 1 + most))
     states = list(follower.states())
     assert follower.end is End.INTERRUPTED
     assert [s.factor for s in states] == [s.factor for s in whole[:first]]
@@ -50,19 +50,8 @@ def test_a_jump_that_is_stopped_leaves_the_state_before_it(kind: Any, most: int,
 def test_a_path_is_stopped_before_the_first_site_passes() -> None:
     """Many points of a large body pass one after the other where it sets out, each with a tangent of its own."""
     asked = []
-    follower = CurvedFollower(line(graph(DROP), 4), PathOptions(), watch=Watch(lambda: not asked.append(1)))
+    follower = CurvedFollower(line(graph(DROP), 4), PathOptions(), None, lambda: not asked.append(1))
     assert [s.event for s in follower.states()] == [Event.START]
     assert follower.end is End.INTERRUPTED
     assert len(asked) == 1
     assert follower.factor == 0.0
-
-
-@pytest.mark.parametrize("kind", [Follower, CurvedFollower])
-def test_a_jump_tells_its_factor_and_its_steps(kind: Any) -> None:
-    """At the factor 2, by hand; each step is told where no time must pass between two of them."""
-    told: list[tuple[float, int]] = []
-    watch = Watch(jumping=lambda factor, steps: told.append((factor, steps)), seconds=0.0)
-    list(kind(spring(), PathOptions(programme=(3.0,)), watch=watch).states())
-    assert [factor for factor, _ in told] == pytest.approx([2.0] * len(told))
-    assert [steps for _, steps in told] == list(range(1, len(told) + 1))
-    assert told
