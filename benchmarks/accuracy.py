@@ -23,7 +23,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx import Model, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
@@ -112,12 +112,12 @@ def measured(name: str, quantity: str, requested: float, largest: int) -> Row:
     )
 
 
-def exact(scene: Scene) -> Scene:
+def exact(scene: Model) -> Model:
     """The scene for the reference: the unsmoothed law, a tight tolerance."""
     return scene.with_solver(smoothing=None, epsilon=None, epsilon_absolute=None, tolerance=1e-8)
 
 
-def true_error(reached: AccuracyResult, scene: Scene, requested: float, largest: int) -> tuple[float | None, float]:
+def true_error(reached: AccuracyResult, scene: Model, requested: float, largest: int) -> tuple[float | None, float]:
     """The relative error, and the reference's own estimated one (energy norm)."""
     level, quantity = reached.level, reached.goal.quantity
     field = reader(quantity)(level)

@@ -15,7 +15,7 @@ from typing import Any
 
 import common
 
-from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx import Model, read_scene, read_tables
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.reduced.condensation import Condensation
@@ -34,7 +34,7 @@ FAMILIES: dict[str, tuple[dict[str, Any] | None, dict[str, Any]]] = {
 """The law of a floor, or None for the support; and how it is smoothed."""
 
 
-def scene_of(family: str, cells: int) -> Scene:
+def scene_of(family: str, cells: int) -> Model:
     """The scene of a family."""
     law, solver = FAMILIES[family]
     demo, size = ("jureczka_ochal.toml", [cells, cells // 2]) if law is None else ("strong_law.toml", [cells, cells])
@@ -43,10 +43,10 @@ def scene_of(family: str, cells: int) -> Scene:
         table["boundary"]["pull"]["traction"] = [6e6, 0.0]
         table["boundary"]["floor"]["friction"] = law
     table["solver"] |= solver
-    return Scene.model_validate(table)
+    return read_tables(table)
 
 
-def searched(scene: Scene, limit: float) -> tuple[Enumeration, bool, float]:
+def searched(scene: Model, limit: float) -> tuple[Enumeration, bool, float]:
     """The search, whether it came to its end with all cells decided, and its processor time, s."""
     problem = Condensation(prepare(scene).system).problem
     began = time.process_time()

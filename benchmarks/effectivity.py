@@ -21,7 +21,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx import Model, read_scene, read_tables
 from hvi_fenicsx.certify.certificate import examine
 from hvi_fenicsx.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.mesh import nodes, refinement
@@ -53,7 +53,7 @@ class Step:
         return self.solved.result.u
 
 
-def steps(scene: Scene, count: int) -> list[Step]:
+def steps(scene: Model, count: int) -> list[Step]:
     """A scene on its own mesh and on uniform refinements of it. Collective."""
     prepared, control = prepare(scene), RunControl(timer=Timer())
     model, options, verdict = prepared.model, prepared.options, prepared.solvability
@@ -125,21 +125,21 @@ class Row:
         return self.estimate.total / self.true
 
 
-def rows(scene: Scene, levels: int, extra: int = 2) -> list[Row]:
+def rows(scene: Model, levels: int, extra: int = 2) -> list[Row]:
     """Estimates on refined meshes against the unsmoothed solution ``extra`` refinements further up. Collective."""
     exact = steps(_exact(scene), levels + extra)
     found = exact if scene.solver.smoothing is None else steps(scene, levels)
     return [_row(step, exact[k + 1 :], scene) for k, step in enumerate(found[:levels])]
 
 
-def _row(step: Step, finer: Sequence[Step], scene: Scene) -> Row:
+def _row(step: Step, finer: Sequence[Step], scene: Model) -> Row:
     problem, u = step.system.problem, step.u
     examination = examine(problem, u, scene.solver.tolerance)
     found = estimate(step.system, step.solved.levels, u, examination)
     return Row(step.system.dofs, distance(step, finer), found, examination.certificate.passed)
 
 
-def _exact(scene: Scene) -> Scene:
+def _exact(scene: Model) -> Model:
     return scene.with_solver(smoothing=None, epsilon=None, epsilon_absolute=None)
 
 
@@ -216,7 +216,7 @@ def square(
 DEEP_DROP = {"law": "graph", "points": [[0, 0], [9e-6, 3e6], [9e-6, 2e5]]}
 
 
-def _demo(name: str, *overrides: str) -> Scene:
+def _demo(name: str, *overrides: str) -> Model:
     return read_scene(DEMOS / f"{name}.toml", overrides)
 
 
@@ -227,7 +227,7 @@ _WIDER = [
 ]
 
 
-def scenes() -> dict[str, Scene]:
+def scenes() -> dict[str, Model]:
     """By name; meshes are the coarsest of their mesh hierarchies."""
     plane = "domain.cells=[8, 8]"
     return {
@@ -240,23 +240,23 @@ def scenes() -> dict[str, Scene]:
         "peeling": _demo("peeling", "domain.cells=[75, 3]"),
         "hertz": _demo("hertz", "domain.mesh_size=0.02", "domain.mesh_size_below=2e-3"),
         "thermal_bar": _demo("thermal_bar"),
-        "L-shape": Scene.model_validate(l_shape()),
+        "L-shape": read_tables(l_shape()),
         "two_cylinders": _demo("two_cylinders", *_WIDER),
         "single_lap": _demo("single_lap", "domain.lower.cells=[50, 2]", "domain.upper.cells=[64, 2]"),
-        "rubber, ν = 0.499": Scene.model_validate(rubber()),
-        "rubber, ν = 0.4999": Scene.model_validate(rubber(0.4999)),
-        "deep drop": Scene.model_validate(square(16, pull=6e6, friction=DEEP_DROP)),
-        "gap 2e-6 sin(25 x)": Scene.model_validate(square(4, gap="2e-6*sin(25*x)")),
-        "traction 1 + 2 sin(40 x)": Scene.model_validate(square(4, press="-1e6*(1 + 2*sin(40*x))")),
-        "traction cos(90 x), flat cells": Scene.model_validate(waves([4, 16], 90)),
-        "traction cos(90 x), tall cells": Scene.model_validate(waves([8, 2], 90)),
+        "rubber, ν = 0.499": read_tables(rubber()),
+        "rubber, ν = 0.4999": read_tables(rubber(0.4999)),
+        "deep drop": read_tables(square(16, pull=6e6, friction=DEEP_DROP)),
+        "gap 2e-6 sin(25 x)": read_tables(square(4, gap="2e-6*sin(25*x)")),
+        "traction 1 + 2 sin(40 x)": read_tables(square(4, press="-1e6*(1 + 2*sin(40*x))")),
+        "traction cos(90 x), flat cells": read_tables(waves([4, 16], 90)),
+        "traction cos(90 x), tall cells": read_tables(waves([8, 2], 90)),
         "block_3d": _demo("block_3d", "domain.cells=[4, 4, 4]"),
         "anchor_3d": _demo("anchor_3d", "domain.cells=[4, 4, 2]"),
-        "glued plate 3D": Scene.model_validate(glued_plate()),
+        "glued plate 3D": read_tables(glued_plate()),
     }
 
 
-def _affordable(scene: Scene) -> int:
+def _affordable(scene: Model) -> int:
     """How many levels fit beside their reference, which is two refinements finer."""
     cells, degree = math.prod(getattr(scene.domain, "cells", [1])), scene.solver.degree or 1
     return 5 - degree if scene.dimension == 2 else (3 if cells < 32 else 2 if cells * degree < 100 else 1)

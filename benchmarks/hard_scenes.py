@@ -12,7 +12,7 @@ from covering import Case
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import Scene, workflow
+from hvi_fenicsx import Model, read_tables, workflow
 from hvi_fenicsx.mesh import domain
 
 Array = npt.NDArray[np.float64]
@@ -80,12 +80,12 @@ class Frame:
         return self.case["margin"] * (1.0 if self.case["side"] == "under" else -1.0)
 
 
-def scene(case: Case, data: Mapping[str, Any], method: str) -> Scene:
+def scene(case: Case, data: Mapping[str, Any], method: str) -> Model:
     """The scene of a case."""
     f = Frame.of(case, data)
     model, nu = case["material"].split()
     material = {"model": "three_dimensional" if f.in_space else model, "youngs_modulus": f.modulus}
-    return Scene.model_validate(
+    return read_tables(
         {
             "title": f"hard case {case.key}",
             "domain": _domain(f),

@@ -12,12 +12,12 @@ import argparse
 
 from effectivity import lines, rows
 
-from hvi_fenicsx import Scene
+from hvi_fenicsx import Model, read_tables
 
 
-def blocks(lower: list[int], upper: list[int]) -> Scene:
+def blocks(lower: list[int], upper: list[int]) -> Model:
     """A block glued to another one, pressed askew and pushed."""
-    return Scene.model_validate(
+    return read_tables(
         {
             "domain": {
                 "lower": {"shape": "rectangle", "size": [1.0, 0.5], "cells": lower},

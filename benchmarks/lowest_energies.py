@@ -161,20 +161,20 @@ def with_lengths(largest: int) -> Iterator[tuple[str, int, Table]]:
         yield f"glued {cells}", cells + 1, glued([1.0, 0.5], [cells, max(cells // 2, 1)], "plane_strain")
 
 
-def scenes(largest: int) -> Iterator[tuple[str, int, hvi.Scene]]:
+def scenes(largest: int) -> Iterator[tuple[str, int, hvi.Model]]:
     """Name, vertices of Γc and scene."""
     for cells in (n for n in SIZES if n < largest):
         for name, family in FAMILIES.items():
-            yield f"{name} {cells}", cells + 1, hvi.Scene.model_validate(square(cells, *family))
+            yield f"{name} {cells}", cells + 1, hvi.read_tables(square(cells, *family))
     for cells in (n for n in (16, 32, 64) if n < largest):
         yield f"jureczka_ochal {cells}", cells + 1, hvi.read_scene(DEMO, [f"domain.cells=[{cells},{cells // 2}]"])
     for pull in (20, 21, 22, 23, 25, 26, 26.2, 27):
-        yield f"composite {pull}", 33, hvi.Scene.model_validate(composite(1e6 * pull))
+        yield f"composite {pull}", 33, hvi.read_tables(composite(1e6 * pull))
     for name, vertices, table in with_lengths(largest):
-        yield name, vertices, hvi.Scene.model_validate(table)
+        yield name, vertices, hvi.read_tables(table)
 
 
-def measured(name: str, vertices: int, scene: hvi.Scene, limit: float) -> Table:
+def measured(name: str, vertices: int, scene: hvi.Model, limit: float) -> Table:
     """One search."""
     start = time.process_time()
     prepared = workflow.prepare(scene, MPI.COMM_SELF)

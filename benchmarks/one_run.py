@@ -22,7 +22,7 @@ from mpi4py import MPI
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.estimate.contact_errors import ratio
 from hvi_fenicsx.mesh.thresholds import Thresholds
-from hvi_fenicsx.model import Scene
+from hvi_fenicsx.model import Model
 from hvi_fenicsx.runtime import timing
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers import nested_iteration
@@ -44,7 +44,7 @@ KINDS = {"gamg": "gamg", "hypre": "gamg", "mumps": "lu", "mg": "mg"}
 Figures = dict[str, Any]
 
 
-def contact(scene: Scene) -> Figures:
+def contact(scene: Model) -> Figures:
     """From the scene to a certified solution."""
     timer = Timer()
     solution = finish(prepare(scene, COMM, timer))
@@ -63,7 +63,7 @@ def contact(scene: Scene) -> Figures:
     }
 
 
-def linear(scene: Scene, kind: str) -> Figures:
+def linear(scene: Model, kind: str) -> Figures:
     """The linear solve, to the scene's tolerance of the residual."""
     if kind == "hypre":
         petsc_options.insert(HYPRE)
@@ -76,14 +76,14 @@ def linear(scene: Scene, kind: str) -> Figures:
     return {**timer.report(), "linear": iterations, "dofs": system.dofs, "certified": True}
 
 
-def assembled(scene: Scene, timer: Timer) -> System:
+def assembled(scene: Model, timer: Timer) -> System:
     """The scene's system, on its mesh with its mesh hierarchy."""
     with timer("mesh"):
         domain = scene.domain.build_hierarchy(COMM, scene.dimension, Thresholds())
     return assemble(domain, scene.formulation(), timer)
 
 
-def plain(scene: Scene) -> Figures:
+def plain(scene: Model) -> Figures:
     """``vinewtonrsls`` with GAMG set on the SNES, from the start with contact closed, on the scene's laws."""
     from plain_snes import solve
 

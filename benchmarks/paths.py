@@ -40,14 +40,14 @@ HEAD = (
 )
 
 
-def scene(tables: dict[str, Any], name: str, changes: list[str]) -> hvi.Scene:
+def scene(tables: dict[str, Any], name: str, changes: list[str]) -> hvi.Model:
     """A scene of the list, or a demo."""
     if name not in tables:
         return hvi.read_scene(common.DEMOS / f"{name}.toml", changes)
     table = copy.deepcopy(tables[name])
     for change in changes:
         override(table, change)
-    return hvi.Scene.model_validate(table)
+    return hvi.read_tables(table)
 
 
 def imbalance(path: ModelPath) -> float:
@@ -72,7 +72,7 @@ def _largest(path: ModelPath, work: npt.NDArray[np.float64], potential: npt.NDAr
     return float(np.max(np.abs(left - left[0])) / max(np.max(np.abs(work)), np.ptp(stored), 1e-300))
 
 
-def followed(name: str, given: hvi.Scene) -> tuple[Any, ...]:
+def followed(name: str, given: hvi.Model) -> tuple[Any, ...]:
     """The row of one path."""
     start = time.process_time()
     path = hvi.follow(given)

@@ -44,7 +44,6 @@ _HOME = {
     "NewtonStep": "runtime.log",
     "Orthotropic": "effects",
     "Pressure": "effects",
-    "Scene": "model",
     "Solution": "api",
     "Superpotential": "laws",
     "Support": "effects",
@@ -56,6 +55,7 @@ _HOME = {
     "follow": "api",
     "prepare": "workflow",
     "read_scene": "model",
+    "read_tables": "model",
     "set_log_level": "runtime.log",
     "solve": "api",
     "study": "api",
@@ -84,7 +84,7 @@ if TYPE_CHECKING:
     )
     from .errors import InputError
     from .laws import Superpotential
-    from .model import Body, Model, Scene, dump_scene, read_scene
+    from .model import Body, Model, dump_scene, read_scene, read_tables
     from .model.energy import Energy
     from .runtime.log import NewtonStep, set_log_level
     from .runtime.versions import __version__

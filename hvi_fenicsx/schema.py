@@ -16,7 +16,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self, TypeVar, get_args
+from typing import Annotated, Any, NamedTuple, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -92,6 +92,19 @@ def shown(value: Any) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
+def plain(given: Any) -> Any:
+    """NumPy's numbers and arrays, however deep in lists and tables, as Python's; all else as it is.
+
+    Args:
+        given: what a program gave.
+    """
+    if hasattr(given, "tolist"):
+        return given.tolist()
+    if isinstance(given, list | tuple):
+        return [plain(one) for one in given]
+    return {key: plain(value) for key, value in given.items()} if isinstance(given, dict) else given
+
+
 def _plain(value: Any) -> str:
     try:
         return str(value)
@@ -115,35 +128,20 @@ def unknown(kind: str, name: Any, allowed: Iterable[str]) -> str:
     return f"unknown {kind} {shown(name)}; {hint}allowed: {', '.join(known) or 'none'}"
 
 
-def suggestion(error: ErrorDetails, model: type[BaseModel] | None) -> str | None:
-    """The key that was probably meant by an unknown one.
-
-    Args:
-        error: pydantic's, of the kind "extra_forbidden".
-        model: the table that was read.
-    """
-    return closest(str(error["loc"][-1]), _keys(model, error["loc"][:-1]))
-
-
-def message_of(error: ErrorDetails, model: type[BaseModel] | None, also: Iterable[str] = ()) -> str:
-    """The message on one finding: what is allowed and what is there, without pydantic's own terms.
-
-    Args:
-        error: pydantic's.
-        model: the table that was read, for its allowed keys.
-        also: keys that the table allows beside those of the model.
-    """
+def _message(error: ErrorDetails, table: type[BaseModel]) -> str:
+    """What is allowed and what is there, without pydantic's own terms."""
     kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
     if kind == "missing":
-        return "is missing" + _described(model, error["loc"])
+        known = descriptions(table).get(str(error["loc"][-1]))
+        return "is missing" + (f": {known}" if known else "")
     if kind == "extra_forbidden":
-        return unknown("key", str(error["loc"][-1]), [*_keys(model, error["loc"][:-1]), *also])
+        return unknown("key", str(error["loc"][-1]), table.model_fields)
     if kind == "literal_error":
         return _not_among(value, context.get("expected", ""))
     if kind == "value_error":
         return str(context["error"])
     if kind in _TEXTS:
-        return f"{_TEXTS[kind](context)} (is {shown(value)}){_mend(kind, value)}"
+        return f"{_TEXTS[kind].format(**context)} (is {shown(value)}){_mend(kind, value)}"
     return str(error["msg"])
 
 
@@ -153,28 +151,28 @@ def _not_among(value: Any, expected: str) -> str:
     return unknown("value", value, names) if names else f"must be {expected} (is {shown(value)})"
 
 
-_TEXTS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
-    "greater_than": lambda c: f"must be greater than {c['gt']:g}",
-    "greater_than_equal": lambda c: f"must be {c['ge']:g} or more",
-    "less_than": lambda c: f"must be less than {c['lt']:g}",
-    "less_than_equal": lambda c: f"must be {c['le']:g} or less",
-    "finite_number": lambda c: "must be a finite number",
-    "float_type": lambda c: "must be a number",
-    "float_parsing": lambda c: "must be a number",
-    "int_type": lambda c: "must be a whole number",
-    "int_parsing": lambda c: "must be a whole number",
-    "int_parsing_size": lambda c: "must be a whole number of reasonable size",
-    "int_from_float": lambda c: "must be a whole number",
-    "bool_type": lambda c: "must be true or false",
-    "string_type": lambda c: "must be a text in quotes",
-    "tuple_type": lambda c: "must be a list, as in [..., ...]",
-    "list_type": lambda c: "must be a list, as in [..., ...]",
-    "dict_type": lambda c: "must be a table",
-    "model_type": lambda c: "must be a table",
-    "model_attributes_type": lambda c: "must be a table",
-    "too_long": lambda c: f"must have {c['max_length']} entries, not {c['actual_length']}",
-    "too_short": lambda c: f"must have {c['min_length']} entries, not {c['actual_length']}",
-    "string_too_long": lambda c: f"must have {c['max_length']} characters at most",
+_TEXTS = {
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be {ge:g} or more",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be {le:g} or less",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_parsing_size": "must be a whole number of reasonable size",
+    "int_from_float": "must be a whole number",
+    "bool_type": "must be true or false",
+    "string_type": "must be a text in quotes",
+    "tuple_type": "must be a list, as in [..., ...]",
+    "list_type": "must be a list, as in [..., ...]",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "too_long": "must have {max_length} entries, not {actual_length}",
+    "too_short": "must have {min_length} entries, not {actual_length}",
+    "string_too_long": "must have {max_length} characters at most",
 }
 
 
@@ -187,37 +185,6 @@ def _mend(kind: str, value: Any) -> str:
             return "; no formula can stand here (a law has multiplier and length_multiplier)" if is_formula else ""
         return "; write it without quotes"
     return ""
-
-
-def _described(model: type[BaseModel] | None, loc: Keys) -> str:
-    field = model_at(model, loc[:-1])
-    known = descriptions(field).get(str(loc[-1])) if field else None
-    return f": {known}" if known else ""
-
-
-def _keys(model: type[BaseModel] | None, loc: Keys) -> list[str]:
-    found = model_at(model, loc)
-    return [info.alias or name for name, info in found.model_fields.items()] if found else []
-
-
-def model_at(model: type[BaseModel] | None, loc: Keys) -> type[BaseModel] | None:
-    """The table that stands at a place within another, as far as the fields' types tell.
-
-    Args:
-        model: the outermost table.
-        loc: the keys down to the place.
-    """
-    for step in loc:
-        field = model.model_fields.get(str(step)) if model else None
-        model = _table_in(field.annotation) if field else None
-    return model
-
-
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    found = (_table_in(argument) for argument in get_args(annotation))
-    return next((model for model in found if model), None)
 
 
 Kind = TypeVar("Kind", bound=BaseModel)
@@ -241,43 +208,19 @@ def validation_error(mistakes: Iterable[Mistake]) -> ValidationError:
     return ValidationError.from_exception_data("scene", details)
 
 
-def mistakes_of(
-    error: ValidationError, model: type[BaseModel] | None = None, also: tuple[str, ...] = ()
-) -> list[Mistake]:
+def mistakes_of(error: ValidationError, table: type[BaseModel]) -> list[Mistake]:
     """What pydantic found, in plain words.
 
     Args:
         error: pydantic's error.
-        model: the table that was read, for its allowed keys.
-        also: keys that the table allows beside those of the model.
+        table: the table that was read, for its allowed keys.
     """
     found = error.errors(include_url=False)
-    meant = {(*e["loc"][:-1], suggestion(e, model)) for e in found if e["type"] == "extra_forbidden"}
+    keys = list(table.model_fields)
+    meant = {closest(str(e["loc"][-1]), keys) for e in found if e["type"] == "extra_forbidden"}
     # A misspelt key is one mistake: that the right one is missing then goes without saying.
-    found = [e for e in found if e["type"] != "missing" or e["loc"] not in meant]
-    return [Mistake(tuple(e["loc"]), message_of(e, model, also)) for e in found]
-
-
-def input_error(error: ValidationError, model: type[BaseModel] | None = None) -> InputError:
-    """What pydantic found as one line for the user.
-
-    Args:
-        error: pydantic's error.
-        model: the table that was read, for its allowed keys.
-    """
-    return InputError("; ".join(m.text for m in mistakes_of(error, model)))
-
-
-def located_error(error: ValidationError, model: type[BaseModel] | None = None) -> InputError:
-    """What pydantic found, a line each, with the key before it.
-
-    Args:
-        error: pydantic's error.
-        model: the table that was read, for its allowed keys.
-    """
-    found = mistakes_of(error, model)
-    lines = ((".".join(str(key) for key in mistake.where if key != ""), mistake.text) for mistake in found)
-    return InputError("\n".join(f"{where}: {text}" if where else text for where, text in lines))
+    found = [e for e in found if e["type"] != "missing" or e["loc"][-1] not in meant]
+    return [Mistake(tuple(e["loc"]), _message(e, table)) for e in found]
 
 
 class Table(BaseModel):
@@ -288,30 +231,46 @@ class Table(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _in_plain_words(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
-        return cls._read_or_refuse(lambda: handler(data), [])
+        try:
+            return handler(data)
+        except ValidationError as error:
+            raise validation_error(mistakes_of(error, cls)) from None
 
     @classmethod
-    def _read_or_refuse(cls, read: Callable[[], Any], mistakes: list[Mistake]) -> Any:
-        """What ``read`` returns; all mistakes together if it finds some or some were found before."""
+    def made(cls, keys: Mapping[str, Any]) -> Self:
+        """A table by its keys.
+
+        Args:
+            keys: as a scene file or a program has them.
+
+        Raises:
+            InputError: what is wrong, a line each, with the key before it.
+        """
         try:
-            table = read()
+            return cls.model_validate(plain(keys))
         except ValidationError as error:
-            mistakes = [*mistakes, *mistakes_of(error, cls)]
-        if mistakes:
-            raise validation_error(mistakes)
-        return table
+            raise located_error(error) from None
 
     def changed(self, **values: Any) -> Self:
-        """A copy with other values, validated like a new table; what was left to its default still is.
+        """A copy with other values, checked like a new table; what was left to its default still is.
 
         Args:
             **values: the new values by their keys.
 
         Raises:
-            ValidationError: the values are not allowed, or do not fit the others.
+            InputError: the values are not allowed, or do not fit the others.
         """
-        given = {key: value for key, value in self if key in self.model_fields_set}
-        return type(self).model_validate({**given, **values})
+        return self.made({**{key: value for key, value in self if key in self.model_fields_set}, **values})
+
+
+def located_error(error: ValidationError) -> InputError:
+    """What is wrong with a table, a line each, with the key before it.
+
+    Args:
+        error: of a :class:`Table`.
+    """
+    found = [(".".join(map(str, e["loc"])), e["msg"]) for e in error.errors(include_url=False)]
+    return InputError("\n".join(f"{where}: {text}" if where else text for where, text in found))
 
 
 def choose(data: Any, key: str, classes: Mapping[str, type[Kind]], context: Any = None) -> Any:

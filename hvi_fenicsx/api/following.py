@@ -13,10 +13,8 @@ import numpy as np
 from dolfinx import fem
 from matplotlib.figure import Figure
 from mpi4py import MPI
-from pydantic import ValidationError
 
 from .. import console
-from ..effects import plain
 from ..errors import InputError
 from ..load_paths.following import Control, PathRun
 from ..model import Model, PathTable, SolverTable
@@ -26,7 +24,7 @@ from ..results import ResultFolder, path_files
 from ..results.output_folder import existing
 from ..runtime import log
 from ..runtime.argument_checks import require_path
-from ..schema import located_error, unknown
+from ..schema import unknown
 from ..typing import Array
 from .solution import GIVEN, displacement
 from .solving import check, fields_of
@@ -196,8 +194,4 @@ def _by_table(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
 
 def _with_path(model: Model, changes: dict[str, Any]) -> Model:
     """The model with a load path, of which some keys are changed."""
-    given = {key: plain(value) for key, value in changes.items()}
-    try:
-        return model.changed(path=(model.path or PathTable()).changed(**given))
-    except ValidationError as error:
-        raise located_error(error, PathTable) from None
+    return model.changed(path=(model.path or PathTable()).changed(**changes))

@@ -8,20 +8,17 @@ from typing import Any
 
 from dolfinx import fem
 from mpi4py import MPI
-from pydantic import ValidationError
 
 from .. import console, workflow
-from ..effects import plain
 from ..errors import InputError
 from ..load_paths import last_borne
 from ..mesh.domain import Domain
-from ..model import Model, SolverTable, is_portable
+from ..model import Model, is_portable
 from ..paths.load_path import LoadPath
 from ..problem import spaces
 from ..runtime.argument_checks import require_kind, require_switch
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
-from ..schema import located_error
 from ..solvers.context import Progress
 from ..system import petsc_options
 from ..workflow import DEFAULT, Preparation, Solution, Thresholds
@@ -157,11 +154,7 @@ def ranks_of(model: Any, comm: MPI.Comm | None) -> MPI.Comm:
 
 
 def _with_options(model: Model, options: dict[str, Any]) -> Model:
-    given = {key: plain(value) for key, value in options.items()}
-    try:
-        return model.with_solver(**given) if given else model
-    except ValidationError as error:
-        raise located_error(error, SolverTable) from None
+    return model.with_solver(**options) if options else model
 
 
 def _domain(model: Model) -> Domain:

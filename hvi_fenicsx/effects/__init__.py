@@ -15,7 +15,6 @@ from .base import (
     in_words,
     load_name,
     names_in_python,
-    plain,
 )
 from .contact import Contact
 from .contribution import (

@@ -14,7 +14,6 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, TypeVar
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 from pydantic_core import PydanticCustomError
 
@@ -22,7 +21,7 @@ from ..class_registry import enter
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..laws import Superpotential
-from ..schema import located_error, names_of, shown
+from ..schema import Table, located_error, names_of, plain, shown
 from ..typing import Array
 from .contribution import Contribution
 
@@ -163,7 +162,7 @@ class SurfaceLoad:
         return self.components if self.pressure is None else (*self.components, self.pressure)
 
 
-class Effect(BaseModel):
+class Effect(Table):
     """One physical contribution: validated data (SI), what it adds, and where it acts.
 
     Attributes:
@@ -183,7 +182,7 @@ class Effect(BaseModel):
         is_sum: whether it is a load that is stated as a sum over its part; it then says how it is spread.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(arbitrary_types_allowed=True)
 
     key: ClassVar[str]
     place: ClassVar[Place]
@@ -233,9 +232,9 @@ class Effect(BaseModel):
         """Fill in what a program gives; a refusal names the effect and its place."""
         place = None if where is None else names_in_python(where)
         try:
-            BaseModel.__init__(self, **{key: plain(value) for key, value in keys.items()})
+            BaseModel.__init__(self, **plain(keys))
         except ValidationError as error:
-            raise self.refused(str(located_error(error, type(self))), place) from None
+            raise self.refused(str(located_error(error)), place) from None
         self._where = place
 
     @classmethod
@@ -419,16 +418,3 @@ def in_words(where: Names | None) -> str:
         where: the sides or regions; None: the whole body.
     """
     return ", ".join(where) if where else "the body"
-
-
-def plain(given: Any) -> Any:
-    """NumPy's number or array, or another kind of real number, as Python's; lists of such too; all else as it is.
-
-    Args:
-        given: what a program gave.
-    """
-    if isinstance(given, np.generic | np.ndarray):
-        return given.tolist()
-    if isinstance(given, list | tuple):
-        return [plain(one) for one in given]
-    return {key: plain(value) for key, value in given.items()} if isinstance(given, dict) else given

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import override
 
 from ..errors import InputError
-from ..schema import Finite, Positive, located_error, refusal
+from ..schema import Finite, Positive, refusal
 from ..typing import Array
 from .base import Effect, FormContext, Place, Sides, from_python
 from .contribution import Averaged, Contribution
@@ -65,9 +65,9 @@ class Elasticity(Effect):
             return self
         usual = "plane_stress" if dimension == 2 else "three_dimensional"
         try:
-            return type(self).model_validate({**dict(self), "model": usual}).at(self.where, self.name)
-        except ValidationError as error:
-            raise self.refused(str(located_error(error, type(self))), self.where) from None
+            return self.changed(model=usual).at(self.where, self.name)
+        except InputError as error:
+            raise self.refused(str(error), self.where) from None
 
     @abstractmethod
     def thermal_stress(self) -> Array:

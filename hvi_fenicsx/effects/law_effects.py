@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Annotated, Any, ClassVar, Self
 
@@ -22,7 +24,7 @@ from .. import laws
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..laws import Mixity, mixities
-from ..schema import OneOf, refusal
+from ..schema import Mistake, OneOf, refusal, validation_error
 from .base import Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python, names_in_python
 from .contribution import ONE, BoundaryLaw, Contribution, Direction
 from .values import FormulaField, Value
@@ -43,7 +45,15 @@ def _law(value: Any) -> laws.Superpotential:
     except InputError as error:
         if isinstance(error.__cause__, ValidationError):
             raise error.__cause__ from None  # it knows the place of each wrong parameter
-        raise refusal(str(error)) from None
+        raise validation_error([Mistake(_parameter(str(error), parameters), str(error))]) from None
+
+
+def _parameter(text: str, table: Mapping[str, Any]) -> tuple[str, ...]:
+    """The parameter that a law's message names first: a law refuses its parameters as a whole."""
+    if text.startswith("unknown law "):
+        return ("law",)
+    named = re.findall(r"(\w+) = |'(\w+)'", text)
+    return next(((name,) for pair in named for name in pair if name in table), ())
 
 
 LawField = Annotated[

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, ValidationInfo, model_validator
 from pydantic.fields import FieldInfo
 from typing_extensions import override
 
 from ..class_registry import enter
 from ..errors import InputError
 from ..formula import SpatialValue
-from ..schema import ExistingFile, Finite, Positive, refusal, unknown
+from ..schema import ExistingFile, Finite, Positive, Table, refusal, unknown
 from ..typing import Array
 from .surface_files import distances_along
 from .values import require_components
@@ -52,7 +52,7 @@ def _is_vector(field: FieldInfo) -> bool:
     return _AS_TUPLE in field.metadata or any(_AS_TUPLE in get_args(one) for one in get_args(field.annotation))
 
 
-class Obstacle(BaseModel):
+class Obstacle(Table):
     """A rigid obstacle. Points are given as (m, d), distances as (m,), in m.
 
     A field of the type :data:`Vector` must have as many components as the scene has dimensions.
@@ -62,7 +62,6 @@ class Obstacle(BaseModel):
         dimensions: of space, in which it makes sense.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     shape: ClassVar[str]
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)
     registry: ClassVar[dict[str, type[Obstacle]]] = {}
@@ -316,21 +315,17 @@ class ObstacleGap(SpatialValue):
 
 
 def read(value: Any, info: ValidationInfo) -> Obstacle:
-    """The obstacle of a table.
+    """The obstacle of a table, or of a point and a normal.
 
     Args:
         value: what a scene has, or an obstacle.
         info: its context has the folder of the scene.
-
-    Raises:
-        PydanticCustomError: there is no such shape.
-        ValidationError: the table does not fit the shape.
     """
     if isinstance(value, Obstacle):
         return value
     if isinstance(value, list) and len(value) == 2:
         value = {"point": value[0], "normal": value[1]}
-    if not isinstance(value, Mapping):
+    if not isinstance(value, dict):
         raise refusal("must be a table, like { point = [0, 0], normal = [0, 1] }")
     keys = dict(value)
     name = keys.pop("shape", Plane.shape)

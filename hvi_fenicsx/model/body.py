@@ -11,13 +11,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from pydantic import ValidationError
 
-from ..effects import names_in_python, plain
+from ..effects import names_in_python
 from ..errors import InputError
 from ..mesh.boundary_part import BoundaryPart, Inequalities, InterfaceSides
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
-from ..schema import located_error, unknown
+from ..schema import unknown
 
 if TYPE_CHECKING:
     from dolfinx import mesh as dmesh
@@ -126,7 +125,7 @@ class Body:
         Raises:
             InputError: a number is not allowed.
         """
-        return cls.from_shape(_shape(Rectangle, size=plain(size), cells=plain(cells)), comm)
+        return cls.from_shape(Rectangle.made({"size": size, "cells": cells}), comm)
 
     @classmethod
     def box(cls, size: Sequence[float], cells: Sequence[int], comm: MPI.Comm | None = None) -> Self:
@@ -142,7 +141,7 @@ class Body:
         Raises:
             InputError: a number is not allowed.
         """
-        return cls.from_shape(_shape(Box, size=plain(size), cells=plain(cells)), comm)
+        return cls.from_shape(Box.made({"size": size, "cells": cells}), comm)
 
     @classmethod
     def file(
@@ -171,8 +170,8 @@ class Body:
         if isinstance(dimension, bool) or dimension not in (2, 3):
             raise InputError(f"dimension: must be 2 or 3 (is {dimension!r})")
         file = os.fspath(path) if isinstance(path, os.PathLike) else path
-        keys = {"file": file, "scale": plain(scale), "refinements": plain(refinements)}
-        body = cls.from_shape(_shape(MeshFile, **keys), comm)
+        keys = {"file": file, "scale": scale, "refinements": refinements}
+        body = cls.from_shape(MeshFile.made(keys), comm)
         body.dimension = dimension
         return body
 
@@ -294,10 +293,3 @@ def _remembering(domain: Domain) -> Domain:
         return _remembering(found), transfer
 
     return replace(domain, coarsening=coarser)
-
-
-def _shape(kind: type[DomainShape], **keys: Any) -> DomainShape:
-    try:
-        return kind(**keys)
-    except ValidationError as error:
-        raise located_error(error, kind) from None

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from pydantic import ValidationError
-
 from ..errors import InputError
 from ..laws import smoothing
 from ..mesh.shapes import DomainShape
 from ..model import Model, SolverTable, dump_scene
 from ..report.units import quantity
-from ..schema import input_error, unknown
+from ..schema import unknown
 from ..solvers import registry
 from ..solvers.registry import options_of
 
@@ -150,9 +148,8 @@ def _combinations(scene: Model, axes: Values, left_out: list[str]) -> Iterator[P
 def _on_mesh(scene: Model, mesh: str | DomainShape) -> Model:
     try:
         return scene.changed(domain=scene.domain.with_mesh(mesh) if isinstance(mesh, str) else mesh)
-    except (ValidationError, InputError) as error:
-        mistake = input_error(error, type(scene.domain)) if isinstance(error, ValidationError) else error
-        raise InputError(f"--axis mesh: {mistake}") from None
+    except InputError as error:
+        raise InputError(f"--axis mesh: {error}") from None
 
 
 def _default(scene: Model) -> Iterator[Values]:
@@ -233,10 +230,7 @@ def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:
     elif width is not None:
         kind = values.get("smoothing", scene.solver.smoothing) or "quadratic"
         values = {**dict.fromkeys(_WIDTHS), **values, "smoothing": kind}
-    try:
-        found = scene.with_solver(**values)
-    except ValidationError as error:
-        raise input_error(error, SolverTable) from None
+    found = scene.with_solver(**values)
     solver = found.solver
     options_of(solver)
     for law in found.laws() if solver.smoothing else ():

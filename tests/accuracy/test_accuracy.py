@@ -16,7 +16,7 @@ from mpi4py import MPI
 from runs import hvi, summary, write_scene
 from scenes import STEEL, model, quadratic_linear
 
-from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx import Model, read_scene, read_tables
 from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
@@ -31,7 +31,7 @@ DEMOS = Path(__file__).parents[2] / "demos"
 STRONG = model(64, 3e6, friction=quadratic_linear(1e6))
 
 
-def reach(scene: Scene, goal: Goal, degree: int | None = 1) -> AccuracyResult:
+def reach(scene: Model, goal: Goal, degree: int | None = 1) -> AccuracyResult:
     scene = scene if degree is None else scene.with_solver(degree=degree)
     return control.solve_to_goal(scene, COMM, goal, AdaptiveSolver(timer=Timer()), lambda line: None)
 
@@ -73,7 +73,7 @@ LIFTED = model(16, 6e6, 1e6, quadratic_linear(3e6))
     ],
 )
 def test_what_is_asked_for_is_kept_and_not_overdone(table: dict[str, Any], requested: float, degree: int) -> None:
-    reached = reach(Scene.model_validate(table), Goal(requested), degree)
+    reached = reach(read_tables(table), Goal(requested), degree)
     assert reached.exit_code == 0
     assert reached.steps[-1].error <= requested
     assert requested / 5 < far_in_energy(finer(reached.level, 2)) < requested
@@ -86,14 +86,14 @@ WAVY = model(16, pull=0.0, gap="2e-6*sin(25*x)")
 @pytest.mark.parametrize(("table", "requested"), [(model(16, 6e6, 1e6, DEEP_DROP), 0.1), (WAVY, 0.3)])
 def test_a_drop_on_its_way_and_a_wavy_gap_keep_what_is_asked_for(table: dict[str, Any], requested: float) -> None:
     """Of the gap a mesh of 4 x 4 cells sees nothing, and the drop needs several meshes to come to its place."""
-    reached = reach(Scene.model_validate(table), Goal(requested))
+    reached = reach(read_tables(table), Goal(requested))
     assert reached.exit_code == 0
     assert requested / 2 < far_in_energy(finer(reached.level, 3)) < requested
 
 
 def test_the_first_mesh_sees_the_data_and_no_more() -> None:
     def first(**changes: Any) -> int:
-        scene, solver = adaptive.coarsest(Scene.model_validate(model(16, **changes))), AdaptiveSolver(timer=Timer())
+        scene, solver = adaptive.coarsest(read_tables(model(16, **changes))), AdaptiveSolver(timer=Timer())
         return solver.begin_resolved(scene, solver.first_domain(scene, COMM)).dofs
 
     plain = first()
@@ -108,7 +108,7 @@ def test_the_first_mesh_sees_the_data_and_no_more() -> None:
 )
 def test_a_quantity_on_the_floor_is_kept(name: str, quantity: str, asked: float) -> None:
     """What softens answers the error by much more of it, the coarse mesh of the glue by a factor of two."""
-    scene = Scene.model_validate(STRONG) if name == "drop" else read_scene(DEMOS / "peeling.toml")
+    scene = read_tables(STRONG) if name == "drop" else read_scene(DEMOS / "peeling.toml")
     levels = finer(reach(scene, Goal(asked, quantity)).level, 3)
     observable = quantities.find(quantity)()
     assert isinstance(observable, Observable)
@@ -135,7 +135,7 @@ def test_the_slip_of_a_body_that_hardly_slips_is_not_refused(degree: int) -> Non
     table = model(8, 0.0, 0.0, {"law": "tresca", "yield_traction": 2e5}, gap="4e-6*(x - 0.7)**2")
     table["domain"] |= {"size": [2.0, 1.0], "cells": [16, 8]}
     table["body"] = {"force": [2e5, -2e6]}
-    reached = reach(Scene.model_validate(table), Goal(5e-2, "u_t"), degree)
+    reached = reach(read_tables(table), Goal(5e-2, "u_t"), degree)
     assert reached.why is None
     levels, observable = finer(reached.level, 2), quantities.find("u_t")()
     assert isinstance(observable, Observable)
@@ -169,8 +169,8 @@ def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> Non
     assert apart < 2e-2 * contact_norm(law, true.x.array, 1)  # type: ignore[union-attr]
 
 
-def l_shape() -> Scene:
-    return Scene.model_validate(
+def l_shape() -> Model:
+    return read_tables(
         {
             "domain": {"shape": "l_shape", "size": [1.0, 1.0], "cut": [0.5, 0.5], "mesh_size": 0.2},
             "material": STEEL,
@@ -204,7 +204,7 @@ def test_adaptive_refinement_at_degree_two_is_optimal_at_a_corner() -> None:
 
 
 def test_the_degree_is_two_unless_a_quantity_is_compared_from_mesh_to_mesh() -> None:
-    scene = Scene.model_validate(STRONG)
+    scene = read_tables(STRONG)
     reached, alone = (reach(scene, Goal(0.03), degree) for degree in (None, 2))
     assert reached.degree == 2
     assert [s.dofs for s in reached.steps] == [s.dofs for s in alone.steps]
@@ -232,14 +232,14 @@ def test_extrapolation_knows_the_order(order: float) -> None:
 
 
 def test_an_accuracy_beyond_all_numbers_is_refused_in_words() -> None:
-    reached = reach(Scene.model_validate(STRONG), Goal(1e-200))
+    reached = reach(read_tables(STRONG), Goal(1e-200))
     assert reached.why == "1e-200 is beyond any number of unknowns"
     assert reached.exit_code == 4
 
 
 def test_what_memory_cannot_hold_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "room", lambda comm: 400.0)
-    reached = reach(Scene.model_validate(STRONG), Goal(1e-5))
+    reached = reach(read_tables(STRONG), Goal(1e-5))
     assert reached.exit_code == 4
     assert reached.why is not None
     assert "unknowns" in reached.why
@@ -253,7 +253,7 @@ def test_a_signal_leaves_the_last_mesh_with_an_error(at: str) -> None:
     lines, asked = list[str](), itertools.count()
     start = {"between two meshes": 0, "in a solve": 1}[at]
     solver = AdaptiveSolver(timer=Timer(), interrupted=lambda: len(lines) >= 2 and next(asked) >= start)
-    scene = Scene.model_validate(STRONG).with_solver(degree=1)
+    scene = read_tables(STRONG).with_solver(degree=1)
     reached = control.solve_to_goal(scene, COMM, Goal(5e-3), solver, lines.append)
     assert len(reached.steps) == 2
     assert reached.solution.converged
@@ -266,7 +266,7 @@ def test_the_first_mesh_is_coarse() -> None:
     cells = [(scene, adaptive.coarsest(read_scene(DEMOS / f"{scene}.toml")).domain) for scene in ("peeling", "hertz")]
     assert cells[0][1].cells == (75, 3)  # type: ignore[union-attr]
     assert cells[1][1].mesh_size == pytest.approx(0.02)  # type: ignore[union-attr]
-    assert adaptive.coarsest(Scene.model_validate(STRONG)).domain.cells == (4, 4)  # type: ignore[union-attr]
+    assert adaptive.coarsest(read_tables(STRONG)).domain.cells == (4, 4)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(

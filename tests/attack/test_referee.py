@@ -25,7 +25,7 @@ from referee.minimality import examine, sampled_descent
 from referee.programmes import Body, verdict
 from referee.solution import Check
 
-from hvi_fenicsx import InputError, Scene, prepare
+from hvi_fenicsx import InputError, prepare, read_tables
 
 STEEL = {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29}
 WEAK = {"law": "quadratic_linear", "gamma1": 1e6, "gamma2": 5e5, "delta": 9e-6}
@@ -102,7 +102,7 @@ def test_a_method_that_smooths_nothing_is_refused_where_smoothing_is_drawn_with_
     """20787 #27: a day's attack failed by it."""
     table = scene(3e5, WEAK) | {"solver": {"method": "branch", "smoothing": "chks", "epsilon_absolute": 1e-3}}
     with pytest.raises(InputError) as refused:
-        prepare(Scene.model_validate(table))
+        prepare(read_tables(table))
     assert judge(table, None, Answer(2, str(refused.value))).word == UNDECIDED
 
 

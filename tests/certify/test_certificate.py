@@ -16,7 +16,7 @@ from dolfinx import fem
 from runs import process
 from scenes import STEEL, P, Q, Table, displacement, far, model, quadratic_linear, solved, two_blocks
 
-from hvi_fenicsx import Scene, Solution, dump_scene, prepare, solve
+from hvi_fenicsx import Solution, dump_scene, prepare, read_tables, solve
 from hvi_fenicsx.certify.certificate import Certificate, examine
 
 Array = npt.NDArray[np.float64]
@@ -104,7 +104,7 @@ def test_what_is_no_number_is_refused(found: Solution, value: float) -> None:
 
 def test_it_judges_the_displacement_not_the_word_of_the_solver(found: Solution) -> None:
     """The solution of one law is refused under another."""
-    other = prepare(Scene.model_validate(model(CELLS, 6e6, Q, quadratic_linear(2.9e6))))
+    other = prepare(read_tables(model(CELLS, 6e6, Q, quadratic_linear(2.9e6))))
     u = fem.Function(other.problem.space)
     u.x.array[:] = displacement(found).ravel() / other.problem.scales.displacement
     verdict = examine(other.problem, u, 1e-8).certificate
@@ -144,7 +144,7 @@ def bearing(wall: Table) -> Solution:
     """A body pressed against a wall at its left, on a floor with friction."""
     table = copy.deepcopy(model(5, -3e6, Q, quadratic_linear(1e6)))
     table["boundary"]["wall"] = {"on": "left", **wall}
-    return solve(Scene.model_validate(table))
+    return solve(read_tables(table))
 
 
 def test_a_corner_of_two_contact_parts_is_certified() -> None:
@@ -179,7 +179,7 @@ def test_two_frictions_share_the_force_at_their_edge(friction: float) -> None:
 def test_ranks_without_a_vertex_of_an_edge_divide_its_force_too(tmp_path: Path) -> None:
     """One cell on three ranks: some own no vertex of the edge, or none of Γc at all."""
     scene = tmp_path / "edge.toml"
-    scene.write_text(dump_scene(Scene.model_validate(_floor_and_back(2e3))), encoding="utf-8")
+    scene.write_text(dump_scene(read_tables(_floor_and_back(2e3))), encoding="utf-8")
     done = process("run", scene, "--out", tmp_path / "r", "--no-pictures", ranks=3)
     assert done.returncode == 0, done.stderr
     alone = solved(_floor_and_back(2e3))
@@ -190,7 +190,7 @@ def test_ranks_without_a_vertex_of_an_edge_divide_its_force_too(tmp_path: Path) 
 
 def test_an_edge_whose_force_exceeds_both_frictions_is_not_certified() -> None:
     """The solution with a hundredth of the displacement taken off: more is needed than both laws can give."""
-    found = solve(Scene.model_validate(_floor_and_back(2e3)))
+    found = solve(read_tables(_floor_and_back(2e3)))
     assert found.solve_result is not None
     u = found.solve_result.u
     u.x.array[:] *= 0.99

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scenes import Table, model, quadratic_linear
 
-from hvi_fenicsx import Scene
+from hvi_fenicsx import read_tables
 from hvi_fenicsx.certify.certificate import examine
 from hvi_fenicsx.estimate.bubbles import BubbleStiffness
 from hvi_fenicsx.estimate.coupled_errors import Coupled
@@ -37,9 +37,9 @@ def stiff_bond() -> Table:
 
 
 CASES = {
-    "stiff bond": Scene.model_validate(stiff_bond()),
+    "stiff bond": read_tables(stiff_bond()),
     "lift-off": scenes()["lift_off"],
-    "bent wall": Scene.model_validate(bent_wall()),
+    "bent wall": read_tables(bent_wall()),
     "two bodies": scenes()["single_lap"],
     "half-disk": scenes()["hertz"],
     "block in space": scenes()["block_3d"],

@@ -18,7 +18,7 @@ from dolfinx import fem
 from runs import hvi, summary, write_scene
 from scenes import Table, block, model, quadratic_linear, solved, solved_system
 
-from hvi_fenicsx import Scene, Solution, prepare
+from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.certify.certificate import examine
 from hvi_fenicsx.estimate.bubbles import BubbleStiffness, diagonal, space
 from hvi_fenicsx.estimate.contact_errors import estimate_contact_errors
@@ -160,7 +160,7 @@ CASES: dict[str, Table] = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_against_a_mesh_four_times_finer(name: str) -> None:
-    (row,) = rows(Scene.model_validate(CASES[name]), levels=1)
+    (row,) = rows(read_tables(CASES[name]), levels=1)
     assert 0.75 < row.index < 1.3
 
 
@@ -181,7 +181,7 @@ UNSEEN["displacement"]["boundary"] = {
 
 @pytest.mark.parametrize("name", UNSEEN)
 def test_data_that_the_mesh_does_not_see(name: str) -> None:
-    (row,) = rows(Scene.model_validate(UNSEEN[name]), levels=1, extra=4)
+    (row,) = rows(read_tables(UNSEEN[name]), levels=1, extra=4)
     assert 0.8 < row.index < 1.3
 
 
@@ -193,7 +193,7 @@ QUICK = ("strong law", "lift-off")
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in CASES])
 def test_degree_two_against_a_mesh_four_times_finer(name: str) -> None:
-    scene = Scene.model_validate(CASES[name]).with_solver(degree=2)
+    scene = read_tables(CASES[name]).with_solver(degree=2)
     (row,) = rows(scene, levels=1, extra=2 if scene.dimension == 2 else 1)
     assert 0.75 < row.index < 1.3
 
@@ -219,7 +219,7 @@ def held_by_a_bond(cells: list[int], stiffness: float, poisson_ratio: float = 0.
 @pytest.mark.parametrize("stiffness", [1e11, 1e13])
 @pytest.mark.parametrize("cells", [[4, 2], pytest.param([3, 3, 2], marks=pytest.mark.long)])
 def test_bonds_that_are_stiff_beside_the_cells_at_degree_two(cells: list[int], stiffness: float) -> None:
-    scene = Scene.model_validate(held_by_a_bond(cells, stiffness)).with_solver(degree=2)
+    scene = read_tables(held_by_a_bond(cells, stiffness)).with_solver(degree=2)
     (row,) = rows(scene, levels=1, extra=5 - len(cells))
     assert 0.75 < row.index < 1.3
 
@@ -228,14 +228,14 @@ def test_bonds_that_are_stiff_beside_the_cells_at_degree_two(cells: list[int], s
 @pytest.mark.parametrize("cells", [[4, 2], pytest.param([3, 3, 2], marks=pytest.mark.long)])
 def test_stiff_bonds_of_a_nearly_incompressible_slab(cells: list[int], degree: int) -> None:
     """The bond is nearly a clamp, of which the index is 1.06 in the plane against a mesh four times finer."""
-    scene = Scene.model_validate(held_by_a_bond(cells, 1e13, 0.49)).with_solver(degree=degree)
+    scene = read_tables(held_by_a_bond(cells, 1e13, 0.49)).with_solver(degree=degree)
     (row,) = rows(scene, levels=1, extra=4 - len(cells))
     assert 0.9 < row.index < 1.15
 
 
 @pytest.mark.parametrize(("name", "degree"), [*((n, 1) for n in CASES), ("l-shape", 2), ("block in space", 2)])
 def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str, degree: int) -> None:
-    problem = prepare(Scene.model_validate(CASES[name]).with_solver(degree=degree)).problem
+    problem = prepare(read_tables(CASES[name]).with_solver(degree=degree)).problem
     bubbles = space(problem.domain.mesh, degree)
     form = problem.bulk.between(ufl.TrialFunction(bubbles), ufl.TestFunction(bubbles))
     matrix = fem.assemble_matrix(fem.form(form)).to_scipy()
@@ -247,7 +247,7 @@ def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str, degree: int) -> 
 
 @pytest.mark.parametrize(("name", "degree"), [("l-shape", 1), ("l-shape", 2), ("block in space", 2)])
 def test_the_bubbles_diagonal_is_their_own_on_an_elastic_bed(name: str, degree: int) -> None:
-    problem = prepare(Scene.model_validate(CASES[name]).with_solver(degree=degree)).problem
+    problem = prepare(read_tables(CASES[name]).with_solver(degree=degree)).problem
     bulk, (v, u) = problem.bulk, problem.bulk.form.arguments()
     bed = 20.0 * ufl.inner(u, v) * ufl.dx
     problem = replace(problem, bulk=replace(bulk, form=bulk.form + bed, foundation=bed))
@@ -277,13 +277,13 @@ def test_smoothing_is_what_it_changes_of_the_solution(strong: bool) -> None:
 def test_what_smoothing_changes_is_counted_once(degree: int) -> None:
     """Nodes that are found with the bubbles, as at degree 2, would answer the unsmoothed law."""
     table = model(8, friction=quadratic_linear(1e3), smoothing="paper", epsilon=20.0, degree=degree)
-    (row,) = rows(Scene.model_validate(table), levels=1)
+    (row,) = rows(read_tables(table), levels=1)
     assert row.estimate.smoothing > 0.5 * row.true
     assert 0.8 < row.index < 1.1
 
 
 def test_algebraic_is_the_distance_from_the_discrete_solution() -> None:
-    prepared = prepare(Scene.model_validate(model(8, pull=3e6, friction=STRONG)))
+    prepared = prepare(read_tables(model(8, pull=3e6, friction=STRONG)))
     problem, system = prepared.problem, prepared.system
     u = solved_system(prepared).result.u
     moved = fem.Function(problem.space)
@@ -298,7 +298,7 @@ def test_algebraic_is_the_distance_from_the_discrete_solution() -> None:
 def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> None:
     """With a drop the slip's error comes from where the drop lies between two vertices, and feeds on itself."""
     law = quadratic_linear(1e6 if name == "strong" else 1e3)
-    prepared = prepare(Scene.model_validate(model(cells, 3e6, friction=law)))
+    prepared = prepare(read_tables(model(cells, 3e6, friction=law)))
     coarse, fine = finish(prepared), solved(model(128, 3e6, friction=law))
     found = estimate_contact_errors(prepared.system, (), coarse.solve_result.u, coarse.examination)
     true = [apart(read(coarse), read(fine), power) for read, power in ((slips, 2), (frictions, 1))]
@@ -308,7 +308,7 @@ def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> No
 
 def test_slip_where_friction_holds_some_vertices_and_others_slide() -> None:
     """A slip that the estimated error turns round is held by the kink at zero: friction does not change its sign."""
-    prepared = prepare(Scene.model_validate(guided(8)))
+    prepared = prepare(read_tables(guided(8)))
     coarse, fine = finish(prepared), solved(guided(64))
     found = estimate_contact_errors(prepared.system, (), coarse.solve_result.u, coarse.examination)
     true = apart(slips(coarse), slips(fine), 2)

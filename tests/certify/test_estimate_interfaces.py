@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 from scenes import STEEL, Table, two_blocks
 
-from hvi_fenicsx import Scene, Solution, solve
+from hvi_fenicsx import Model, Solution, read_tables, solve
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 from effectivity import rows, scenes
 
 
-def uniform(between: Table, stress: list[list[float]], upper: tuple[float, float], degree: int) -> Scene:
+def uniform(between: Table, stress: list[list[float]], upper: tuple[float, float], degree: int) -> Model:
     """Two blocks on meshes that do not match, under a uniform stress; upper: where the upper one begins, its width."""
     normals = {"left": (-1, 0), "right": (1, 0), "bottom": (0, -1), "top": (0, 1)}
     sides = [f"lower.{s}" for s in ("left", "right", "bottom")] + [f"upper.{s}" for s in ("left", "right", "top")]
     loads = {s: [float(np.dot(row, normals[s.split(".")[1]])) for row in stress] for s in sides}
     low = {"shape": "rectangle", "size": [1.0, 0.5], "cells": [7, 4]}
     high = {"shape": "rectangle", "size": [upper[1], 0.4], "cells": [5, 3], "origin": [upper[0], 0.5]}
-    return Scene.model_validate(
+    return read_tables(
         {
             "domain": {"lower": low, "upper": high},
             "material": STEEL,
@@ -56,7 +56,7 @@ def test_stiff_bonds_between_bodies_at_degree_two() -> None:
     between = {"cohesion": {"law": "graph", "points": [[0, 0], [1e-8, 4e6], [4e-5, 0]], "beta": 0.7}}
     table = uniform(between, [[0.0, 0.0], [0.0, 1e6]], (0.0, 1.0), 2).tables()
     lid = {"lid": {"on": "upper.top", "traction": [2e5, 1e6]}, "foot": {"on": "lower.bottom", "displacement": [0, 0]}}
-    (row,) = rows(Scene.model_validate(table | {"boundary": lid}).with_solver(tolerance=1e-8), 1, 1)
+    (row,) = rows(read_tables(table | {"boundary": lid}).with_solver(tolerance=1e-8), 1, 1)
     assert row.certified
     assert 0.75 < row.index < 1.3
 
@@ -102,7 +102,7 @@ def refined(blocks: Table, accuracy: float) -> Solution:
     from hvi_fenicsx.accuracy.goal import Goal
     from hvi_fenicsx.runtime.timing import Timer
 
-    scene, lines = Scene.model_validate(blocks), list[str]()
+    scene, lines = read_tables(blocks), list[str]()
     found = solve_to_goal(scene, MPI.COMM_WORLD, Goal(accuracy=accuracy), AdaptiveSolver(timer=Timer()), lines.append)
     assert found.why is None
     return found.solution

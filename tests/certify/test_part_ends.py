@@ -10,7 +10,7 @@ from dolfinx import fem, geometry
 from runs import hvi, summary, write_scene
 from scenes import Table
 
-from hvi_fenicsx import Scene, solve
+from hvi_fenicsx import read_tables, solve
 from hvi_fenicsx.api.solution import ModelSolution
 
 LOAD, END = 1e6, 0.3
@@ -30,7 +30,7 @@ def square(cells: int, degree: int, **load: object) -> Table:
 
 
 def solved(table: Table) -> ModelSolution:
-    return solve(Scene.model_validate(table))
+    return solve(read_tables(table))
 
 
 def work(found: ModelSolution, degree: int) -> float:

@@ -10,7 +10,7 @@ import pytest
 from runs import ROOT, hvi, summary, write_scene
 from scenes import block, model, quadratic_linear
 
-from hvi_fenicsx import Scene, console, prepare, read_scene, solve
+from hvi_fenicsx import console, prepare, read_scene, read_tables, solve
 from hvi_fenicsx.certify.thresholds import PlausibilityThresholds
 from hvi_fenicsx.estimate import plausibility
 from hvi_fenicsx.mesh.shapes import MeshFile
@@ -21,7 +21,7 @@ COARSE = ("domain.cells=[8, 8]",)
 
 
 def warned(table: dict[str, Any]) -> tuple[str, ...]:
-    return solve(Scene.model_validate(table)).warnings
+    return solve(read_tables(table)).warnings
 
 
 def material(table: dict[str, Any], **changes: float) -> dict[str, Any]:
@@ -107,7 +107,7 @@ def test_a_coarse_mesh_is_told_with_its_error() -> None:
 
 
 def test_a_fine_mesh_is_left_in_peace() -> None:
-    assert not [line for line in console.outcome(solve(Scene.model_validate(model(16)))) if "--accuracy" in line]
+    assert not [line for line in console.outcome(solve(read_tables(model(16)))) if "--accuracy" in line]
 
 
 @pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.toml")), ids=lambda d: d.stem)
@@ -126,7 +126,7 @@ def test_before_solving_only_the_implausible_demos_are_warned_of(demo: Path) -> 
 
 
 def test_the_limits_can_be_chosen() -> None:
-    prepared = prepare(Scene.model_validate(model(8)))
+    prepared = prepare(read_tables(model(8)))
     problem, forces = prepared.problem, prepared.system.forces
     assert plausibility.before_solving(problem, forces) == prepared.warnings == ()
     (warning,) = plausibility.before_solving(problem, forces, PlausibilityThresholds(stiffest=1e11))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scenes import Q, Table, block, displacement, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, console, solve
+from hvi_fenicsx import console, read_tables, solve
 
 BALANCED = 1.0e9
 PEAK = 0.5
@@ -90,7 +90,7 @@ def lifting(two_squares: Path, pull: float) -> Table:
 
 def test_another_bodys_stress_hides_no_tension(two_squares: Path) -> None:
     """Block b is the same beside a block that nothing pulls, to the accuracy that its own load asks for."""
-    beside, alone = (solve(Scene.model_validate(lifting(two_squares, pull))) for pull in (1e8, 1.0))
+    beside, alone = (solve(read_tables(lifting(two_squares, pull))) for pull in (1e8, 1.0))
     assert beside.exit_code == alone.exit_code == 0
     here = points(alone)[:, 0] > 1.5
     there = points(beside)[:, 0] > 1.5
@@ -106,13 +106,13 @@ def test_another_bodys_stress_hides_no_tension(two_squares: Path) -> None:
 def test_a_drop_just_ahead_of_a_slip_is_none_that_is_reached(two_squares: Path, pull: float) -> None:
     """What counts as being on a kink belongs to the body: half a percent of its slip is far away."""
     table = lifting(two_squares, pull)
-    free = solve(Scene.model_validate(table))
+    free = solve(read_tables(table))
     bottom = (points(free)[:, 0] > 1.5) & (points(free)[:, 1] < 1e-9)
     drop = 1.005 * float(np.max(np.abs(displacement(free)[bottom, 0])))
     law = {"law": "graph", "points": [[0.0, 0.0], [drop, 1e-6], [drop, 0.5e-6]]}
     table["boundary"]["floor"]["friction"] = law
     table["solver"]["second_order"] = True
-    found = solve(Scene.model_validate(table))
+    found = solve(read_tables(table))
     assert found.examination is not None
     assert found.examination.certificate.second_order == "local minimiser"
 

@@ -10,7 +10,7 @@ import pytest
 from enumeration import Floor, polyline
 from scenes import Table, model
 
-from hvi_fenicsx import Scene, read_scene
+from hvi_fenicsx import read_scene, read_tables
 from hvi_fenicsx.certify.uniqueness import needed_falls
 from hvi_fenicsx.workflow import Solution, finish, prepare
 
@@ -22,7 +22,7 @@ GRAPHS = {"drop": DROP, "teeth": TEETH, "softening": SOFTENING}
 
 
 def found(table: Table) -> Solution:
-    return finish(prepare(Scene.model_validate(table)), estimating=False)
+    return finish(prepare(read_tables(table)), estimating=False)
 
 
 def law_of(name: str) -> Table:

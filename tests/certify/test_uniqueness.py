@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import STEEL, E, Table, block, model, quadratic_linear
 
-from hvi_fenicsx import Scene, console, laws
+from hvi_fenicsx import console, laws, read_tables
 from hvi_fenicsx.certify import uniqueness
 from hvi_fenicsx.certify.thresholds import UniquenessThresholds
 from hvi_fenicsx.laws import Superpotential
@@ -19,7 +19,7 @@ PAPER = {"gamma1": 1e3, "gamma2": 5e2, "delta": 9e-6}
 
 
 def verdict(table: Table, thresholds: UniquenessThresholds | None = None) -> uniqueness.Uniqueness:
-    prepared = prepare(Scene.model_validate(table))
+    prepared = prepare(read_tables(table))
     found = finish(prepared, estimating=False)
     assert found.converged
     assert found.uniqueness is not None
@@ -107,7 +107,7 @@ def test_nothing_large_is_tried() -> None:
 
 
 def test_a_drop_leaves_it_open_and_the_terminal_says_so() -> None:
-    found = finish(prepare(Scene.model_validate(model(8, 6e6, 1e6, quadratic_linear(3e6)))), estimating=False)
+    found = finish(prepare(read_tables(model(8, 6e6, 1e6, quadratic_linear(3e6)))), estimating=False)
     lines = [line for line in console.outcome(found) if line.startswith("other equilibria: unknown")]
     assert len(lines) == 1
     assert "boundary.floor: the law's traction drops" in lines[0]
@@ -115,7 +115,7 @@ def test_a_drop_leaves_it_open_and_the_terminal_says_so() -> None:
 
 
 def test_what_is_not_certified_says_nothing() -> None:
-    found: Solution = finish(prepare(Scene.model_validate(block(2, push=4e6, friction=TRESCA))))
+    found: Solution = finish(prepare(read_tables(block(2, push=4e6, friction=TRESCA))))
     assert not found.converged
     assert found.uniqueness is None
 

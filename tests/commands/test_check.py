@@ -11,7 +11,7 @@ import pytest
 from runs import ROOT, hvi, write_scene
 from scenes import model
 
-from hvi_fenicsx import Scene, console, prepare
+from hvi_fenicsx import console, prepare, read_tables
 from hvi_fenicsx.rigid import Mode, RigidBody
 from hvi_fenicsx.workflow import find_solution
 
@@ -87,7 +87,7 @@ def test_few_rigid_motions_are_named_and_many_are_counted(tmp_path: Path) -> Non
 @pytest.mark.parametrize(("cells", "linear"), [(8, "MUMPS"), (64, "CG with geometric multigrid on the mesh hierarchy")])
 def test_the_linear_solver_is_the_one_that_a_run_takes(cells: int, linear: str) -> None:
     """On 64 x 64 cells a coarser level pays."""
-    prepared = prepare(Scene.model_validate(model(cells)))
+    prepared = prepare(read_tables(model(cells)))
     assert console.solver(prepared).endswith(linear)
     found = find_solution(prepared)
     assert found.solution.converged

@@ -17,7 +17,7 @@ import sympy
 from runs import ROOT
 from scenes import STEEL, E, P, Q, Table, block, displacement, energy, far, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import InputError, Scene, prepare, read_scene, solve
+from hvi_fenicsx import InputError, prepare, read_scene, read_tables, solve
 
 Array = npt.NDArray[np.float64]
 ALPHA, HEAT = 1.2e-5, 50.0
@@ -315,7 +315,7 @@ def test_a_floor_bears_the_weight_of_any_shape(shape: str) -> None:
 def test_what_a_scene_does_not_name_is_not_there() -> None:
     table = body("isotropic plane stress")
     table["boundary"] = rollers("isotropic plane stress") | {"pull": {"on": "right", "traction": [P, 0.0]}}
-    problem = prepare(Scene.model_validate(table)).problem
+    problem = prepare(read_tables(table)).problem
     assert (problem.bounds, problem.terms, problem.surfaces, problem.bulk.averaged) == ((), (), (), ())
     assert list(problem.linear) == ["pull.traction"]
     assert not problem.bulk.strains
@@ -412,5 +412,5 @@ REFUSED: dict[str, tuple[Table, str]] = {
 def test_what_makes_no_sense_is_refused_with_a_reason(case: str) -> None:
     table, reason = REFUSED[case]
     with pytest.raises((InputError, ValueError)) as caught:
-        prepare(Scene.model_validate(table))
+        prepare(read_tables(table))
     assert reason in str(caught.value)

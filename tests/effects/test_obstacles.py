@@ -131,7 +131,7 @@ def stl_of_a_ball(file: Path, radius: float, center: list[float]) -> Path:
 
 
 def solved(table: Table) -> hvi.Solution:
-    found = hvi.solve(hvi.Scene.model_validate(table), estimate=False)
+    found = hvi.solve(hvi.read_tables(table), estimate=False)
     assert found.converged
     return found
 
@@ -213,7 +213,7 @@ def test_what_is_refused(contact: Table, said: str) -> None:
     table = model(4)
     table["boundary"]["floor"]["contact"] = contact
     with pytest.raises((hvi.InputError, ValueError), match=said):
-        hvi.prepare(hvi.Scene.model_validate(table))
+        hvi.prepare(hvi.read_tables(table))
 
 
 def test_a_scene_writes_its_obstacles_as_it_read_them() -> None:

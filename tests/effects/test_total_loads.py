@@ -11,7 +11,7 @@ from runs import hvi, write_scene
 from scenes import NU, E, Table
 
 import hvi_fenicsx
-from hvi_fenicsx import InputError, Scene, prepare
+from hvi_fenicsx import InputError, prepare, read_tables
 from hvi_fenicsx.workflow import solve
 
 
@@ -34,14 +34,14 @@ def bar(**loads: Any) -> Table:
 
 
 def energy(table: Table) -> float:
-    solution = solve(Scene.model_validate(table))
+    solution = solve(read_tables(table))
     assert solution.examination is not None
     return solution.examination.energy * solution.problem.scales.energy
 
 
 def resultant(table: Table, about: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Force and moment of all loads, SI, from the assembled load vector."""
-    prepared = prepare(Scene.model_validate(table))
+    prepared = prepare(read_tables(table))
     scales, d = prepared.problem.scales, prepared.problem.scales.dimension
     force = prepared.system.pushing * scales.force
     arm = prepared.problem.points[: len(force), :d] - np.array(about)
@@ -85,7 +85,7 @@ def test_a_force_in_space_has_its_resultant() -> None:
 )
 def test_what_makes_no_sense_is_refused(loads: Table, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        Scene.model_validate(plate(**loads))
+        read_tables(plate(**loads))
 
 
 def test_from_python_they_are_the_same() -> None:

@@ -82,9 +82,9 @@ def test_an_unknown_in_stick_stays_there() -> None:
 
 def test_all_saddles_of_a_curved_scene_are_certified() -> None:
     """No solver makes a saddle exact; each is certified as it was found. A small ε leaves their number as it is."""
-    plain = hvi.equilibria(hvi.Scene.model_validate(model(2, 6e6, 1e6, quadratic_linear(3e6))))
+    plain = hvi.equilibria(hvi.read_tables(model(2, 6e6, 1e6, quadratic_linear(3e6))))
     smooth = {"smoothing": "chks", "epsilon": 1e-4}
-    found = hvi.equilibria(hvi.Scene.model_validate(model(2, 6e6, 1e6, quadratic_linear(3e6), **smooth)))
+    found = hvi.equilibria(hvi.read_tables(model(2, 6e6, 1e6, quadratic_linear(3e6), **smooth)))
     assert all(s.converged for s in found.solutions)
     assert sorted(found.kinds) == sorted(plain.kinds)
     assert [s.energy for s in found.solutions] == pytest.approx([s.energy for s in plain.solutions], rel=1e-3)

@@ -39,7 +39,7 @@ def energies() -> list[float]:
 
 
 def test_python_finds_all_certified_and_proves_the_lowest(caplog: pytest.LogCaptureFixture) -> None:
-    scene = hvi.Scene.model_validate(model(3, 6e6, friction=STRONG))
+    scene = hvi.read_tables(model(3, 6e6, friction=STRONG))
     with caplog.at_level(logging.DEBUG, logger="hvi_fenicsx"):
         found = hvi.equilibria(scene)
     told = [r.getMessage() for r in caplog.records if r.getMessage().startswith("certified: ")]
@@ -93,7 +93,7 @@ def test_the_lowest_equilibrium_is_certified_where_a_descent_ends_slowly() -> No
     table = model(3, 3.333e8, 2.218e8, friction=law, gap=6.904e-4)
     table["domain"] = {"shape": "rectangle", "size": [1.0, 0.272], "cells": [3, 2]}
     table["material"] = {"model": "plane_strain", "youngs_modulus": 4.507e10, "poisson_ratio": 0.0}
-    found = hvi.equilibria(hvi.Scene.model_validate(table), lowest=True)
+    found = hvi.equilibria(hvi.read_tables(table), lowest=True)
     assert found.proven
     assert found.solutions[0].converged
 

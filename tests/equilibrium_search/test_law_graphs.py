@@ -95,7 +95,7 @@ def test_all_equilibria_of_the_smoothed_scene_and_its_lowest() -> None:
     """At small widths as many as those of the law itself, a little apart."""
     law = polyline([(0.0, 0.0), (DELTA, 3e6), (DELTA, 1.5e6)])
     wanted = [p.energy for p in Floor(3, 6e6, 1e6, law).stationary()]
-    scene = hvi.Scene.model_validate(model(3, 6e6, 1e6, quadratic_linear(3e6), **SMOOTHED))
+    scene = hvi.read_tables(model(3, 6e6, 1e6, quadratic_linear(3e6), **SMOOTHED))
     found = hvi.equilibria(scene)
     assert found.complete
     assert [s.energy for s in found.solutions] == pytest.approx(wanted, rel=1e-4)
@@ -105,7 +105,7 @@ def test_all_equilibria_of_the_smoothed_scene_and_its_lowest() -> None:
 @pytest.mark.parametrize("smoothing", ["paper", pytest.param("chks", marks=pytest.mark.long)])
 def test_a_curved_scene_has_a_proven_lowest_energy(smoothing: str) -> None:
     smooth = {"smoothing": smoothing, "epsilon": 0.05}
-    scene = hvi.Scene.model_validate(model(2, 6e6, 1e6, quadratic_linear(3e6), **smooth))
+    scene = hvi.read_tables(model(2, 6e6, 1e6, quadratic_linear(3e6), **smooth))
     found = hvi.equilibria(scene, lowest=True, gap=1e-6)
     assert found.proven
     assert found.solutions[0].converged
@@ -116,8 +116,8 @@ def test_a_curved_scene_has_a_proven_lowest_energy(smoothing: str) -> None:
 
 def test_the_equilibria_of_a_curved_scene_are_found_without_a_proof() -> None:
     """The paper's smoothing changes the law at zero slip, too; the smallest width leaves it near the other one."""
-    scene = hvi.Scene.model_validate(model(3, 6e6, 1e6, quadratic_linear(3e6), smoothing="quadratic", epsilon=0.002))
-    curved = hvi.Scene.model_validate(model(3, 6e6, 1e6, quadratic_linear(3e6), smoothing="paper", epsilon=0.002))
+    scene = hvi.read_tables(model(3, 6e6, 1e6, quadratic_linear(3e6), smoothing="quadratic", epsilon=0.002))
+    curved = hvi.read_tables(model(3, 6e6, 1e6, quadratic_linear(3e6), smoothing="paper", epsilon=0.002))
     found, near = hvi.equilibria(curved), hvi.equilibria(scene)
     assert (found.complete, found.proven) == (False, False)
     assert found.reason == "3 found, and there may be more: curved laws are searched without a proof"

@@ -319,7 +319,7 @@ SCENES = [
 
 @pytest.mark.parametrize("table", SCENES)
 def test_the_lowest_equilibrium_of_a_scene_is_certified_and_a_run_is_not_below_its_bound(table: Table) -> None:
-    scene = hvi.Scene.model_validate(table)
+    scene = hvi.read_tables(table)
     found = hvi.equilibria(scene, lowest=True)
     assert found.proven
     assert found.lower_bound is not None
@@ -331,7 +331,7 @@ def test_the_lowest_equilibrium_of_a_scene_is_certified_and_a_run_is_not_below_i
 
 @pytest.mark.long
 def test_a_search_of_such_laws_that_is_stopped_tells_what_it_found_and_what_is_open() -> None:
-    found = hvi.equilibria(hvi.Scene.model_validate(space(2)), limit=20.0)
+    found = hvi.equilibria(hvi.read_tables(space(2)), limit=20.0)
     assert (found.complete, found.proven) == (False, False)
     assert "open" in found.reason
     assert len(found.solutions) > 1
@@ -339,7 +339,7 @@ def test_a_search_of_such_laws_that_is_stopped_tells_what_it_found_and_what_is_o
     energies = [s.energy for s in found.solutions]
     assert found.lower_bound is not None
     assert found.lower_bound <= min(energies)
-    lowest = hvi.equilibria(hvi.Scene.model_validate(space(2)), lowest=True)
+    lowest = hvi.equilibria(hvi.read_tables(space(2)), lowest=True)
     assert min(energies) == pytest.approx(lowest.solutions[0].energy, rel=1e-8)
 
 
@@ -349,7 +349,7 @@ def test_a_block_that_sticks_and_could_slide_off_has_one_minimiser_and_no_lowest
     The search for all has more cells than a test has time for; a saddle is among what it finds later.
     """
     law = {"law": "graph", "points": [[0, 0], [0, 1.2e4], [4e-5, 0]]}
-    scene = hvi.Scene.model_validate(
+    scene = hvi.read_tables(
         {
             "domain": {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [1, 1, 1]},
             "material": {"model": "three_dimensional", "youngs_modulus": 2e9, "poisson_ratio": 0.3},
@@ -376,7 +376,7 @@ def test_where_the_energy_is_convex_the_only_equilibrium_is_proven_at_once() -> 
     """Friction that never weakens; the search for the lowest energy knows nothing of it, and ends there too."""
     table = space(2)
     table["boundary"]["floor"]["friction"] = {"law": "tresca", "yield_traction": 4e6}
-    scene = hvi.Scene.model_validate(table)
+    scene = hvi.read_tables(table)
     found, lowest = hvi.equilibria(scene), hvi.equilibria(scene, lowest=True)
     assert (found.complete, found.proven, found.nodes, found.gap) == (True, True, 0, 0.0)
     assert found.reason.startswith("the only equilibrium, proven: the energy is convex")

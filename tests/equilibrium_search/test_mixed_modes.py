@@ -18,7 +18,7 @@ CRITERIA = {
 }
 
 
-def scene(criterion: str, poisson_ratio: float = 0.0) -> hvi.Scene:
+def scene(criterion: str, poisson_ratio: float = 0.0) -> hvi.Model:
     """A square under a uniform stress. Without contraction all its bonds have one share of the slip, and one m g(δ)."""
     strength = CRITERIA[criterion] * TRACTION
     pull, drag = strength * np.sqrt(1.0 - SHARE), BETA * strength * np.sqrt(SHARE)
@@ -33,7 +33,7 @@ def scene(criterion: str, poisson_ratio: float = 0.0) -> hvi.Scene:
             "glue": {"on": "bottom", "cohesion": {"law": "graph", "points": POINTS, "beta": BETA, **mixed}},
         },
     }
-    return hvi.Scene.model_validate(table)
+    return hvi.read_tables(table)
 
 
 def lengths(found: hvi.Solution) -> np.ndarray:

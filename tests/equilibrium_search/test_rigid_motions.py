@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes import Table, block, model
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.equilibrium_search.rigid_motions import EPSILON, with_motions
@@ -20,7 +20,7 @@ TRESCA = {"law": "tresca", "yield_traction": PEAK, "reference_slip": 1e-6}
 
 
 def of_scene(table: Table) -> CondensedProblem:
-    return Condensation(prepare(Scene.model_validate(table)).system).problem
+    return Condensation(prepare(read_tables(table)).system).problem
 
 
 def test_a_free_block_has_the_motions_of_geometry_and_no_resistance_to_them() -> None:

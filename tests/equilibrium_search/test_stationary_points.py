@@ -16,7 +16,7 @@ from condensed import problem as condensed
 from enumeration import Floor, polyline
 from scenes import DELTA, block, model
 
-from hvi_fenicsx import Scene, prepare, solve
+from hvi_fenicsx import prepare, read_tables, solve
 from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain, energy, total
 from hvi_fenicsx.equilibrium_search.boxes import fresh_box
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
@@ -70,7 +70,7 @@ def problem_of(case: Case) -> tuple[ScalarProblem, float]:
     """The condensed problem of the package, and the unit of its energy."""
     cells, pull, press, graph, wall = case
     law = {"law": "graph", "points": [list(p) for p in graph]}
-    system = prepare(Scene.model_validate((model if wall else block)(cells, pull, press, law))).system
+    system = prepare(read_tables((model if wall else block)(cells, pull, press, law))).system
     return scalar_problem(Condensation(system).problem), system.problem.scales.energy
 
 
@@ -130,7 +130,7 @@ def test_bonds_that_stick_keep_their_point_however_often_its_cell_is_clipped() -
     table["material"] |= {"youngs_modulus": 6e7, "poisson_ratio": 0.0}
     table["boundary"]["floor"]["support"] = {"law": "tresca", "yield_traction": 347.7}
     del table["boundary"]["floor"]["contact"]
-    scene = Scene.model_validate(table)
+    scene = read_tables(table)
     known = solve(scene, estimate=False)
     assert known.converged
     points = found(scalar_problem(Condensation(prepare(scene).system).problem)).points
@@ -190,7 +190,7 @@ def test_the_balance_of_bodies_knows_that_all_bonds_must_bear_nearly_their_peak(
     """Pulled by the peak less 1 % of it, no bond can be broken: all slips lie just before the drop."""
     far_drop = 1e3 * DELTA  # the body's own strain is small beside it
     law = {"law": "graph", "points": [[0.0, 0.0], [far_drop, 1e6], [far_drop, 5e5]]}
-    problem = scalar_problem(Condensation(prepare(Scene.model_validate(block(8, 0.99e6, 1e6, law))).system).problem)
+    problem = scalar_problem(Condensation(prepare(read_tables(block(8, 0.99e6, 1e6, law))).system).problem)
     low, high = np.maximum(problem.lower, -problem.far), np.minimum(problem.upper, problem.far)
     ends = RigidBalance(problem).tightened(low, high)
     bonded = np.array([len(chain) > 1 for chain in problem.chains])
@@ -314,7 +314,7 @@ def test_a_drop_that_is_rounding_is_none() -> None:
     table = model(3, 6e6, 1e6, {"law": "graph", "points": [list(p) for p in paper(3e6)]})
     glue = {"law": "graph", "points": [[0, 0], [4e-6, 5e6], [2e-5, 0]], "one_sided": True}
     table["boundary"]["another"] = {"on": "bottom", "adhesion": glue}
-    prepared = prepare(Scene.model_validate(table))
+    prepared = prepare(read_tables(table))
     search = Enumeration(problem=scalar_problem(Condensation(prepared.system).problem))
     search.start()
     steps = itertools.count()

@@ -12,7 +12,7 @@ import pytest
 from enumeration import Floor, polyline
 from scenes import DELTA, model
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.equilibrium_search.arcs import FREE, chain
 from hvi_fenicsx.equilibrium_search.balance_programme import BalanceProgramme, BalanceTest
 from hvi_fenicsx.equilibrium_search.boxes import fresh_box
@@ -79,7 +79,7 @@ def test_a_diagonal_beyond_the_stiffness_is_not_used() -> None:
 
 def condensed_floor(cells: int, press: float = 6e6) -> ScalarProblem:
     law = {"law": "graph", "points": [list(point) for point in PAPER]}
-    return scalar_problem(Condensation(prepare(Scene.model_validate(model(cells, press, 1e6, law))).system).problem)
+    return scalar_problem(Condensation(prepare(read_tables(model(cells, press, 1e6, law))).system).problem)
 
 
 def searched(problem: ScalarProblem, cut: Callable[[], bool] = lambda: False) -> Enumeration:
@@ -154,6 +154,6 @@ def test_all_points_of_a_long_floor_take_few_cells() -> None:
     """The search took 55 cells before the balance was weighed."""
     table = tomllib.loads((Path(__file__).parents[2] / "demos" / "strong_law.toml").read_text(encoding="utf-8"))
     table["domain"]["cells"] = [16, 16]
-    search = searched(scalar_problem(Condensation(prepare(Scene.model_validate(table)).system).problem))
+    search = searched(scalar_problem(Condensation(prepare(read_tables(table)).system).problem))
     assert len(search.points) == 3
     assert search.cells <= 15

@@ -18,7 +18,7 @@ from domains import lost, space_on
 from mpi4py import MPI
 from runs import LONG_RANKS
 
-from hvi_fenicsx import Scene, workflow
+from hvi_fenicsx import read_tables, workflow
 from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
@@ -76,7 +76,7 @@ def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_what_is_solved_does_not_change(bored: Path) -> None:
     thresholds = workflow.Thresholds(mesh=COARSER, solvers=SolverThresholds(nested_from=500))
-    scene = Scene.model_validate(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})
+    scene = read_tables(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})
     nested = workflow.solve(scene, thresholds=thresholds)
     alone = workflow.solve(scene, thresholds=replace(thresholds, mesh=replace(COARSER, hierarchy_from=10**9)))
     assert [s.solve_result.levels for s in (nested, alone)] == [2, 1]  # type: ignore[union-attr]

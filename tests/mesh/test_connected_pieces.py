@@ -13,7 +13,7 @@ import meshes
 import pytest
 from runs import LONG_RANKS, on_ranks
 
-from hvi_fenicsx import Scene, workflow
+from hvi_fenicsx import read_tables, workflow
 from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 
@@ -49,7 +49,7 @@ def test_each_body_has_its_own_coarser_mesh(dimension: int, size: float, ranks: 
 
 def test_what_is_solved_does_not_change(tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "two.msh", meshes.TOUCHING.format(size=0.05, dimension=2))
-    scene = Scene.model_validate(JOINT | {"domain": {"shape": "file", "file": str(file)}})
+    scene = read_tables(JOINT | {"domain": {"shape": "file", "file": str(file)}})
     thresholds = workflow.Thresholds(mesh=COARSER, solvers=SolverThresholds(nested_from=500))
     nested = workflow.solve(scene, thresholds=thresholds)
     alone = workflow.solve(scene, thresholds=replace(thresholds, mesh=replace(COARSER, hierarchy_from=10**9)))

@@ -14,7 +14,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from runs import hvi, summary
 
-from hvi_fenicsx import InputError, Scene, prepare, read_scene
+from hvi_fenicsx import InputError, Model, prepare, read_scene
 from hvi_fenicsx.api import solve
 from hvi_fenicsx.mesh import facets as facet_sizes
 from hvi_fenicsx.mesh import gmsh_file, refinement
@@ -111,7 +111,7 @@ def test_a_side_is_moved_with_its_body() -> None:
     np.testing.assert_allclose(found, [[2.9, 4.5], [3.0, 4.0]], atol=1e-12)
 
 
-def hertz(domain: str) -> Scene:
+def hertz(domain: str) -> Model:
     return read_scene(DEMOS / "hertz.toml", ["solver.degree=2", f"domain={domain}"])
 
 

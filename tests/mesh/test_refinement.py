@@ -21,7 +21,7 @@ from domains import BODIES, COMM, half_disk, lost, measure, rough, towards, volu
 from runs import LONG_RANKS
 from scenes import model, quadratic_linear, solved_system
 
-from hvi_fenicsx import Scene, workflow
+from hvi_fenicsx import Model, read_tables, workflow
 from hvi_fenicsx.mesh import gmsh_file, refinement
 from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
@@ -109,9 +109,9 @@ def test_ten_steps_do_not_spoil_the_cells(make: Callable[[], Domain]) -> None:
     assert angles[9] > 0.9 * angles[5]
 
 
-def slanted(cells: float) -> Scene:
+def slanted(cells: float) -> Model:
     """A disk in a bed of its own shape, so that frames turn, with a friction."""
-    return Scene.model_validate(
+    return read_tables(
         {
             "domain": {"shape": "disk", "radius": 0.5, "mesh_size": cells},
             "material": {"model": "plane_strain", "youngs_modulus": 1e7, "poisson_ratio": 0.3},
@@ -143,8 +143,8 @@ def test_prolongation_turns_with_the_frames() -> None:
     assert np.max(np.abs(found.x.array - (plain * cartesian).array)) < 1e-14
 
 
-@pytest.mark.parametrize("scene", [Scene.model_validate(model(8, 3e6, friction=quadratic_linear(1e6))), slanted(0.1)])
-def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
+@pytest.mark.parametrize("scene", [read_tables(model(8, 3e6, friction=quadratic_linear(1e6))), slanted(0.1)])
+def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Model) -> None:
     """The solution of the finest mesh is that of a direct solve from rest; few steps remain from the coarser one."""
     coarse, options = workflow.prepare(scene, COMM), options_of(scene.solver)
     options = replace(options, thresholds=SolverThresholds(linear=LinearThresholds(largest_direct={2: 500, 3: 500})))
@@ -169,7 +169,7 @@ def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Scene) -> None:
     assert found.result.counts.newton <= 4 * direct.counts.newton
 
 
-def assembled(scene: Scene, body: Domain) -> System:
+def assembled(scene: Model, body: Domain) -> System:
     return assemble(body, scene.formulation(), Timer())
 
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from pydantic import ValidationError
 from scenes import STEEL, solved
 
-from hvi_fenicsx import InputError, Scene
+from hvi_fenicsx import InputError, read_tables
 from hvi_fenicsx.geometry import Outline
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.shapes import (
@@ -87,12 +87,12 @@ def test_sides_and_regions_of_a_users_shape_are_checked(wedge: type[DomainShape]
     table = on_wedge()
     table["material"]["b"]["region"] = "easst"
     with pytest.raises(InputError, match='unknown region "easst"; did you mean "east"') as caught:
-        Scene.model_validate(table)
+        read_tables(table)
     assert "(a wedge)" in str(caught.value)
     table = on_wedge()
     table["boundary"]["floor"]["on"] = "floor"
     with pytest.raises(InputError, match='unknown side "floor"; allowed: bottom, left, right, top'):
-        Scene.model_validate(table)
+        read_tables(table)
 
 
 def test_a_shape_needs_a_name_that_is_free() -> None:

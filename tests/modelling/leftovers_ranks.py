@@ -24,6 +24,6 @@ def counted(system: System) -> None:
 
 System.free = counted  # type: ignore[method-assign]
 PETSc.Log.begin()
-hvi.solve(hvi.Scene.model_validate(model(12, 3e6, friction=STUCK_AND_DROPPING)), COMM)
+hvi.solve(hvi.read_tables(model(12, 3e6, friction=STUCK_AND_DROPPING)), COMM)
 if COMM.rank == 0:
     print(json.dumps(max(counts)))

@@ -40,7 +40,7 @@ def measured(call: Callable[[], Any]) -> dict[str, list[float]]:
     return found
 
 
-def followed(scene: hvi.Scene) -> None:
+def followed(scene: hvi.Model) -> None:
     path = hvi.follow(scene, COMM)
     path.u(-1)
     path.free()
@@ -48,9 +48,9 @@ def followed(scene: hvi.Scene) -> None:
 
 def main() -> None:
     PETSc.Log.begin()
-    small = hvi.Scene.model_validate(model(12, 3e6, friction=LAW))
-    curved = hvi.Scene.model_validate(model(3, 3e6, friction=quadratic_linear(3e6)))
-    nested = hvi.Scene.model_validate(model(52, 3e6, friction=LAW))  # with coarser levels
+    small = hvi.read_tables(model(12, 3e6, friction=LAW))
+    curved = hvi.read_tables(model(3, 3e6, friction=quadratic_linear(3e6)))
+    nested = hvi.read_tables(model(52, 3e6, friction=LAW))  # with coarser levels
     calls = {
         "path": lambda: followed(small),
         "equilibria": lambda: hvi.equilibria(curved, COMM),

@@ -25,7 +25,7 @@ class Kept(logging.Handler):
 package = logging.getLogger("hvi_fenicsx")
 package.addHandler(Kept())
 package.setLevel(logging.DEBUG)
-scene = hvi.Scene.model_validate(block(2, 0.0, friction=quadratic_linear(1e6)))
+scene = hvi.read_tables(block(2, 0.0, friction=quadratic_linear(1e6)))
 found = hvi.equilibria(scene)
 searched = Equilibria(hvi.prepare(scene, comm))
 (point,) = searched.find(lowest=False, gap=1e-8, stop=lambda: False, report=lambda _: None).points

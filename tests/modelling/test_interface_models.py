@@ -53,7 +53,7 @@ def test_an_interface_between_tagged_sides_is_that_of_a_scene() -> None:
     model = hvi.Model(body, [*LOADS, hvi.Contact("seam"), hvi.Friction("seam", LAW)])
     found = hvi.solve(model, tolerance=1e-10)
     table = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", tolerance=1e-10)
-    same = hvi.solve(hvi.Scene.model_validate(table), MPI.COMM_SELF)
+    same = hvi.solve(hvi.read_tables(table), MPI.COMM_SELF)
     assert found.converged
     assert found.energy == pytest.approx(same.energy, rel=1e-9)
     assert found.contact["seam"].pressure == pytest.approx(same.contact["seam"].pressure, rel=1e-6, abs=1.0)
@@ -66,7 +66,7 @@ def test_cohesion_between_tagged_sides_is_that_of_a_scene() -> None:
     table = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress")
     seam = table["interface"]["seam"]
     seam["cohesion"] = {**seam.pop("friction"), "beta": 0.5}
-    same = hvi.solve(hvi.Scene.model_validate(table), MPI.COMM_SELF)
+    same = hvi.solve(hvi.read_tables(table), MPI.COMM_SELF)
     assert found.converged == same.converged
     assert found.energy == pytest.approx(same.energy, rel=1e-9)
     assert found.contact["seam"].friction == pytest.approx(same.contact["seam"].friction, rel=1e-6, abs=1.0)

@@ -54,7 +54,7 @@ def plane_stress(u: Any, v: Any) -> Any:
 
 
 def test_an_own_mesh_gives_what_the_scene_gives(found: hvi.Solution) -> None:
-    scene = hvi.Scene.model_validate(scene_table(8, 3e6, friction=quadratic_linear(1e6)))
+    scene = hvi.read_tables(scene_table(8, 3e6, friction=quadratic_linear(1e6)))
     same = hvi.solve(scene, MPI.COMM_SELF)
     assert found.converged
     assert same.converged
@@ -275,7 +275,7 @@ def test_wrong_words_are_refused_as_in_a_scene_file(body: hvi.Body) -> None:
             "petsc: no solver of this run has read ksp_max_itt",
         ),
         (lambda: hvi.solve(steel_square(body=body), petsc={"pc_type": "luu"}), "-hvi_pc_type luu: .*PC type luu"),
-        (lambda: hvi.Scene(domain={"shape": "rectangel"}), 'domain.shape: unknown .*mean "rectangle"'),
+        (lambda: hvi.read_tables({"domain": {"shape": "rectangel"}}), 'domain.shape: unknown .*mean "rectangle"'),
         (lambda: hvi.solve("part.toml"), "'part.toml' is no model; a scene file is read by"),  # type: ignore[arg-type]
     ]
     for make, reason in wrong:

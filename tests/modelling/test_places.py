@@ -28,13 +28,13 @@ def solved(body: hvi.Body, *effects: Any) -> hvi.Solution:
     return hvi.solve(hvi.Model(body, [*PUSHED, *effects]), estimate=False, tolerance=1e-12)
 
 
-def between_plates() -> hvi.Scene:
+def between_plates() -> hvi.Model:
     """The scene of a block between two plates, which are one part."""
     table = scene_table(8)
     sides: dict[str, Any] = {"wall": {"on": "left", "displacement": [0.0, "free"]}}
     sides["pull"] = {"on": "right", "traction": [-2e7, 1e6]}
     sides["plates"] = {"on": ["bottom", "top"], "contact": {"gap": 1e-6}, "friction": quadratic_linear(1e6)}
-    return hvi.Scene.model_validate({**table, "boundary": sides})
+    return hvi.read_tables({**table, "boundary": sides})
 
 
 def test_laws_on_a_list_are_those_of_a_scene_and_of_single_sides(body: hvi.Body) -> None:

@@ -257,7 +257,7 @@ def test_a_boolean_is_no_number(square: hvi.Body, effect: Any, true: Any) -> Non
         lambda: hvi.laws.QuadraticLinear(gamma1=2.0, gamma2=True, delta=1e-6),
         lambda: hvi.laws.Graph([(0, 0), (True, 1.0)]),
         lambda: hvi.laws.PowerLaw(energy_ratio=True, exponent=2.0),
-        lambda: hvi.Scene(domain={"shape": "rectangle", "size": [1.0, True], "cells": [2, 2]}, material={}),
+        lambda: hvi.read_tables({"domain": {"shape": "rectangle", "size": [1.0, True], "cells": [2, 2]}}),
     ],
 )
 def test_a_boolean_is_no_number_of_a_body_or_a_law(made: Any) -> None:

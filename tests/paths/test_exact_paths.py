@@ -14,7 +14,7 @@ from enumeration import Floor, polyline
 from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.relations import ContactPoints
 from hvi_fenicsx.paths.segments import Segment
@@ -121,7 +121,7 @@ def peeled() -> CondensedProblem:
             "glue": {"on": "bottom", "contact": {"gap": 0.0}, "adhesion": glue},
         },
     }
-    return Condensation(prepare(Scene.model_validate(table), MPI.COMM_SELF).system).problem
+    return Condensation(prepare(read_tables(table), MPI.COMM_SELF).system).problem
 
 
 def test_what_hardly_moves_does_not_drive_and_the_path_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -338,7 +338,7 @@ def distinct(states: Sequence[PathState]) -> list[float]:
 def test_states_on_a_small_floor_are_among_all_that_there_are() -> None:
     """Pulled from zero load, by brute force at the factor 1; the law drops on the way."""
     table = model(3, 6e6, friction=quadratic_linear(3e6, DELTA))
-    system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
+    system = prepare(read_tables(table), MPI.COMM_SELF).system
     condensation = Condensation(system)
     _, states = path(condensation.problem, programme=(1.0,))
     floor = Floor(3, 6e6, 1e6, polyline([(0.0, 0.0), (DELTA, 3e6), (DELTA, 1.5e6)]))

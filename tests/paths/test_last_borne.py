@@ -8,7 +8,7 @@ from enumeration import Floor, polyline
 from scenes import DELTA, P, block, displacement, far, points, quadratic_linear
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx import Scene
+from hvi_fenicsx import read_tables
 from hvi_fenicsx.api.solution import ModelSolution
 from hvi_fenicsx.load_paths import following
 
@@ -22,7 +22,7 @@ def last(request: pytest.FixtureRequest) -> ModelSolution:
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "auto":
             patch.setattr(following.PathRun, "follow", _must_not)
-        return hvi.solve(Scene.model_validate(PUSHED | {"solver": {"method": request.param}}))
+        return hvi.solve(read_tables(PUSHED | {"solver": {"method": request.param}}))
 
 
 def _must_not(*_: object) -> None:
@@ -58,7 +58,7 @@ def test_its_state_is_certified_under_its_load_and_the_answer_stays_no(last: Mod
 
 
 def test_below_the_limit_nothing_is_followed() -> None:
-    found = hvi.solve(Scene.model_validate(block(CELLS, 0.7 * P, P, quadratic_linear(STRENGTH))))
+    found = hvi.solve(read_tables(block(CELLS, 0.7 * P, P, quadratic_linear(STRENGTH))))
     assert found.converged
     assert found.last_borne is None
 
@@ -69,7 +69,7 @@ def test_moved_obstacles_are_scaled_as_on_a_path(method: str) -> None:
     table = block(CELLS, ABOVE, P, quadratic_linear(STRENGTH), method=method)
     plate = {"point": [0.0, 1.0], "normal": [0.0, -1.0], "displacement": [0.0, -1e-5]}
     table["boundary"]["press"] = {"on": "top", "contact": {"obstacle": plate}}
-    scene = Scene.model_validate(table)
+    scene = read_tables(table)
     found, path = hvi.solve(scene), hvi.follow(scene, memory=False)
     assert found.last_borne is not None
     assert found.examination is not None

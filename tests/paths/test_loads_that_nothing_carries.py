@@ -16,11 +16,11 @@ FADING: Table = {"law": "exponential", "peak_traction": 1e6, "residual_traction"
 GLUED: Table = {"adhesion": FADING, "friction": FADING}
 
 
-def on_rails(seam: Table, **loads: Table) -> hvi.Scene:
+def on_rails(seam: Table, **loads: Table) -> hvi.Model:
     """Two blocks, one on the other, on rails along x."""
     block = {"shape": "rectangle", "size": [1.0, 0.5], "cells": [1, 1]}
     rails = {"rails": {"on": "lower.bottom", "displacement": ["free", 0.0]}}
-    return hvi.Scene.model_validate(
+    return hvi.read_tables(
         {
             "domain": {"lower": block, "upper": block | {"origin": [0.0, 0.5]}},
             "material": {
@@ -86,10 +86,10 @@ def test_several_loads_together_may_be_scaled_in_both_directions() -> None:
     assert np.min(found.factor) == pytest.approx(-1e6 / 3e5, rel=1e-6)
 
 
-def disk(**floor: Table) -> hvi.Scene:
+def disk(**floor: Table) -> hvi.Model:
     """A disk on a floor, under its weight: it may roll and slide."""
     plane = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
-    return hvi.Scene.model_validate(
+    return hvi.read_tables(
         {
             "domain": {"shape": "disk", "radius": 0.1, "mesh_size": 0.04},
             "material": {"model": "plane_strain", "youngs_modulus": 2.1e9, "poisson_ratio": 0.3},
@@ -111,10 +111,10 @@ GLUE: Table = {"law": "graph", "points": [[0, 0], [1e-3, 9e3], [2e-3, 9e3], [4e-
 RUB: Table = {"friction": {"law": "graph", "points": [[0, 0], [1e-3, 18e3], [1e-3, 0]]}}
 
 
-def humped(cells: int, **floor: Table) -> hvi.Scene:
+def humped(cells: int, **floor: Table) -> hvi.Model:
     """A block over a hump that is 0.05 m too high, and a load that presses it down."""
     hump = {"shape": "sphere", "center": [0.7, 0.05 - 4.689], "radius": 4.689, "direction": [0.0, -1.0]}
-    return hvi.Scene.model_validate(
+    return hvi.read_tables(
         {
             "domain": {"shape": "rectangle", "size": [1.4, 1.0], "cells": [cells, 1]},
             "material": {"model": "plane_strain", "youngs_modulus": 1.1e7, "poisson_ratio": 0.3},
@@ -146,7 +146,7 @@ def test_a_floor_that_lifts_a_body_off_its_glue_as_a_whole_leaves_rounding_that_
 ) -> None:
     """By hand as above: 22.5 J/m² on 2 m. The elastic forces of a lifted body are rounding; they took it away."""
 
-    def lifted(**glue: Table) -> hvi.Scene:
+    def lifted(**glue: Table) -> hvi.Model:
         block = {"shape": "rectangle", "size": [2.0, 1.0], "cells": cells}
         boundary = {
             "floor": {"on": "bottom", "contact": {"gap": -0.05}, **RUB, **glue},
@@ -154,7 +154,7 @@ def test_a_floor_that_lifts_a_body_off_its_glue_as_a_whole_leaves_rounding_that_
         }
         material = {"model": "plane_strain", "youngs_modulus": 1.1e7, "poisson_ratio": 0.3}
         given = {"domain": block, "material": material, "boundary": boundary, "solver": {"degree": degree}}
-        return hvi.Scene.model_validate(given)
+        return hvi.read_tables(given)
 
     path = hvi.follow(lifted(adhesion=GLUE))
     assert (path.end, path.uncertified) == ("reached", 0)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 from scenes import STEEL, Table, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.api import solve
 from hvi_fenicsx.load_paths.measures import Measures
 from hvi_fenicsx.reduced.condensation import Condensation
@@ -54,9 +54,9 @@ def unknowns(condensation: Condensation, whole: npt.NDArray[np.float64]) -> npt.
 
 @pytest.mark.parametrize("table", [scene, slanted])
 def test_forces_and_means_are_those_of_the_whole_body(table: Callable[..., Table]) -> None:
-    solution = solve(Scene.model_validate(table(FACTOR)), estimate=False, tolerance=1e-11)
+    solution = solve(read_tables(table(FACTOR)), estimate=False, tolerance=1e-11)
     assert solution.converged
-    system = prepare(Scene.model_validate(table())).system
+    system = prepare(read_tables(table())).system
     condensation = Condensation(system, SCALED)
     measures = Measures(system, condensation, SCALED)
     solution.u.x.array[:] /= system.problem.scales.displacement

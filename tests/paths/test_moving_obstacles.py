@@ -14,10 +14,10 @@ E, FORCE, WAY = 1e9, 2e4, 1e-3
 FRICTION = {"law": "graph", "points": [[0, 0], [2e-6, 2e5], [8e-6, 4e5]]}
 
 
-def column(**changes: Any) -> hvi.Scene:
+def column(**changes: Any) -> hvi.Model:
     """A column of height 0.5 m and area 0.12 m² under a rigid plate that goes down by a millimetre."""
     plate = {"point": [0.0, 0.0, 0.5], "normal": [0.0, 0.0, -1.0], "displacement": [0.0, 0.0, -WAY]}
-    return hvi.Scene.model_validate(
+    return hvi.read_tables(
         {
             "domain": {"shape": "box", "size": [0.4, 0.3, 0.5], "cells": [2, 1, 2]},
             "material": {"model": "three_dimensional", "youngs_modulus": E, "poisson_ratio": 0.0},
@@ -29,11 +29,11 @@ def column(**changes: Any) -> hvi.Scene:
     )
 
 
-def punch(way: float = WAY, friction: Table | None = None, **obstacle: Any) -> hvi.Scene:
+def punch(way: float = WAY, friction: Table | None = None, **obstacle: Any) -> hvi.Model:
     """A roller that stands 0.2 mm over a block, and is pressed into it; the block is pushed from the left."""
     roller = {"shape": "sphere", "center": [0.5, 40.5002], "radius": 40.0, "direction": [0, 1]}
     floor = {"friction": FRICTION if friction is None else friction} if friction != {} else {}
-    return hvi.Scene.model_validate(
+    return hvi.read_tables(
         {
             "domain": {"shape": "rectangle", "size": [1.0, 0.5], "cells": [16, 8]},
             "material": {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": 0.3},
@@ -66,12 +66,12 @@ def test_a_plate_that_goes_down_and_up_compresses_a_column() -> None:
 
 def test_a_scene_names_the_obstacle_that_its_path_moves() -> None:
     table = column().tables() | {"path": {"to": 1.0, "scaled": ["lid.contact"]}}
-    path = hvi.follow(hvi.Scene.model_validate(table))
+    path = hvi.follow(hvi.read_tables(table))
     assert path.scaled == ("lid.contact",)
     assert path.force("lid")[-1, 2] == pytest.approx(-E * 0.12 / 0.5 * WAY, rel=1e-9)
     table["boundary"]["lid"]["contact"]["obstacle"].pop("displacement")
     with pytest.raises(ValueError, match=r'moved obstacle "lid\.contact"; allowed: base\.displacement'):
-        hvi.Scene.model_validate(table)
+        hvi.read_tables(table)
 
 
 def test_a_plate_that_stands_still_presses_from_the_start() -> None:
@@ -90,7 +90,7 @@ def test_a_roller_presses_as_in_single_runs_with_the_roller_there(friction: Tabl
     for row in (closed[0], closed[len(closed) // 2], closed[-1]):
         table = punch(row.factor * WAY, friction).tables()
         table["boundary"]["side"]["traction"] = [row.factor * FORCE, 0.0]
-        single = hvi.solve(hvi.Scene.model_validate(table), estimate=False)
+        single = hvi.solve(hvi.read_tables(table), estimate=False)
         assert single.converged
         np.testing.assert_allclose(row.forces["top"], single.resultant("top"), rtol=1e-6, atol=1e-6 * FORCE)
         assert row.energy == pytest.approx(single.energy, rel=1e-7)
@@ -106,7 +106,7 @@ def test_a_roller_presses_as_in_single_runs_with_the_roller_there(friction: Tabl
         (punch(friction={}, displacement=[1e-4, -1e-3]), "do not change in proportion"),
     ],
 )
-def test_an_obstacle_whose_gaps_change_otherwise_is_not_moved_by_a_path(scene: hvi.Scene, said: str) -> None:
+def test_an_obstacle_whose_gaps_change_otherwise_is_not_moved_by_a_path(scene: hvi.Model, said: str) -> None:
     with pytest.raises(hvi.InputError, match=said):
         hvi.follow(scene)
     assert hvi.follow(scene, scaled=["side.traction"]).end == "reached"
@@ -123,7 +123,7 @@ def test_laws_that_would_feel_the_displacement_of_an_obstacle_are_refused(law: s
     table = punch(friction={}, **obstacle).tables()
     table["boundary"]["top"][law] = FRICTION
     with pytest.raises(hvi.InputError, match=said):
-        hvi.check(hvi.Scene.model_validate(table))
+        hvi.check(hvi.read_tables(table))
 
 
 @pytest.mark.parametrize("gap", [1e-4, 1.23e-4])
@@ -138,7 +138,7 @@ def test_a_plate_that_just_touches_a_block_leaves_a_state_that_is_certified(gap:
             "lid": {"on": "top", "contact": {"obstacle": plate}},
         },
     }
-    path = hvi.follow(hvi.Scene.model_validate(scene), degree=2, to=[1.0, 0.0, 1.0])
+    path = hvi.follow(hvi.read_tables(scene), degree=2, to=[1.0, 0.0, 1.0])
     assert path.events.count("contact") > 7
     assert path.uncertified == 0
     assert path.rows[-1].energy == pytest.approx(0.5 * E * (2.6e-4 - gap) ** 2 / 0.3925, rel=1e-9)

@@ -16,7 +16,7 @@ GLUES = ("[[0,0],[4e-6,5e6],[2e-5,0]]", "[[0,0],[2e-6,1.25e7],[8e-6,0]]")
 """Two laws whose area is 50 J/m²."""
 
 
-def block(press: float, modulus: float) -> hvi.Scene:
+def block(press: float, modulus: float) -> hvi.Model:
     """The demo with another press and modulus; only the push is scaled."""
     changes = [
         f"boundary.press.traction=[0.0,{-press!r}]",
@@ -70,12 +70,12 @@ def test_a_jump_is_tried_in_another_way_where_its_first_curve_comes_to_singular_
         "material": {"model": "plane_stress", "youngs_modulus": 1895000.0, "poisson_ratio": 0.3},
         "boundary": {"glue": glue, "pull": {"on": "top", "traction": [0.567, 13.76]}},
     }
-    path = hvi.follow(hvi.Scene.model_validate(scene), to=1.5, memory=False)
+    path = hvi.follow(hvi.read_tables(scene), to=1.5, memory=False)
     assert path.end == "escapes"
     for part, code in ((0.99, 0), (1.01, 4)):
         pull = {"on": "top", "traction": [part * path.peak_factor * p for p in (0.567, 13.76)]}
         loaded = {**scene, "boundary": {"glue": glue, "pull": pull}}
-        assert hvi.solve(hvi.Scene.model_validate(loaded), estimate=False).exit_code == code
+        assert hvi.solve(hvi.read_tables(loaded), estimate=False).exit_code == code
 
 
 def test_a_block_sinks_where_its_bed_bears_no_more_although_bonds_turn_back_on_the_way() -> None:
@@ -92,7 +92,7 @@ def test_a_block_sinks_where_its_bed_bears_no_more_although_bonds_turn_back_on_t
             "wall": {"on": "left", "displacement": [0.0, "free"]},
         },
     }
-    path = hvi.follow(hvi.Scene.model_validate(scene), to=1.6)
+    path = hvi.follow(hvi.read_tables(scene), to=1.6)
     assert path.end == "escapes"
     assert path.peak_factor == pytest.approx(5514.0 / 3641.0, rel=1e-4)
     assert path.peak_factor < 5514.0 / 3641.0
@@ -106,7 +106,7 @@ def jumped(path: Any) -> float:
 def test_a_slender_body_comes_off_once_its_bonds_soften_together() -> None:
     """Sliding bonds all bear what the factor 0.2 asks for: above it nothing holds a body that has jumped that far."""
     size, drop = {"shape": "rectangle", "size": [1.0, 0.01]}, [[0.0, 0.0], [9.3e-8, 3e6], [3.72e-7, 6e5]]
-    scene = hvi.Scene.model_validate(
+    scene = hvi.read_tables(
         {
             "domain": {
                 "lower": {**size, "cells": [7, 7], "origin": [0.0, -0.01]},
@@ -140,7 +140,7 @@ def test_a_body_without_contact_and_law_follows_its_straight_path(programme: flo
     table = model(pull=P)
     del table["boundary"]["floor"]
     table["boundary"]["wall"]["displacement"] = [0.0, 0.0]
-    scene = hvi.Scene.model_validate(table)
+    scene = hvi.read_tables(table)
     path = hvi.follow(scene, to=programme)
     assert path.converged
     assert path.end == "reached"

@@ -48,7 +48,7 @@ def test_states_in_which_a_body_moves_without_load_are_certified() -> None:
             "floor": {"on": "bottom", "contact": floor, "friction": law},
         },
     }
-    path = hvi.follow(hvi.Scene.model_validate(table))
+    path = hvi.follow(hvi.read_tables(table))
     unloaded = [row for row in path.rows[1:] if abs(row.factor) < 1e-9]
     assert len(unloaded) > 2
     assert path.uncertified == 0
@@ -76,7 +76,7 @@ def test_a_smoothed_law_unloaded_to_nothing_is_loaded_again() -> None:
     """At no load a body on its floor is at rest, not off; without memory it comes to where it was."""
     table = model(4, pull=4e6, press=1e6, friction={"law": "graph", "points": [[0, 0], [2e-6, 3e6], [1.6e-5, 0]]})
     table["solver"] = {"smoothing": "quadratic", "epsilon": 0.05}
-    scene = hvi.Scene.model_validate(table)
+    scene = hvi.read_tables(table)
     path = hvi.follow(scene, to=[0.9, 0.0, 1.2], memory=False)
     assert path.end == "reached"
     assert path.uncertified == 0
@@ -84,7 +84,7 @@ def test_a_smoothed_law_unloaded_to_nothing_is_loaded_again() -> None:
     assert path.displacement("pull")[-1] == pytest.approx(once.displacement("pull")[-1], rel=1e-9)
 
 
-def slender() -> hvi.Scene:
+def slender() -> hvi.Model:
     """A nearly incompressible strip, a hundred times as long as high, that is pulled and lifts at one end."""
     law = {"law": "quadratic_linear", "gamma1": 1e4, "gamma2": 5e3, "delta": 9e-6}
     table = {
@@ -98,7 +98,7 @@ def slender() -> hvi.Scene:
         },
         "solver": {"degree": 2},
     }
-    return hvi.Scene.model_validate(table)
+    return hvi.read_tables(table)
 
 
 def test_a_path_of_a_slender_body_is_certified() -> None:
@@ -124,11 +124,11 @@ def test_the_path_of_a_body_on_nothing_ends_at_once() -> None:
     """No unknown carries anything, and a rigid motion is left."""
     table = slender().tables()
     boundary = {name: part for name, part in table["boundary"].items() if name != "floor"}
-    path = hvi.follow(hvi.Scene.model_validate(table | {"boundary": boundary}))
+    path = hvi.follow(hvi.read_tables(table | {"boundary": boundary}))
     assert (path.end, len(path.rows), path.uncertified) == ("escapes", 2, 0)
 
 
-def towers() -> hvi.Scene:
+def towers() -> hvi.Model:
     """A tall block on another, hardly compressible: rounding of the stiffness leaves 2e-8 of the loads on Γc."""
     block = {"shape": "rectangle", "size": [0.1, 1.0]}
     law = {"law": "exponential", "peak_traction": 3e6, "residual_traction": 1.5e6, "delta": 9.3e-7}
@@ -145,7 +145,7 @@ def towers() -> hvi.Scene:
         },
         "interface": {"floor": {"between": ["upper.bottom", "lower.top"], "contact": {"gap": 0.0}, "friction": law}},
     }
-    return hvi.Scene.model_validate(table)
+    return hvi.read_tables(table)
 
 
 def test_rounding_of_the_stiffness_is_taken_out_where_bonds_have_turned_back() -> None:

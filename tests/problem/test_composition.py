@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from runs import hvi, summary, write_scene
 from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved, solved_system
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.solvers import SolveResult
 from hvi_fenicsx.solvers.registry import choose
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
@@ -109,14 +109,14 @@ def found_by_solver(ready: Preparation) -> SolveResult:
 @pytest.mark.parametrize("name", SCENES)
 def test_only_what_is_named_is_compiled(name: str, compiled: Compiled) -> None:
     table, integrals, _, _ = SCENES[name]
-    prepare(Scene.model_validate(table))
+    prepare(read_tables(table))
     assert compiled.integrals == integrals
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_solver_follows_from_what_acts(name: str) -> None:
     table, _, method, bounds = SCENES[name]
-    ready = prepare(Scene.model_validate(table))
+    ready = prepare(read_tables(table))
     box = np.concatenate([ready.system.lower.array, ready.system.upper.array])
     assert bool(np.isfinite(box).any()) is bounds
     found = finish(ready)
@@ -130,7 +130,7 @@ def test_the_solver_follows_from_what_acts(name: str) -> None:
 @pytest.mark.parametrize("name", [n for n, case in SCENES.items() if case[2] == "linear"])
 def test_a_scene_without_nonsmooth_effects_is_one_ksp_solve(name: str) -> None:
     """By PETSc's own count of events."""
-    ready = prepare(Scene.model_validate(SCENES[name][0]))
+    ready = prepare(read_tables(SCENES[name][0]))
     before = calls("KSPSolve"), calls("SNESSolve")
     assert found_by_solver(ready).converged
     assert (calls("KSPSolve") - before[0], calls("SNESSolve") - before[1]) == (1, 0)
@@ -139,7 +139,7 @@ def test_a_scene_without_nonsmooth_effects_is_one_ksp_solve(name: str) -> None:
 @pytest.mark.usefixtures("events")
 def test_contact_alone_is_one_snes_solve_after_the_start() -> None:
     """The body comes down on an inclined floor: some vertices lift, so that there is something to iterate."""
-    ready = prepare(Scene.model_validate(scene({"contact": {"gap": "1e-6*x"}})))
+    ready = prepare(read_tables(scene({"contact": {"gap": "1e-6*x"}})))
     before = calls("SNESSolve")
     assert found_by_solver(ready).converged
     assert calls("SNESSolve") - before == 1
@@ -169,7 +169,7 @@ def test_a_linear_scene_takes_coarser_levels_for_its_multigrid_only() -> None:
 
 
 def test_a_method_that_is_named_is_the_one() -> None:
-    ready = prepare(Scene.model_validate(rolling() | {"solver": {"method": "condensed"}}))
+    ready = prepare(read_tables(rolling() | {"solver": {"method": "condensed"}}))
     assert choose(ready.options, ready.system).name == "condensed"
 
 

@@ -9,7 +9,7 @@ from meshes import make
 from mpi4py import MPI
 from scenes import STEEL, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.geometry import tangents
 from hvi_fenicsx.problem.contact_surface import Surface, decide
@@ -35,7 +35,7 @@ def distance(solution: Any, slope: float, at: float = 1.0) -> Any:
 def test_without_friction_a_body_slides_down_any_slope(slope: float) -> None:
     scene = on_slope(slope, block(2, push=0.0))
     del scene["boundary"]["pull"]
-    found = prepare(Scene.model_validate(scene)).solvability
+    found = prepare(read_tables(scene)).solvability
     assert found.state == "escapes"
     assert found.margin == pytest.approx(-slope, rel=1e-6)
 

@@ -7,7 +7,7 @@ import pytest
 from dolfinx import fem
 from scenes import STEEL, Table, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.problem import references
 from hvi_fenicsx.problem.factored_problem import FactoredProblem
@@ -33,8 +33,8 @@ def scene(factor: float = 1.0) -> Table:
 
 
 def test_loads_and_displacements_are_those_of_the_scene_with_multiplied_values() -> None:
-    problem = prepare(Scene.model_validate(scene())).problem
-    wanted = prepare(Scene.model_validate(scene(FACTOR)))
+    problem = prepare(read_tables(scene())).problem
+    wanted = prepare(read_tables(scene(FACTOR)))
     made = FactoredProblem(problem, ["body.temperature", "wall.displacement", "grip.displacement"])
     made.at(7.0)
     found = made.at(FACTOR)
@@ -54,8 +54,8 @@ def test_the_certificate_at_a_factor_passes_for_its_own_solution_alone(factor: f
     """Solved as a scene of its own; at another factor the same displacement fails."""
     from hvi_fenicsx import solve
 
-    solution = solve(Scene.model_validate(scene(factor)), estimate=False)
-    problem = prepare(Scene.model_validate(scene())).problem
+    solution = solve(read_tables(scene(factor)), estimate=False)
+    problem = prepare(read_tables(scene())).problem
     made = FactoredProblem(problem, ["body.temperature", "wall.displacement", "grip.displacement"])
     assert solution.solve_result is not None
     u = fem.Function(problem.space)
@@ -67,7 +67,7 @@ def test_the_certificate_at_a_factor_passes_for_its_own_solution_alone(factor: f
 
 
 def test_what_is_found_once_for_a_mesh_is_kept_when_laws_change() -> None:
-    problem = prepare(Scene.model_validate(scene())).problem
+    problem = prepare(read_tables(scene())).problem
     made = FactoredProblem(problem, [])
     changed = made.at(1.0, problem.terms)
     assert changed.bodies is made.at(1.0).bodies

@@ -55,9 +55,7 @@ def test_a_step_of_the_lengths_is_two_pieces_with_their_own_laws(laws: Table, so
 
 
 def test_paths_and_all_equilibria_follow_the_lengths() -> None:
-    formula, pieces = (
-        hvi.Scene.model_validate(t) for t in both(model(4, 6e6), {"friction": quadratic_linear(1e7, 4e-6)})
-    )
+    formula, pieces = (hvi.read_tables(t) for t in both(model(4, 6e6), {"friction": quadratic_linear(1e7, 4e-6)}))
     assert_same_equilibria(formula, pieces)
     paths = [hvi.follow(scene, follow="exact") for scene in (formula, pieces)]
     rows = [[(row.factor, row.energy) for row in path.rows] for path in paths]
@@ -150,4 +148,4 @@ def test_models_from_python_give_lengths_as_functions() -> None:
 )
 def test_what_is_refused(law: Table, said: str) -> None:
     with pytest.raises((hvi.InputError, ValueError), match=said):
-        hvi.prepare(hvi.Scene.model_validate(model(4, friction=quadratic_linear(1e6) | law)))
+        hvi.prepare(hvi.read_tables(model(4, friction=quadratic_linear(1e6) | law)))

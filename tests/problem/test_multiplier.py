@@ -55,7 +55,7 @@ def test_a_step_of_the_multiplier_is_two_pieces_with_their_own_laws(laws: Table,
 
 
 def test_paths_and_all_equilibria_follow_the_multiplier() -> None:
-    formula, pieces = (hvi.Scene.model_validate(t) for t in both(model(4, 6e6), {"friction": quadratic_linear(3e6)}))
+    formula, pieces = (hvi.read_tables(t) for t in both(model(4, 6e6), {"friction": quadratic_linear(3e6)}))
     assert_same_equilibria(formula, pieces)
     paths = [hvi.follow(scene, follow="exact") for scene in (formula, pieces)]
     peaks = [[row.factor for row in path.rows if row.event in ("fold", "end")] for path in paths]
@@ -66,7 +66,7 @@ def test_paths_and_all_equilibria_follow_the_multiplier() -> None:
 def test_a_block_slides_when_the_load_is_the_integral_of_the_multiplier() -> None:
     """Tresca friction of yield traction p (1 + x) on a floor of unit length carries 3/2 p, and gives p (1 + x)."""
     law = {"law": "tresca", "yield_traction": 2e5, "multiplier": "1 + x"}
-    held = hvi.prepare(hvi.Scene.model_validate(block(5, 1e6, 1e6, law)))
+    held = hvi.prepare(hvi.read_tables(block(5, 1e6, 1e6, law)))
     assert held.load_factors("pull").peak == pytest.approx(1.5 * 2e5 / 1e6, rel=1e-9)
     grip = block(5, 0.0, 1e6, law)
     grip["boundary"]["pull"] = {"on": "right", "displacement": [1e-3, "free"]}
@@ -133,4 +133,4 @@ def test_models_from_python_give_multipliers_as_functions() -> None:
 )
 def test_what_is_refused(law: Table, said: str) -> None:
     with pytest.raises((hvi.InputError, ValueError), match=said):
-        hvi.prepare(hvi.Scene.model_validate(model(4, friction={"law": "tresca", "yield_traction": 1e6} | law)))
+        hvi.prepare(hvi.read_tables(model(4, friction={"law": "tresca", "yield_traction": 1e6} | law)))

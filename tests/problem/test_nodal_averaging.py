@@ -15,13 +15,13 @@ from dolfinx.mesh import CellType, create_rectangle, locate_entities_boundary, m
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from hvi_fenicsx import Scene, solve
+from hvi_fenicsx import Model, read_tables, solve
 
 NU, FORCE = 0.4999, 1.0e-3
 
 
-def scene(cells: int, nu: float = NU) -> Scene:
-    return Scene.model_validate(
+def scene(cells: int, nu: float = NU) -> Model:
+    return read_tables(
         {
             "domain": {"shape": "rectangle", "size": [1.0, 1.0], "cells": [cells, cells]},
             "material": {"model": "plane_strain", "youngs_modulus": 1.0, "poisson_ratio": nu},
@@ -90,7 +90,7 @@ def test_a_uniform_stress_is_reproduced(load: float) -> None:
         "floor": {"on": "bottom", "contact": {"gap": 0.0}},
         "press": {"on": "top", "traction": [0.0, -load]},
     }
-    solution = solve(Scene.model_validate(tables))
+    solution = solve(read_tables(tables))
     stiffness = (1 - nu) / ((1 + nu) * (1 - 2 * nu))
     assert solution.converged
     assert solution.examination is not None

@@ -19,7 +19,7 @@ FRICTION = quadratic_linear(1e6)
 
 
 def solved(table: Table, **options: Any) -> hvi.Solution:
-    found = hvi.solve(hvi.Scene.model_validate(table), estimate=False, **options)
+    found = hvi.solve(hvi.read_tables(table), estimate=False, **options)
     assert found.converged
     return found
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from scenes import E, model
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.problem.scaling import Scales
 
 
@@ -20,7 +20,7 @@ def scales(size: tuple[float, float] = (3.0, 2.0), body: Any = None, **boundary:
     table["boundary"] = held | boundary
     if body:
         table["body"] = body
-    return prepare(Scene.model_validate(table)).problem.scales
+    return prepare(read_tables(table)).problem.scales
 
 
 def test_the_largest_load_counts_in_whatever_order() -> None:

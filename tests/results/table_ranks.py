@@ -14,7 +14,7 @@ from full_disk import room_for
 from mpi4py import MPI
 from scenes import STEEL, Table, model, quadratic_linear, two_blocks
 
-from hvi_fenicsx import Scene
+from hvi_fenicsx import read_tables
 from hvi_fenicsx.errors import HviError, NotWrittenError
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.pictures.draw import PictureProcess
@@ -53,14 +53,14 @@ SCENES = {
 
 def solved(scene: Table) -> Solution:
     """Without an estimate of the error."""
-    return finish(prepare(Scene.model_validate(scene), COMM), estimating=False)
+    return finish(prepare(read_tables(scene), COMM), estimating=False)
 
 
 def written(folder: Path, scene: Table) -> dict[str, Any] | None:
     """The tables of a result; of its arrays the sums, by which numbers of vertices do not count. None but on rank 0."""
     with ResultFolder(COMM, folder) as target:
         write_whole(target, solved(scene), Timer(), {}, print, None)
-        target.commit(Scene.model_validate(scene))
+        target.commit(read_tables(scene))
     if COMM.rank:
         return None
     arrays = reader.read(folder).arrays

@@ -15,7 +15,7 @@ pyvista = pytest.importorskip("pyvista")
 
 
 def test_tangents_are_vectors_that_turn_slips_into_displacements(tmp_path: Path) -> None:
-    scene = hvi.Scene.model_validate(
+    scene = hvi.read_tables(
         {
             "domain": {"shape": "box", "size": [1.0, 0.5, 0.5], "cells": [2, 2, 2]},
             "material": {"model": "three_dimensional", "youngs_modulus": 1e9, "poisson_ratio": 0.3},
@@ -41,7 +41,7 @@ def test_a_part_without_a_law_has_no_friction_also_at_the_corner_of_a_support(tm
     """The corner's reaction along the floor is the wall's."""
     table = model(4)
     table["boundary"]["floor"].pop("friction", None)
-    hvi.solve(hvi.Scene.model_validate(table), estimate=False).write(tmp_path / "r", pictures=False)
+    hvi.solve(hvi.read_tables(table), estimate=False).write(tmp_path / "r", pictures=False)
     with (tmp_path / "r" / "contact.csv").open(encoding="utf-8") as stream:
         rows = [row for row in csv.DictReader(stream) if row["part"] == "floor"]
     assert len(rows) == 5

@@ -16,7 +16,7 @@ from dolfinx import fem
 from runs import ROOT, hvi, summary, table, write_scene
 from scenes import NU, E, P, Q, Table, model, solved
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.certify import contact_state, placed_forces
 from hvi_fenicsx.effects import Contribution
 from hvi_fenicsx.problem.problem import PlacedContribution
@@ -113,7 +113,7 @@ def test_heat_puts_no_force_on_the_body() -> None:
 
 
 def test_a_spring_pulls_back_where_it_stands() -> None:
-    problem = prepare(Scene.model_validate(model(2))).problem
+    problem = prepare(read_tables(model(2))).problem
     v, u = problem.bulk.form.arguments()
     stiffness = 3.0
     spring = Contribution(bilinear=(stiffness * ufl.inner(u, v) * ufl.ds,))

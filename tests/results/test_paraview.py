@@ -119,7 +119,7 @@ def test_the_macro_runs(result: tuple[int, Path], tmp_path: Path) -> None:
 def test_both_sides_of_an_interface_are_written(tmp_path: Path) -> None:
     """The forces on the two sides, in boundary.csv and by the tractions of contact.pvd, are opposite."""
     scene = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress")
-    found = hvi_fenicsx.solve(hvi_fenicsx.Scene.model_validate(scene), MPI.COMM_SELF)
+    found = hvi_fenicsx.solve(hvi_fenicsx.read_tables(scene), MPI.COMM_SELF)
     found.write(tmp_path / "r")
     first, second = pyvista.get_reader(tmp_path / "r" / "contact.pvd").read()
     assert "sigma_n" in first.point_data

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scenes import block
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.console import existence
 from hvi_fenicsx.rigid import (
     ContactCone,
@@ -157,7 +157,7 @@ def test_literal_friction_that_no_factor_of_the_load_holds_says_so() -> None:
     scene = block(
         2, push=0.2e6, friction={"law": "quadratic_linear_literal", "gamma1": 2e6, "gamma2": 1e6, "delta": 9e-6}
     )
-    prepared = prepare(Scene.model_validate(scene))
+    prepared = prepare(read_tables(scene))
     found = prepared.solvability
     assert found.state == "metastable"
     assert found.never_held
@@ -175,7 +175,7 @@ def test_a_roof_makes_a_floor_that_drives_coercive() -> None:
     del boundary["pull"]
     boundary["floor"]["friction"] = {"law": "graph", "points": [[0, 0], [9e-6, 1e6], [1.8e-5, -1e5]]}
     boundary["roof"] = {"on": "top", "friction": {"law": "tresca", "yield_traction": 8e5}}
-    prepared = prepare(Scene.model_validate(scene))
+    prepared = prepare(read_tables(scene))
     found = prepared.solvability
     assert found.margin is not None
     (problem,) = rigid_problems(prepared.problem, prepared.system.forces)

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from runs import LONG_RANKS, on_ranks
 from scenes import NU, E, Table, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare, solve
+from hvi_fenicsx import Model, prepare, read_tables, solve
 
 SIZE = {2: (2.0, 1.0), 3: (2.0, 1.0, 1.0)}
 STRONG = quadratic_linear(1.0e9)
@@ -105,9 +105,9 @@ LOAD = 0.7e6
 FLOORS: dict[str, Callable[[Table], Table]] = {"rigid": lambda table: table, "body": on_a_body}
 
 
-def scene_of(name: str, dimension: int, load: float, floor: str) -> Scene:
+def scene_of(name: str, dimension: int, load: float, floor: str) -> Model:
     """A case at a load, on a floor."""
-    return Scene.model_validate(FLOORS[floor](CASES[name][0](dimension, load)))
+    return read_tables(FLOORS[floor](CASES[name][0](dimension, load)))
 
 
 def told(comm: MPI.Comm) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import pytest
 from runs import command, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import Scene, solve
+from hvi_fenicsx import read_tables, solve
 from hvi_fenicsx.errors import NotWrittenError
 from hvi_fenicsx.runtime import log
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
@@ -85,7 +85,7 @@ def test_handlers_leave_the_package_as_they_found_it(tmp_path: Path) -> None:
 
 def solve_from_python(caplog: pytest.LogCaptureFixture, level: int, **keys: object) -> list[logging.LogRecord]:
     with caplog.at_level(level, logger="hvi_fenicsx"):
-        solve(Scene.model_validate(model(32, 3e6, friction=LAW, **keys)), thresholds=NESTED)
+        solve(read_tables(model(32, 3e6, friction=LAW, **keys)), thresholds=NESTED)
     return caplog.records
 
 

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 from scenes import model
 
-from hvi_fenicsx import InputError, Scene, prepare
+from hvi_fenicsx import InputError, prepare, read_tables
 from hvi_fenicsx.mesh.shapes import DomainShape
 from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.runtime import memory
@@ -91,7 +91,7 @@ TOGETHER: dict[str, tuple[dict[str, Any], float]] = {
 def test_what_degree_two_and_several_bodies_take_is_foreseen(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each body alone, and the mesh at degree 1, have room enough."""
     table, unknowns = TOGETHER[place]
-    scene, measured = Scene.model_validate(table), unknowns * 1.3 / 1024
+    scene, measured = read_tables(table), unknowns * 1.3 / 1024
     monkeypatch.setattr(memory, "room", lambda comm: 0.8 * measured)
     with pytest.raises(InputError, match=rf"^{place}: .* unknowns need .* GB or more; there are"):
         prepare(scene)

@@ -17,7 +17,7 @@ import pytest
 from runs import hvi, process, write_scene
 from scenes import STEEL, model, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, prepare, read_scene
+from hvi_fenicsx import InputError, prepare, read_scene, read_tables
 
 LAW = quadratic_linear(1e3)
 TABLE: dict[str, tuple[str, str]] = {
@@ -192,7 +192,7 @@ def test_a_scale_that_makes_no_body_is_refused(tmp_path: Path) -> None:
     table = file_scene(file)
     table["domain"]["scale"] = 1e-300
     with pytest.raises(InputError, match=r"domain\.scale: makes the body 1\.0e-300 m long; allowed is 1e-09 to 1e\+09"):
-        prepare(Scene.model_validate(table))
+        prepare(read_tables(table))
 
 
 def test_a_wrong_scene_is_refused_by_the_process_too(scene: Path, tmp_path: Path) -> None:
@@ -276,7 +276,7 @@ WORDS = {
 def test_a_mesh_file_that_is_none_of_ours_is_refused(kind: str, tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "m.msh", meshes.BAD[kind])
     with pytest.raises(InputError, match=WORDS[kind]) as refused:
-        prepare(Scene.model_validate(file_scene(file)))
+        prepare(read_tables(file_scene(file)))
     assert str(file) in str(refused.value)
 
 
@@ -298,7 +298,7 @@ def test_a_damaged_mesh_file_is_refused(kind: str, tmp_path: Path) -> None:
     file.write_text(damage(whole), encoding="utf-8")
     assert file.read_text(encoding="utf-8") != whole
     with pytest.raises(InputError, match=words):
-        prepare(Scene.model_validate(file_scene(file)))
+        prepare(read_tables(file_scene(file)))
 
 
 def test_a_mesh_that_has_lost_cells_but_not_their_nodes_is_read(tmp_path: Path) -> None:
@@ -309,7 +309,7 @@ def test_a_mesh_that_has_lost_cells_but_not_their_nodes_is_read(tmp_path: Path) 
     found["sides"] = [[side, a + 1, b + 1] for side, a, b in found["sides"]]
     file = tmp_path / "m.msh"
     file.write_bytes(damage.msh(found))
-    assert prepare(Scene.model_validate(file_scene(file))).system.dofs == 2 * 16
+    assert prepare(read_tables(file_scene(file))).system.dofs == 2 * 16
 
 
 def _on_a_damaged_mesh(folder: Path) -> Path:
@@ -332,7 +332,7 @@ def test_a_region_that_the_mesh_does_not_have_is_told(tmp_path: Path) -> None:
     table = file_scene(file)
     table["material"] = {"a": STEEL | {"region": "soft"}, "b": STEEL | {"region": "hart"}}
     with pytest.raises(InputError, match="'hart'; it has hard, soft"):
-        prepare(Scene.model_validate(table))
+        prepare(read_tables(table))
 
 
 @pytest.mark.parametrize("depth", range(300, 800, 50))

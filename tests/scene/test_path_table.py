@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, dump_scene, read_scene
+from hvi_fenicsx import InputError, Model, dump_scene, read_scene, read_tables
 
 
-def read(tmp_path: Path, *overrides: str) -> Scene:
+def read(tmp_path: Path, *overrides: str) -> Model:
     file = tmp_path / "s.toml"
-    file.write_text(dump_scene(Scene.model_validate(model(4, friction=quadratic_linear(1e6)))), encoding="utf-8")
+    file.write_text(dump_scene(read_tables(model(4, friction=quadratic_linear(1e6)))), encoding="utf-8")
     return read_scene(file, overrides)
 
 

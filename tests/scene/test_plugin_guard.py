@@ -13,7 +13,7 @@ from runs import hvi, process
 from scenes import model
 
 from hvi_fenicsx import InputError, dump_scene, read_scene
-from hvi_fenicsx.model import Scene
+from hvi_fenicsx.model import read_tables
 
 LAW = """
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ def scene(folder: Path, traction: str = "return 0 * x + self.strength", ends: st
     name = next(NAMES)
     (folder / f"{name}.py").write_text(LAW.format(name=name, traction=traction, ends=ends), encoding="utf-8")
     tables: dict[str, Any] = model(2)
-    text = f'plugins = "{name}.py"\n{dump_scene(Scene.model_validate(tables))}'
+    text = f'plugins = "{name}.py"\n{dump_scene(read_tables(tables))}'
     friction = f'friction = {{ law = "{name}", strength = 1e3 }}'
     path = folder / "scene.toml"
     path.write_text(text.replace("[boundary.floor]", f"[boundary.floor]\n{friction}"), encoding="utf-8")

@@ -20,7 +20,7 @@ from hvi_fenicsx import laws
 from hvi_fenicsx.effects import Contact, Contribution, Effect, FormContext, Friction, Place
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.mesh.shapes import MeshFile, Rectangle, SeveralBodies
-from hvi_fenicsx.model import Model, Scene, SolverTable, dump_scene, read_scene
+from hvi_fenicsx.model import Model, SolverTable, dump_scene, read_scene, read_tables
 from hvi_fenicsx.model.reader import KEYS
 from hvi_fenicsx.model.toml_lines import lines_of
 
@@ -453,11 +453,12 @@ def test_a_mistake_in_one_of_several_bodies_is_told_at_its_line(write: Callable[
 
 def test_a_scene_from_python() -> None:
     law = laws.create("quadratic_linear", {"gamma1": 2.0, "gamma2": 1.0, "delta": 1e-3})
-    scene = Scene(
-        domain=Rectangle(size=(1.0, 1.0), cells=(4, 4)),
-        material={"model": "plane_stress", "youngs_modulus": 1.0, "poisson_ratio": 0.0},
-        boundary={"floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": {"law": law}}},
-    )
+    tables = {
+        "domain": Rectangle(size=(1.0, 1.0), cells=(4, 4)),
+        "material": {"model": "plane_stress", "youngs_modulus": 1.0, "poisson_ratio": 0.0},
+        "boundary": {"floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": {"law": law}}},
+    }
+    scene = read_tables(tables)
     assert scene.dimension == 2
     assert [(effect.place, where, effect.key) for where, effect in scene.acting()] == [
         (Place.MATERIAL, None, "isotropic"),
@@ -595,7 +596,7 @@ _VALUES = st.recursive(
 @example({"plugins": {"a.py": 1}})
 def test_any_tables_are_refused_in_one_way(data: dict[str, Any]) -> None:
     with pytest.raises(InputError):
-        Scene.model_validate(data)
+        read_tables(data)
 
 
 @settings(max_examples=300)

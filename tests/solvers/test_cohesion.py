@@ -12,7 +12,7 @@ from runs import contact, run_all, summary
 from scenes import Table, solved
 from scipy.optimize import minimize
 
-from hvi_fenicsx import InputError, Scene, Solution, solve, workflow
+from hvi_fenicsx import InputError, Solution, read_tables, solve, workflow
 from hvi_fenicsx.certify.contact_state import ContactState
 from hvi_fenicsx.laws import Length
 
@@ -106,7 +106,7 @@ def test_each_mode_dissipates_its_share_of_the_area_under_the_law(angle: float) 
 def test_the_forces_are_the_derivative_of_the_energy(dimension: int) -> None:
     """At random separations, some of them closed."""
     table = square({"cohesion": law(BOND, beta=0.7)}, {"traction": [1.0e6] * dimension}, 1, dimension)
-    system = workflow.prepare(Scene.model_validate(table)).system
+    system = workflow.prepare(read_tables(table)).system
     (term,) = system.terms
     rng, n = np.random.default_rng(1), system.load.local_size
     u = rng.normal(size=n) * 2 * term.law.length_scale
@@ -138,9 +138,7 @@ def test_the_strength_under_an_inclined_pull_is_that_of_an_ellipse(beta: float) 
     for tension, shear in ((0.6, 0.3), (0.2, -0.5), (0.0, 0.4)):
         along, up = shear * PEAK, tension * PEAK
         top = {"traction": [along, f"{up} + {12 * along}*(x - 0.5)"]}
-        found = workflow.prepare(
-            Scene.model_validate(square({"cohesion": law(BRITTLE, beta=beta)}, top, 4))
-        ).solvability
+        found = workflow.prepare(read_tables(square({"cohesion": law(BRITTLE, beta=beta)}, top, 4))).solvability
         strength = 1.0 / np.hypot(tension, shear / beta)
         assert found.lambda_peak <= strength * (1 + 1e-9)
         assert found.lambda_held == pytest.approx(0.4 * found.lambda_peak, rel=1e-9)
@@ -160,7 +158,7 @@ def test_another_optimiser_ends_where_the_program_does(closes: bool) -> None:
     table = square(floor, {"displacement": [2.4e-6, 1.6e-6]}, 3)
     found = solved(table)
     state, scales = glue(found), found.problem.scales
-    system = workflow.prepare(Scene.model_validate(table)).system
+    system = workflow.prepare(read_tables(table)).system
     stiffness = system.jacobian.matrix.copy()
     stiffness.convert("dense")
     matrix, load = stiffness.getDenseArray(), system.load.array_r
@@ -222,7 +220,7 @@ REFUSED = [
 @pytest.mark.parametrize(("floor", "words"), REFUSED)
 def test_what_makes_no_sense_is_refused_with_the_mend(floor: Table, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        solve(Scene(**square(floor, {"traction": [0.0, 1.0e6]}, 1)))
+        solve(read_tables(square(floor, {"traction": [0.0, 1.0e6]}, 1)))
 
 
 def test_the_forces_of_a_kink_at_zero_are_the_nearest_of_half_an_ellipsoid() -> None:

@@ -18,7 +18,7 @@ from dolfinx import fem
 from enumeration import Floor, Point, polyline
 from scenes import DELTA, Table, block, context_of, displacement, energy, far, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.certify.certificate import Certificate, examine
 from hvi_fenicsx.solvers import registry
 from hvi_fenicsx.workflow import Preparation, Solution
@@ -93,7 +93,7 @@ everywhere = pytest.mark.parametrize("case", CASES, ids=str)
 
 @functools.cache
 def prepared(case: Case) -> Preparation:
-    return prepare(Scene.model_validate(case.scene(tolerance=TOLERANCE)))
+    return prepare(read_tables(case.scene(tolerance=TOLERANCE)))
 
 
 @functools.cache

@@ -9,7 +9,7 @@ import pytest
 from runs import hvi, summary, write_scene
 from scenes import DELTA, STEEL, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, solve, workflow
+from hvi_fenicsx import read_tables, solve, workflow
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system import boundedness
 from hvi_fenicsx.workflow import Thresholds
@@ -105,7 +105,7 @@ def test_the_margin_is_what_the_load_has_left() -> None:
 def test_in_space_too_a_support_does_not_show_in_the_friction() -> None:
     """Where a wall prescribes a component, the residual holds its reaction; the law's own traction stands there."""
     found = solve(
-        Scene.model_validate(
+        read_tables(
             {
                 "domain": {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [4, 4, 2]},
                 "material": {"model": "three_dimensional", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29},
@@ -166,7 +166,7 @@ def test_in_space_a_law_that_has_fallen_below_zero_resists_nothing() -> None:
             "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
         },
     }
-    prepared = workflow.prepare(Scene.model_validate(table))
+    prepared = workflow.prepare(read_tables(table))
     term = prepared.problem.terms[0]
     beyond = term.law.concave.left(np.full(len(term.surface.blocks), 10.0 * term.law.length_scale))
     assert np.all(beyond > term.law.convex.right(np.array([10.0 * term.law.length_scale])))

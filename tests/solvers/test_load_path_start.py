@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import Table, solved
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.state import PathOptions
 from hvi_fenicsx.reduced.condensation import Condensation
@@ -76,7 +76,7 @@ def anchor(load: float) -> Table:
 
 def largest_factor(table: Table) -> float:
     """The factor at which the path of unsmoothed laws ends."""
-    problem = Condensation(prepare(Scene.model_validate(table)).system).problem
+    problem = Condensation(prepare(read_tables(table)).system).problem
     return max(state.factor for state in Follower(problem, PathOptions(programme=(9.0,))).states())
 
 

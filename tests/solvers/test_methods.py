@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scenes import P, Table, block, displacement, energy, far, model, quadratic_linear, solved
 
-from hvi_fenicsx import NewtonStep, Scene, Solution, prepare
+from hvi_fenicsx import NewtonStep, Solution, prepare, read_tables
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.workflow import Thresholds, finish
@@ -112,7 +112,7 @@ def test_iterations_that_run_out_are_said_to(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_interrupt_ends_the_iteration(method: str) -> None:
-    prepared = prepare(Scene.model_validate(strong(8, 6 * P, 3.0e6, epsilon=0.1, method=method)))
+    prepared = prepare(read_tables(strong(8, 6 * P, 3.0e6, epsilon=0.1, method=method)))
     found = finish(prepared, interrupted=lambda: True)
     assert found.exit_code == 130
     assert found.solve_result is not None
@@ -122,7 +122,7 @@ def test_an_interrupt_ends_the_iteration(method: str) -> None:
 def test_an_interrupt_on_the_second_level_of_three_gives_what_was_found_there(caplog: pytest.LogCaptureFixture) -> None:
     """The third one was set up, and began at zero."""
     thresholds = Thresholds(solvers=SolverThresholds(nested_from=500))
-    scene = Scene.model_validate(model(32, 3e6, friction=quadratic_linear(1.0e6)))
+    scene = read_tables(model(32, 3e6, friction=quadratic_linear(1.0e6)))
     whole = finish(prepare(scene, thresholds=thresholds)).solve_result
     prepared = prepare(scene, thresholds=thresholds)
 
@@ -142,7 +142,7 @@ def test_an_interrupt_on_the_second_level_of_three_gives_what_was_found_there(ca
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_is_told(method: str) -> None:
     steps: list[NewtonStep] = []
-    prepared = prepare(Scene.model_validate(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
+    prepared = prepare(read_tables(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
     finish(prepared, progress=steps.append)
     assert {step.method for step in steps} == {method}
     assert [step.iteration for step in steps] == sorted(step.iteration for step in steps)

@@ -32,7 +32,7 @@ def block(modulus: float = E, **boundary: Table) -> Table:
 
 
 def solved(table: Table, **options: Any) -> hvi.Solution:
-    found = hvi.solve(hvi.Scene.model_validate(table), **options)
+    found = hvi.solve(hvi.read_tables(table), **options)
     assert found.converged, found.reason
     return found
 
@@ -138,7 +138,7 @@ def test_the_error_under_a_force_is_that_of_the_body_under_the_obstacle_where_it
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_mesh_is_refined_under_a_force(degree: int) -> None:
-    scene = hvi.Scene.model_validate(roller(5, {"force": [0.0, -5e5]}) | {"solver": {"degree": degree}})
+    scene = hvi.read_tables(roller(5, {"force": [0.0, -5e5]}) | {"solver": {"degree": degree}})
     found = control.solve_to_goal(scene, MPI.COMM_WORLD, Goal(0.3), AdaptiveSolver(timer=Timer()), lambda _: None)
     assert found.why is None
     assert len(found.steps) > 1
@@ -155,7 +155,7 @@ GLIDES = {side: {"on": side, "displacement": way} for side, way in _HELD.items()
 def test_a_body_that_only_a_load_holds_against_the_plate_escapes(load: float, way: str) -> None:
     """The smaller one of both forces cannot hold the larger one: proven before anything is solved."""
     table = block(**GLIDES, base={"on": "bottom", "traction": [0.0, 0.0, load / AREA]})
-    found = hvi.solve(hvi.Scene.model_validate(table))
+    found = hvi.solve(hvi.read_tables(table))
     assert found.exit_code == ExitCode.NO_SOLUTION
     assert found.solvability.direction is not None
     assert found.solvability.direction.name == f"translation along {way}, together with the obstacle of lid.contact"
@@ -165,12 +165,12 @@ def test_the_force_on_the_plate_has_the_limit_load_of_the_bed() -> None:
     """The bed bears 48 kN at its peak and 24 kN beyond it, the plate presses with 30 kN."""
     bed = {"law": "graph", "points": [[0, 0], [1e-6, 4e5], [1e-6, 2e5]], "one_sided": True}
     table = block(**GLIDES, base={"on": "bottom", "support": bed})
-    prepared = hvi.prepare(hvi.Scene.model_validate(table))
+    prepared = hvi.prepare(hvi.read_tables(table))
     assert prepared.solvability.state == "metastable"
     for factors in (prepared.load_factors("lid"), prepared.load_factors()):
         assert (factors.held, factors.peak) == pytest.approx((24 / 30, 48 / 30), rel=1e-9)
     table["boundary"]["lid"]["contact"]["obstacle"]["force"] = [0.0, 0.0, -4.9e4]
-    assert hvi.solve(hvi.Scene.model_validate(table)).exit_code == ExitCode.NO_SOLUTION
+    assert hvi.solve(hvi.read_tables(table)).exit_code == ExitCode.NO_SOLUTION
 
 
 @pytest.mark.parametrize(("foot", "state"), [(0.1, "escapes"), (0.3, "borderline")])
@@ -182,7 +182,7 @@ def test_a_plate_that_presses_beside_the_foot_tips_the_block(foot: float, state:
     )
     table["domain"]["cells"] = [4, 1, 2]
     table["boundary"]["lid"]["where"] = "x > 0.2"
-    prepared = hvi.prepare(hvi.Scene.model_validate(table))
+    prepared = hvi.prepare(hvi.read_tables(table))
     assert prepared.solvability.state == state
 
 
@@ -199,7 +199,7 @@ def test_forces_that_make_no_sense_are_refused(obstacle: Table, said: str) -> No
     table = block(base=BASE)
     table["boundary"]["lid"]["contact"]["obstacle"] |= obstacle
     with pytest.raises((hvi.InputError, ValueError), match=said):
-        hvi.solve(hvi.Scene.model_validate(table))
+        hvi.solve(hvi.read_tables(table))
 
 
 def test_a_ball_needs_a_direction_along_its_force() -> None:
@@ -207,7 +207,7 @@ def test_a_ball_needs_a_direction_along_its_force() -> None:
     ball = {"shape": "sphere", "center": [0.2, 0.15, 1.5], "radius": 1.0, "force": [0.0, 0.0, -1e3]}
     table["boundary"]["lid"]["contact"]["obstacle"] = ball
     with pytest.raises(hvi.InputError, match="direction along the force"):
-        hvi.solve(hvi.Scene.model_validate(table))
+        hvi.solve(hvi.read_tables(table))
 
 
 def test_a_force_presses_one_obstacle_only() -> None:
@@ -215,10 +215,10 @@ def test_a_force_presses_one_obstacle_only() -> None:
     side = {"point": [0.4, 0.0, 0.0], "normal": [-1.0, 0.0, 0.0], "force": [-1e3, 0.0, 0.0]}
     table["boundary"]["right"] = {"on": "right", "contact": {"obstacle": side}}
     with pytest.raises(hvi.InputError, match="one obstacle"):
-        hvi.solve(hvi.Scene.model_validate(table))
+        hvi.solve(hvi.read_tables(table))
 
 
 @pytest.mark.parametrize("command", [hvi.follow, hvi.equilibria])
 def test_other_commands_say_what_to_do(command: Any) -> None:
     with pytest.raises(hvi.InputError, match="give the obstacle the displacement"):
-        command(hvi.Scene.model_validate(block(base=BASE)))
+        command(hvi.read_tables(block(base=BASE)))

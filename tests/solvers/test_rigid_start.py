@@ -12,7 +12,7 @@ from mpi4py import MPI
 from runs import on_ranks
 from scenes import context_of
 
-from hvi_fenicsx import Scene, prepare, solve
+from hvi_fenicsx import Model, prepare, read_tables, solve
 from hvi_fenicsx.solvers.resting_start import at_rest
 
 WEIGHT = 8.0e4
@@ -24,9 +24,9 @@ LAWS: dict[str, Any] = {
 }
 
 
-def rolling(law: str, size: float, below: float, push: float) -> Scene:
+def rolling(law: str, size: float, below: float, push: float) -> Model:
     """A half-disk on a floor, its flat top guided upright, pushed to the side: two rigid motions, both free."""
-    return Scene.model_validate(
+    return read_tables(
         {
             "domain": {"shape": "half_disk", "radius": 0.5, "mesh_size": size, "mesh_size_below": below},
             "material": {"model": "plane_stress", "youngs_modulus": 2.1e11, "poisson_ratio": 0.3},

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver, StallTest
 from hvi_fenicsx.solvers.law_models import Cells, VertexModel
@@ -31,9 +31,7 @@ def test_a_residual_that_stands_is_given_up_at_once() -> None:
 
 
 def test_a_solve_that_is_cut_off_says_so_in_words() -> None:
-    prepared = prepare(
-        Scene.model_validate(model(4, 6e6, friction=quadratic_linear(3e6), smoothing="chks", epsilon=0.01))
-    )
+    prepared = prepare(read_tables(model(4, 6e6, friction=quadratic_linear(3e6), smoothing="chks", epsilon=0.01)))
     system = prepared.system
     solver = ActiveSetSolver(system, (), LinearSettings("lu"), Timer())
     x = system.load.duplicate()

@@ -12,7 +12,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from scenes import Table, model, quadratic_linear, two_blocks
 
-from hvi_fenicsx import Scene, Solution, prepare
+from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.mesh.blocks import NestedGridTransfer
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.report.solution_arrays import SolutionArrays
@@ -27,7 +27,7 @@ LAW = quadratic_linear(1.0e6)
 
 
 def solved(table: Table) -> Solution:
-    return finish(prepare(Scene.model_validate(table), MPI.COMM_SELF), estimating=False)
+    return finish(prepare(read_tables(table), MPI.COMM_SELF), estimating=False)
 
 
 @functools.cache
@@ -78,7 +78,7 @@ def quadratic(x: Array) -> Array:
 def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: str) -> None:
     size, cells = ([1.0, 2.0], [4, 6]) if shape == "rectangle" else ([1.0, 2.0, 0.5], [4, 6, 2])
     table = in_space(2, 1) if shape == "box" else model(4)
-    fine = Scene.model_validate({**table, "domain": {"shape": shape, "size": size, "cells": cells}})
+    fine = read_tables({**table, "domain": {"shape": shape, "size": size, "cells": cells}})
     coarse, d = fine.with_domain(cells=tuple(n // 2 for n in cells)), len(size)
     both = [fem.functionspace(s.domain.build(MPI.COMM_SELF, d).mesh, ("Lagrange", 1, (d,))) for s in (fine, coarse)]
     step = NestedGridTransfer(size, coarse.domain.cells).prolongation(*both)  # type: ignore[attr-defined]
@@ -100,7 +100,7 @@ def test_where_two_bodies_meet_each_node_takes_the_field_of_its_own(shape: str) 
         across = [n] * (d - 1)
         table = two_blocks(shape, [1.0] * (d - 1), [[*across, n], [*(2 * k for k in across), n]], elasticity)
         table["domain"]["upper"]["origin"][0] = 0.0
-        arrays = of_mesh(prepare(Scene.model_validate(table), MPI.COMM_SELF).problem.space)
+        arrays = of_mesh(prepare(read_tables(table), MPI.COMM_SELF).problem.space)
         u = 1.0 + arrays.points
         u[np.unique(arrays.cells[arrays.points[arrays.cells].mean(axis=1)[:, -1] > 0.5])] *= -2.0
         return arrays, u
@@ -257,7 +257,7 @@ def test_the_mesh_width_halves_where_a_mesh_is_refined(shape: str) -> None:
     widths = []
     for n in (3, 6):
         table = in_space(2, 1) if shape == "box" else model(4)
-        scene = Scene.model_validate({**table, "domain": {"shape": shape, "size": size, "cells": [n] * len(size)}})
+        scene = read_tables({**table, "domain": {"shape": shape, "size": size, "cells": [n] * len(size)}})
         mesh = scene.domain.build(MPI.COMM_SELF, len(size)).mesh
         widths.append(transfer.mesh_width(of_mesh(fem.functionspace(mesh, ("Lagrange", 1)))))
     assert widths[1] == pytest.approx(widths[0] / 2, rel=1e-9)

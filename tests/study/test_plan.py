@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene
+from hvi_fenicsx import InputError, Model, read_tables
 from hvi_fenicsx.commands.arguments import parser
 from hvi_fenicsx.study import plan
 from hvi_fenicsx.study.errors import NORMS, Certainty
@@ -20,11 +20,11 @@ from hvi_fenicsx.study.table import Row, Study
 LAW = quadratic_linear(1.0e6)
 
 
-def scene(cells: int = 4, **keys: Any) -> Scene:
-    return Scene.model_validate(model(cells, **keys))
+def scene(cells: int = 4, **keys: Any) -> Model:
+    return read_tables(model(cells, **keys))
 
 
-def planned(given: Scene, *axes: str) -> plan.Plan:
+def planned(given: Model, *axes: str) -> plan.Plan:
     return plan.make(given, [plan.read_axis(text) for text in axes])
 
 
@@ -68,7 +68,7 @@ def test_every_key_of_the_solver_table_is_an_axis() -> None:
 def test_the_unknowns_of_a_graded_mesh_are_foreseen(shape: str, mesh_size: float, below: float | None) -> None:
     """What a plan may afford is decided on them; a mesh fine at one point only is not fine everywhere."""
     table = {"shape": shape, "radius": 0.1, "mesh_size": mesh_size, **({"mesh_size_below": below} if below else {})}
-    made = Scene.model_validate({**model(4, 1e6), "domain": table, "boundary": {}})
+    made = read_tables({**model(4, 1e6), "domain": table, "boundary": {}})
     body = made.domain.build(MPI.COMM_SELF, 2)
     assert 0.6 < plan.Point(made).unknowns / (2 * body.mesh.topology.index_map(0).size_global) < 1.4
 

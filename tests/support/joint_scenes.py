@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scenes import Array, Table
 
-from hvi_fenicsx import Scene, Solution, solve
+from hvi_fenicsx import Model, Solution, read_tables, solve
 
 
-def seam_scene(low: Table, high: Table, material: Table, boundary: Table, between: Table, **solver: Any) -> Scene:
+def seam_scene(low: Table, high: Table, material: Table, boundary: Table, between: Table, **solver: Any) -> Model:
     """Two bodies, upper and lower, that meet in the interface "seam"; the upper one's side comes first."""
-    return Scene.model_validate(
+    return read_tables(
         {
             "domain": {"lower": low, "upper": high},
             "material": material,
@@ -53,7 +53,7 @@ def differences_by_side(table: Table, finer: Sequence[int]) -> Array:
         energies = []
         for sides in (between, between[::-1]):
             interface = {"seam": {**table["interface"]["seam"], "between": sides}}
-            solution = solve(Scene.model_validate({**table, "domain": bodies, "interface": interface}))
+            solution = solve(read_tables({**table, "domain": bodies, "interface": interface}))
             assert solution.examination is not None
             energies.append(solution.examination.energy)
         found.append(abs(energies[0] / energies[1] - 1.0))

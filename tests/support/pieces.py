@@ -16,7 +16,7 @@ LIFTED: Table = {"on": "top", "traction": [0.0, "1e6*(2*x - 0.9)"]}
 
 def solved(table: Table, **options: Any) -> hvi.Solution:
     """The solution without its estimate, which has converged."""
-    found = hvi.solve(hvi.Scene.model_validate(table), **{"estimate": False, **options})
+    found = hvi.solve(hvi.read_tables(table), **{"estimate": False, **options})
     assert found.converged
     return found
 
@@ -30,7 +30,7 @@ def assert_equal(one: hvi.Solution, two: hvi.Solution, parts: tuple[str, str], i
         np.testing.assert_allclose(whole[: len(left)], left, rtol=1e-6, atol=1e-6 * abs(left).max())
 
 
-def assert_same_equilibria(one: hvi.Scene, two: hvi.Scene) -> None:
+def assert_same_equilibria(one: hvi.Model, two: hvi.Model) -> None:
     """All equilibria of two scenes, more than one, with the same energies."""
     first, second = hvi.equilibria(one), hvi.equilibria(two)
     assert first.complete

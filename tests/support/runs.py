@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hvi_fenicsx import Scene, dump_scene
+from hvi_fenicsx import dump_scene, read_tables
 from hvi_fenicsx.cli import main
 from hvi_fenicsx.runtime.processes import SIGNALS
 
@@ -104,7 +104,7 @@ def run_all(folder: Path, scenes: dict[str, dict[str, Any]], ranks: int) -> None
 
 def write_scene(path: Path, table: dict[str, Any]) -> Path:
     """A scene file of these tables."""
-    path.write_text(dump_scene(Scene.model_validate(table)), encoding="utf-8")
+    path.write_text(dump_scene(read_tables(table)), encoding="utf-8")
     return path
 
 

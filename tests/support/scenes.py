@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hvi_fenicsx import Scene, Solution, solve
+from hvi_fenicsx import Solution, read_tables, solve
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl, SolveContext
@@ -85,7 +85,7 @@ NESTED = Thresholds(
 
 def solved(table: Table, thresholds: Thresholds = DEFAULT) -> Solution:
     """The solution of a scene given as tables."""
-    return solve(Scene.model_validate(table), thresholds=thresholds)
+    return solve(read_tables(table), thresholds=thresholds)
 
 
 def solved_system(prepared: Preparation) -> LevelSolution:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.load_paths.following import PathRun
 from hvi_fenicsx.paths.load_path import LoadPath
 from hvi_fenicsx.workflow import DEFAULT
@@ -18,7 +18,7 @@ def path_run(table: dict[str, Any], *, formed: bool, comm: MPI.Comm = MPI.COMM_W
     """A path that is to be followed with or without S as an array."""
     linear = replace(DEFAULT.solvers.linear, solve_overhead=np.inf if formed else 0.0)
     thresholds = replace(DEFAULT, solvers=replace(DEFAULT.solvers, largest_dense=10**6 if formed else 0, linear=linear))
-    scene = Scene.model_validate(table)
+    scene = read_tables(table)
     assert scene.path is not None
     return PathRun(prepare(scene, comm, thresholds=thresholds), scene.path)
 

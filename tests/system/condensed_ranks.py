@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from scenes import DELTA, model, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.reduced.condensation import Condensation
 
 
@@ -16,7 +16,7 @@ def main() -> None:
     """Of the model problem, pulled by a displacement."""
     comm, table = MPI.COMM_WORLD, model(6, friction=quadratic_linear(3e6, DELTA))
     table["boundary"]["pull"] = {"on": "right", "displacement": [5e-6, "free"]}
-    condensation = Condensation(prepare(Scene.model_validate(table), comm).system)
+    condensation = Condensation(prepare(read_tables(table), comm).system)
     problem = condensation.problem
     slip = np.zeros(problem.size, dtype=bool)
     slip[problem.bonds[0].unknowns[:, 0]] = True

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.system.factorisation import FactorForm, Factorisation, form_of
 from hvi_fenicsx.system.petsc_options import CHOLESKY
 
@@ -21,7 +21,7 @@ SLOPE = 100.0
 
 def compared(table: Mapping[str, Any], comm: MPI.Comm = MPI.COMM_WORLD) -> dict[str, Any]:
     """Of a scene: with a tangent, some unknowns of Γc held, and others that fall steeply."""
-    system = prepare(Scene.model_validate(table), comm).system
+    system = prepare(read_tables(table), comm).system
     rates = [np.eye(k.shape[1]) * (1.0 + np.arange(len(k)))[:, None, None] for k in system.jacobian.rates]
     system.jacobian.set_rates(rates)
     dofs = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))

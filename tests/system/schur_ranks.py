@@ -7,7 +7,7 @@ import json
 import numpy as np
 from mpi4py import MPI
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.system import direct
 from hvi_fenicsx.system.factorisation import form_of
@@ -28,7 +28,7 @@ SCENE = {
 
 def main() -> None:
     """Unknowns of Γc by rank, and the difference with a tangent and some unknowns held."""
-    system = prepare(Scene.model_validate(SCENE), MPI.COMM_WORLD).system
+    system = prepare(read_tables(SCENE), MPI.COMM_WORLD).system
     rates = [np.eye(k.shape[1]) * (1.0 + np.arange(len(k)))[:, None, None] for k in system.jacobian.rates]
     system.jacobian.set_rates(rates)
     held = system.jacobian.rows.dofs[1::3].astype(np.int32)

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from runs import LONG_RANKS, on_ranks
 from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.paths.vertex_laws import is_straight
 from hvi_fenicsx.reduced.condensation import Condensation
@@ -79,7 +79,7 @@ SCENES = {f.__name__: f for f in (pulled, corner, frictionless, in_space, on_spr
 
 @functools.cache
 def condensed(name: str) -> tuple[System, Condensation]:
-    system = prepare(Scene.model_validate(SCENES[name]()), MPI.COMM_SELF).system
+    system = prepare(read_tables(SCENES[name]()), MPI.COMM_SELF).system
     return system, Condensation(system)
 
 
@@ -152,7 +152,7 @@ def test_a_spring_on_a_length_is_springs_on_its_components() -> None:
 def test_a_slide_that_nothing_resists_needs_no_unknown_whether_or_not_a_load_works_on_it() -> None:
     """Contact alone, and a load along the floor: the slide is pinned, and contact feels all other motions."""
     for push in (0.0, 1e5):
-        problem = Condensation(prepare(Scene.model_validate(block(4, push=push)), MPI.COMM_SELF).system).problem
+        problem = Condensation(prepare(read_tables(block(4, push=push)), MPI.COMM_SELF).system).problem
         bounded = np.isfinite(problem.lower) | np.isfinite(problem.upper)
         assert np.all(bounded)
         values = np.linalg.eigvalsh(problem.stiffness)
@@ -167,7 +167,7 @@ def test_the_factor_scales_loads_and_prescribed_displacements(name: str) -> None
     for part in table["boundary"].values():
         for key in {"traction", "displacement"} & part.keys():
             part[key] = [v if v == "free" else factor * v for v in part[key]]
-    other = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
+    other = prepare(read_tables(table), MPI.COMM_SELF).system
     reference = Condensation(other)
     scales = [s.problem.scales for s in (system, other)]
     unit, force = (getattr(scales[0], k) / getattr(scales[1], k) for k in ("displacement", "stress"))

@@ -11,7 +11,7 @@ from scenes import model
 from unformed import path_run
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import Model, prepare, read_tables
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.reduced.condensed_stiffness import CellColumns, CondensedStiffness, DenseStiffness
 from hvi_fenicsx.reduced.factorised_stiffness import FactorisedStiffness
@@ -19,7 +19,7 @@ from hvi_fenicsx.reduced.factorised_stiffness import FactorisedStiffness
 SPRING = {"law": "graph", "points": [[0, 0], [9e-6, 3e6], [9e-6, 1.5e6]]}
 
 
-def both(table: Scene) -> tuple[DenseStiffness, CondensedStiffness]:
+def both(table: Model) -> tuple[DenseStiffness, CondensedStiffness]:
     """S as an array and without, on the same unknowns."""
     system = prepare(table).system
     unformed = Condensation(system, None, 0).problem.elastic
@@ -29,16 +29,16 @@ def both(table: Scene) -> tuple[DenseStiffness, CondensedStiffness]:
     return formed, unformed
 
 
-def plane() -> Scene:
-    return Scene.model_validate(model(5, friction=SPRING))
+def plane() -> Model:
+    return read_tables(model(5, friction=SPRING))
 
 
-def space() -> Scene:
+def space() -> Model:
     return hvi.read_scene(ROOT / "demos" / "anchor_3d.toml", ["domain.cells=[2,3,2]"])
 
 
 @pytest.mark.parametrize("scene", [plane, space])
-def test_products_are_those_of_the_array(scene: Callable[[], Scene]) -> None:
+def test_products_are_those_of_the_array(scene: Callable[[], Model]) -> None:
     formed, unformed = both(scene())
     n, size = len(formed.array), float(np.max(formed.diagonal))
     x = np.random.default_rng(0).standard_normal(n)
@@ -107,7 +107,7 @@ def test_a_body_that_only_its_floor_holds_is_singular_without_it() -> None:
     """Rigid motions meet no stiffness; with springs, or with two unknowns held, the body is held."""
     table = model(4, friction=SPRING)
     del table["boundary"]["wall"]
-    formed, unformed = both(Scene.model_validate(table))
+    formed, unformed = both(read_tables(table))
     n = len(formed.array)
     everything, none = np.ones(n, dtype=bool), np.zeros(n)
     for stiffness in (formed, unformed):

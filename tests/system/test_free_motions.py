@@ -17,7 +17,7 @@ from mpi4py import MPI
 from runs import LONG_RANKS, hvi, on_ranks, summary, write_scene
 from scenes import NU, E, P, Q, Table
 
-from hvi_fenicsx import Scene, Solution, solve
+from hvi_fenicsx import Solution, read_tables, solve
 
 Array = npt.NDArray[np.float64]
 SIDES = {"left": (0, -1), "right": (0, 1), "bottom": (-1, -1), "top": (-1, 1), "front": (1, -1), "back": (1, 1)}
@@ -120,7 +120,7 @@ def solve_cases(comm: MPI.Comm) -> dict[str, Any]:
     """By case: state, exit code, number of free motions, error."""
     found = {}
     for name, (table, gradient, _) in CASES.items():
-        solution = solve(Scene.model_validate(table), comm)
+        solution = solve(read_tables(table), comm)
         still = np.array(STILL.get(name, [1.0, 0.5, 0.5][: len(gradient)]))
         wrong = error(solution, gradient, still)
         verdict = solution.solvability
@@ -151,7 +151,7 @@ def test_contact_that_opens_leaves_a_motion_free(method: str) -> None:
         "push": {"on": ["right"], "traction": ["-1e6 + 2.4e6*(y - 0.5)", 0.0]},
     }
     table["solver"] = {"method": method}
-    solution = solve(Scene.model_validate(table))
+    solution = solve(read_tables(table))
     assert (solution.exit_code, solution.solvability.state) == (0, "borderline")
     assert [mode.name for mode in solution.solvability.free] == ["translation along y"]
     assert solution.examination is not None
@@ -177,7 +177,7 @@ def test_a_traction_in_balance_with_itself_is_no_load_on_rigid_motions() -> None
     table = body(2, 8)
     table["boundary"]["right"] = {"on": ["right"], "traction": ["1e6*sin(2*pi*y)*(1 - 6*y*(1-y))", 0.0]}
     table["boundary"]["left"] = {"on": ["left"], "traction": ["-1e6*sin(2*pi*y)*(1 - 6*y*(1-y))", 0.0]}
-    solution = solve(Scene.model_validate(table))
+    solution = solve(read_tables(table))
     assert (solution.exit_code, solution.solvability.state) == (0, "borderline")
     assert len(solution.solvability.free) == 3
 

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from scenes import NESTED, Table, model
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl
@@ -30,7 +30,7 @@ def springs(system: System) -> Array:
 
 
 def test_translations_meet_the_same_bonds_on_all_levels_at_corners_too() -> None:
-    scene = Scene.model_validate(glued_corner())
+    scene = read_tables(glued_corner())
     system = (found := prepare(scene, MPI.COMM_SELF, thresholds=NESTED)).system
     levels = nested_iteration.coarser_levels(scene.formulation(), system, found.options, RunControl(timer=Timer()))
     assert len(levels) > 1

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 from scenes import STEEL, Table
 
-from hvi_fenicsx import InputError, Scene, prepare
+from hvi_fenicsx import InputError, prepare, read_tables
 from hvi_fenicsx.reduced import loading
 
 FACTOR = -0.4
@@ -43,13 +43,13 @@ def multiplied(table: Table, names: list[str]) -> Table:
 
 
 def load(table: Table) -> npt.NDArray[np.float64]:
-    found: npt.NDArray[np.float64] = prepare(Scene.model_validate(table)).system.load.array.copy()
+    found: npt.NDArray[np.float64] = prepare(read_tables(table)).system.load.array.copy()
     return found
 
 
 @pytest.mark.parametrize("names", [["grip.displacement"], ["grip.displacement", "wall.displacement", "body.force"]])
 def test_a_factor_multiplies_the_named_loads_and_displacements(names: list[str]) -> None:
-    system = prepare(Scene.model_validate(scene())).system
+    system = prepare(read_tables(scene())).system
     assert system.rotation is not None  # the slope turns components
     constant, rate = loading.make(system, names).lifted.T
     np.testing.assert_allclose(constant + FACTOR * rate, load(multiplied(scene(), names)), rtol=0, atol=1e-13)
@@ -57,7 +57,7 @@ def test_a_factor_multiplies_the_named_loads_and_displacements(names: list[str])
 
 
 def test_a_name_that_does_not_exist_is_refused_with_those_that_do() -> None:
-    system = prepare(Scene.model_validate(scene())).system
+    system = prepare(read_tables(scene())).system
     with pytest.raises(InputError, match=r"no load 'pull.traction'; there are: body.force, press.traction, wall.disp"):
         loading.make(system, ["pull.traction"])
 
@@ -66,6 +66,6 @@ def test_two_parts_that_share_a_moved_vertex_are_scaled_together() -> None:
     table = scene()
     del table["boundary"]["press"]
     table["boundary"]["lid"] = {"on": "top", "displacement": ["free", "1e-7*(1 + x)"]}
-    system = prepare(Scene.model_validate(table)).system
+    system = prepare(read_tables(table)).system
     with pytest.raises(InputError, match=r"two boundary parts meet"):
         loading.make(system, ["wall.displacement"])

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 from scenes import NESTED, Table, model, two_blocks
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl
@@ -64,7 +64,7 @@ def blocks() -> Table:
 
 
 def prepared(table: Table) -> tuple[Preparation, Levels]:
-    scene = Scene.model_validate(table)
+    scene = read_tables(table)
     found = prepare(scene, MPI.COMM_SELF, thresholds=NESTED)
     levels = nested_iteration.coarser_levels(
         scene.formulation(), found.system, found.options, RunControl(timer=Timer())

@@ -12,7 +12,7 @@ from runs import on_ranks
 from scenes import DELTA, displacement, model, quadratic_linear, solved
 from schur_ranks import SCENE
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.convergence import Outcome, Sizes
@@ -30,7 +30,7 @@ STRONG = quadratic_linear(3e6, DELTA)
 
 
 def assembled(cells: int = 8) -> System:
-    return prepare(Scene.model_validate(model(cells, friction=STRONG)), MPI.COMM_SELF).system
+    return prepare(read_tables(model(cells, friction=STRONG)), MPI.COMM_SELF).system
 
 
 @pytest.mark.parametrize("every", [1, 3, 1000])
@@ -63,7 +63,7 @@ def test_condensed_on_several_ranks_it_solves_the_same() -> None:
 def test_algebraic_multigrid_that_is_made_again_and_again_gives_way_to_a_direct_solver() -> None:
     """Its setup took 0.6 s in each of 300 Newton steps on long cells, where factorising takes 0.05 s."""
     table = SCENE | {"material": SCENE["material"] | {"poisson_ratio": 0.3}}
-    system = prepare(Scene.model_validate(table), MPI.COMM_SELF).system
+    system = prepare(read_tables(table), MPI.COMM_SELF).system
     solver = HeldPreconditioner(
         system, (), LinearSettings("gamg", LinearThresholds(slow=20), replaceable=True), Timer()
     )

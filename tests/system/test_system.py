@@ -17,7 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scenes import DELTA, NU, E, P, Q, Table, block, energy, model, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, Superpotential, prepare
+from hvi_fenicsx import Superpotential, prepare, read_tables
 from hvi_fenicsx.mesh import blocks, nodes
 from hvi_fenicsx.workflow import Preparation
 
@@ -48,7 +48,7 @@ class Smooth:
 
 
 def ready(table: Table) -> Preparation:
-    return prepare(Scene.model_validate(table))
+    return prepare(read_tables(table))
 
 
 def random_state(prepared: Preparation, seed: int = 1) -> PETSc.Vec:

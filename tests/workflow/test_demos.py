@@ -15,7 +15,7 @@ from scenes import displacement, energy, points
 from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from hvi_fenicsx import Scene, Solution, prepare, read_scene, solve
+from hvi_fenicsx import Solution, prepare, read_scene, read_tables, solve
 from hvi_fenicsx.certify.contact_state import ContactState
 
 Array = npt.NDArray[np.float64]
@@ -161,7 +161,7 @@ def giving(broken: int) -> float:
     """The energy with so many vertices of the ground broken from the right, the others on springs: a linear system."""
     scene = demo("jureczka_ochal").scene.tables()
     del scene["boundary"]["ground"]
-    ready = prepare(Scene.model_validate(scene))
+    ready = prepare(read_tables(scene))
     system, scales = ready.system, ready.problem.scales
     rows, columns, values = system.jacobian.matrix.getValuesCSR()
     place = ready.problem.space.tabulate_dof_coordinates()

@@ -15,7 +15,7 @@ from runs import ROOT
 from scenes import Array, Table, energy
 from scipy.spatial import cKDTree
 
-from hvi_fenicsx import Scene, Solution, solve
+from hvi_fenicsx import Solution, read_tables, solve
 from hvi_fenicsx.certify.contact_state import ContactState
 
 DEMOS = ROOT / "demos"
@@ -171,7 +171,7 @@ FAST = {"pushed_block", "slot", "tipping_tower"}
 @pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.long) for n in PARTNERS])
 def test_a_stiff_partner_is_the_rigid_floor(name: str) -> None:
     partner, table = PARTNERS[name], of_demo(name)
-    one, two = solve(Scene.model_validate(table)), solve(Scene.model_validate(on_partner(table, partner)))
+    one, two = solve(read_tables(table)), solve(read_tables(on_partner(table, partner)))
     away, same = cKDTree(state(one).surface.points).query(state(two).surface.points)
     met = away < 1e-9  # beyond the part's `where` nothing is in contact
     assert not state(two).contact[~met].any()

@@ -122,7 +122,7 @@ class SeveralBodies(DomainShape):
         try:
             return handler(data)
         except ValidationError as error:
-            mistakes = mistakes_of(error)
+            mistakes = mistakes_of(error, cls)
         own = ("bodies",)
         raise validation_error([m._replace(where=m.where[m.where[:1] == own :]) for m in mistakes])
 
