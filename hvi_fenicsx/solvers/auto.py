@@ -172,7 +172,7 @@ class Auto(BranchIteration):
             yield from self._attempt(self._iteration().solve, None, pieces)
 
     def _from_exact(self) -> Iterator[SolveResult]:
-        """Of smoothed laws, from the equilibrium of the laws themselves."""
+        """Start smoothed laws from the equilibrium of the laws themselves."""
         exact = [term.exact for term in self.system.terms]
         if all(law is true for law, true in zip(self._laws, exact, strict=True)):
             return

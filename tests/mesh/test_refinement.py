@@ -9,7 +9,6 @@ import functools
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import meshes
@@ -147,7 +146,8 @@ def test_prolongation_turns_with_the_frames() -> None:
 def test_multigrid_and_starts_on_a_refined_hierarchy(scene: Model) -> None:
     """The solution of the finest mesh is that of a direct solve from rest; few steps remain from the coarser one."""
     coarse, options = workflow.prepare(scene, COMM), options_of(scene.solver)
-    options = replace(options, thresholds=SolverThresholds(linear=LinearThresholds(largest_direct={2: 500, 3: 500})))
+    small = SolverThresholds(linear=LinearThresholds(largest_direct={2: 500, 3: 500}))
+    options = options.model_copy(update={"thresholds": small})
     control, found = RunControl(timer=Timer()), solved_system(coarse)
     for k in range(3):
         before = found.system.problem.domain

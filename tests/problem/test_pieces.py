@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -73,7 +72,7 @@ def test_a_piece_is_what_tags_of_facets_give() -> None:
     body = hvi.Body(square, facets=dmesh.meshtags(square, 1, tags.indices, values), names=TAGS)
     by_tags = hvi.solve(steel_square(body=body), estimate=False)
     rest = own_square().piece("rest", "floor", "x > 0.4")
-    moved = [replace(e, side="rest") if e.where == ("floor",) else e for e in steel_square(body=rest).effects]  # type: ignore[type-var]
+    moved = [e.at("rest") if e.where == ("floor",) else e for e in steel_square(body=rest).effects]
     from_python = hvi.solve(hvi.Model(rest, moved), estimate=False)
     assert from_python.energy == pytest.approx(by_tags.energy, rel=1e-11)
     with pytest.raises(hvi.InputError, match="there is a side 'floor' already"):
