@@ -28,7 +28,10 @@ def differences(old: Any, new: Any, tolerance: float, *, searched: bool = False)
 
 
 def _of_all_parts(record: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Displacements and tractions of all parts in one list: those of a glued part may be rounding beside others."""
+    """Displacements, tractions and resultants of all parts in one list: those of one may be rounding beside others."""
+    if record.get("resultants") and (contact := record.get("contact")):
+        together = {**record["resultants"], "contact": contact["resultant"]}
+        record = {**record, "resultants": {"all": list(together.values())}, "contact": {**contact, "resultant": None}}
     parts = record.get("columns")
     if not isinstance(parts, Mapping) or not parts:  # a path's are names
         return record
