@@ -11,7 +11,7 @@ from referee import programmes
 from referee.assembly import Problem, assemble
 from referee.coordinates import Floor
 from referee.equilibria import find
-from referee.meshes import Array, Mesh, block, boundary
+from referee.meshes import Array, Mesh, block
 from referee.minimality import examine, sampled_descent
 from referee.solution import EPS, Check
 
@@ -43,41 +43,9 @@ class Verdict:
     why: str
 
 
-def mesh_of(scene: Table, drawn: Mesh | None, answer: Answer) -> Mesh | None:
-    """The mesh of a scene: our own, or the cells of the program where gmsh made them."""
-    domain = scene["domain"]
-    if drawn is not None:
-        return drawn
-    if domain["shape"] in ("rectangle", "box"):
-        return block(domain["size"], domain["cells"])
-    if answer.points is None or answer.cells is None:
-        return None
-    facets = boundary(answer.cells)
-    return Mesh(answer.points, answer.cells, _sides(domain, answer.points, facets), np.zeros(len(answer.cells), int))
-
-
-def _sides(domain: Table, points: Array, facets: Any) -> dict[str, Any]:
-    ends = points[facets]
-    shape = domain["shape"]
-    if shape == "half_disk":
-        top = np.all(np.abs(ends[:, :, 1] - domain["radius"]) < 1e-9, axis=1)
-        return {"top": facets[top], "arc": facets[~top]}
-    if shape == "disk":
-        upper = ends[:, :, 1].mean(axis=1) > domain["radius"]
-        return {"upper_arc": facets[upper], "lower_arc": facets[~upper]}
-
-    def along(axis: int, value: float) -> Any:
-        return np.all(np.abs(ends[:, :, axis] - value) < 1e-9, axis=1)
-
-    width, height = domain["size"]
-    found = {"left": along(0, 0), "right": along(0, width), "bottom": along(1, 0), "top": along(1, height)}
-    rest = ~np.any(list(found.values()), axis=0)
-    if shape == "l_shape":
-        flat = along(1, height - domain["cut"][1])
-        found |= {"inner_top": rest & flat, "inner_right": rest & ~flat}
-    else:
-        found["notch"] = rest
-    return {name: facets[mask] for name, mask in found.items()}
+def mesh_of(scene: Table, drawn: Mesh | None) -> Mesh:
+    """The mesh of a scene, our own."""
+    return block(scene["domain"]["size"], scene["domain"]["cells"]) if drawn is None else drawn
 
 
 def displacement(mesh: Mesh, answer: Answer) -> Array | None:
@@ -107,9 +75,7 @@ def judge(scene: Table, drawn: Mesh | None, answer: Answer, seed: int = 0) -> Ve
         return Verdict(UNDECIDED, "took too long")
     if answer.code == 1:
         return Verdict(CONTRADICTS, f"broke down: {answer.text[:200]}")
-    mesh = mesh_of(scene, drawn, answer)
-    if mesh is None:
-        return Verdict(UNDECIDED, "no mesh")
+    mesh = mesh_of(scene, drawn)
     problem = assemble(scene, mesh)
     if not problem.stress.any() and not Check(problem, np.zeros_like(mesh.points)).wrongs():
         word = AGREES if answer.code == 0 else CONTRADICTS

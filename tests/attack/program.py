@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from referee.meshes import Array, Integers
+from referee.meshes import Array
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,6 @@ class Answer:
         certificate: its entries.
         energy: J/m or J.
         points: vertices, (n, d).
-        cells: (m, d + 1).
         u: displacement, m, (n, d).
         seconds: processor time that it took.
         margin: of existence.
@@ -38,7 +37,6 @@ class Answer:
     certificate: dict[str, Any] | None = None
     energy: float = np.nan
     points: Array | None = None
-    cells: Integers | None = None
     u: Array | None = None
     seconds: float = 0.0
     margin: float | None = None
@@ -63,9 +61,8 @@ def run(scene_file: Path, limit: float = 60.0) -> Answer:
         return Answer(1, f"{type(error).__name__}: {error}", seconds=time.process_time() - began)
     problem, verdict = solution.problem, solution.solvability
     space, d = problem.space, problem.scales.dimension
-    mesh, found, seen = problem.domain.mesh, solution.solve_result, solution.examination
+    found, seen = solution.solve_result, solution.examination
     points = space.tabulate_dof_coordinates()[:, :d]
-    own = mesh.topology.index_map(d).size_local
     return Answer(
         code=int(solution.exit_code),
         text=solution.reason,
@@ -75,7 +72,6 @@ def run(scene_file: Path, limit: float = 60.0) -> Answer:
         certificate=seen.certificate.as_dict() if seen else None,
         energy=seen.energy * problem.scales.energy if seen else np.nan,
         points=points.copy(),
-        cells=space.dofmap.list[:own].astype(np.int64),
         u=found.u.x.array.reshape(-1, d)[: len(points)] * problem.scales.displacement if found else None,
         seconds=time.process_time() - began,
         margin=verdict.margin,

@@ -1,7 +1,8 @@
-"""Damaged scenes and meshes, each made from its number alone: what users, editors and full disks do to files."""
+"""Damaged scenes and meshes, drawn at random: what users, editors and full disks do to files."""
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import os
 import random
@@ -309,35 +310,32 @@ def _odd_file(chance: random.Random, folder: Path, good: bytes) -> str:
     return name
 
 
-def make(number: int, folder: Path) -> str:
-    """Write case ``number`` into an empty folder, its scene as ``scene.toml``; what was done to it."""
-    chance = random.Random(number)
-    table = copy.deepcopy(chance.choice(_bases()))
-    kind = number % 8
-    if kind == 7:
-        return f"file: {_odd_file(chance, folder, tomli_w.dumps(table).encode())}"
-    if kind == 6:
-        (folder / "scene.toml").write_bytes(text(chance, tomli_w.dumps(table).encode()))
-        return "text"
-    if kind in (4, 5):
-        table = model(3, friction=quadratic_linear(1e6)) | {"domain": {"shape": "file", "file": "m.msh"}}
-        found, done = grid(), []
-        if kind == 4:
-            done = chance.sample(MESHES, chance.choice([1, 1, 2]))
-            for damage in done:
-                damage(chance, found)
-        raw = msh(found)
-        (folder / "m.msh").write_bytes(raw if done else mesh(chance, raw))
-        (folder / "scene.toml").write_bytes(tomli_w.dumps(table).encode())
-        return f"mesh: {', '.join(d.__name__ for d in done) or 'text'}"
-    done = chance.sample(TABLES, chance.choice([1, 1, 1, 2]))
+def damaged(chance: random.Random, table: Table, ways: list[Any]) -> str:
+    """Change a table in one or two ways; what was done."""
+    done = chance.sample(ways, chance.choice([1, 1, 1, 2]))
     for damage in done:
-        try:
-            damage(chance, table)
-        except (KeyError, IndexError, TypeError, ValueError, AttributeError):
-            continue  # an earlier damage took away what this one works on
-    (folder / "scene.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
+        with contextlib.suppress(KeyError, IndexError, TypeError, ValueError, AttributeError):
+            damage(chance, table)  # an earlier damage may have taken away what this one works on
     return ", ".join(d.__name__ for d in done)
 
 
-__all__ = ["make"]
+def make(chance: random.Random, folder: Path) -> str:
+    """Write a case into an empty folder, its scene as ``scene.toml``; what was done to it."""
+    table, kind = copy.deepcopy(chance.choice(_bases())), chance.randrange(8)
+    scene = folder / "scene.toml"
+    if kind == 7:
+        return f"file: {_odd_file(chance, folder, tomli_w.dumps(table).encode())}"
+    if kind == 6:
+        scene.write_bytes(text(chance, tomli_w.dumps(table).encode()))
+        return "text"
+    if kind < 4:
+        done = damaged(chance, table, TABLES)
+        scene.write_text(tomli_w.dumps(table), encoding="utf-8")
+        return done
+    found, done = grid(), "text"
+    if kind == 4:
+        done = damaged(chance, found, MESHES)
+    (folder / "m.msh").write_bytes(msh(found) if kind == 4 else mesh(chance, msh(found)))
+    table = model(3, friction=quadratic_linear(1e6)) | {"domain": {"shape": "file", "file": "m.msh"}}
+    scene.write_text(tomli_w.dumps(table), encoding="utf-8")
+    return f"mesh: {done}"

@@ -93,32 +93,10 @@ def _bodies(kind: str, rng: np.random.Generator) -> Drawn:
     return _finish(g, kind, {"shape": "file", "file": "bodies.msh"}, boundary, joined(meshes))
 
 
-def _shape(kind: str, rng: np.random.Generator) -> Drawn:
-    """The shapes that gmsh meshes."""
-    g = new_draw(rng, 2)
-    g.length = 1.0
-    shape = g.pick("half_disk", "disk", "l_shape", "notched_strip")
-    h = round_to(rng.uniform(0.25, 0.5), 3)
-    obstacle = {"obstacle": {"point": [0.0, 0.0], "normal": [g.pick(0.0, 1e-5, -3e-5, 0.1), 1.0]}}
-    round_side = {"half_disk": "arc", "disk": "lower_arc"}.get(shape)
-    domain: Table = {"shape": shape, "mesh_size": h}
-    domain |= {"radius": 0.5} if round_side else {"size": [1.0, 1.0]}
-    domain |= {"cut": [0.5, 0.5]} if shape == "l_shape" else {}
-    domain |= {"notch": [0.3, 0.3]} if shape == "notched_strip" else {}
-    floor = {"on": round_side or "bottom", "contact": obstacle}
-    parts.laws(g, floor, 0.7)
-    top = {"half_disk": "top", "disk": "upper_arc", "l_shape": "inner_top", "notched_strip": "top"}[shape]
-    boundary = {"floor": floor, "press": {"on": top, "traction": parts.load(g, "top")}}
-    if not round_side and g.some(0.6):
-        boundary["wall"] = {"on": "left", "displacement": [0.0, "free"]}
-    return _finish(g, kind, domain, boundary)
-
-
 _KINDS = {
     "rectangle": (0.46, _rectangle),
     "fine": (0.01, _rectangle),
     "driven": (0.09, _driven),
     "box": (0.14, _box),
-    "bodies": (0.24, _bodies),
-    "shape": (0.06, _shape),
+    "bodies": (0.3, _bodies),
 }

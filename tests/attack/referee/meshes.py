@@ -112,24 +112,3 @@ def write_msh(mesh: Mesh, path: Path) -> None:
         for i, (kind, group, vertices) in enumerate(elements, 1)
     ]
     path.write_text("\n".join([*lines, "$EndElements", ""]), encoding="utf-8")
-
-
-def read_msh(path: Path) -> Mesh:
-    """A file of :func:`write_msh`."""
-    sections: dict[str, list[str]] = {}
-    for line in path.read_text(encoding="utf-8").splitlines():
-        if line.startswith("$") and not line.startswith("$End"):
-            current = sections.setdefault(line[1:], [])
-        elif not line.startswith("$"):
-            current.append(line)
-    groups = [(int(a), int(b), c.strip('"')) for a, b, c in (ln.split() for ln in sections["PhysicalNames"][1:])]
-    d = max(dim for dim, _, _ in groups)
-    points = np.array([[float(c) for c in ln.split()[1 : d + 1]] for ln in sections["Nodes"][1:]])
-    rows = [[int(c) for c in ln.split()] for ln in sections["Elements"][1:]]
-    by_group = {n: np.array([r[5:] for r in rows if r[3] == n], dtype=np.int64) - 1 for _, n, _ in groups}
-    names = tuple(name for dim, _, name in groups if dim == d)
-    numbers = [n for dim, n, _ in groups if dim == d]
-    sides = {name: by_group[n] for dim, n, name in groups if dim == d - 1}
-    cells = np.concatenate([by_group[n] for n in numbers])
-    regions = np.concatenate([np.full(len(by_group[n]), i) for i, n in enumerate(numbers)])
-    return Mesh(points, cells, sides, regions, names)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import tomli_w
@@ -26,7 +26,7 @@ class Case:
         environment: variables that are changed, by name; None removes one.
         shell: how the shell starts the program, ``"$@"``.
         end_after: seconds after which the process is told to end.
-        out: the folder for the output, relative to that of the case.
+        places: whether a refusal must name a file, an option or a part of the scene.
         ours: beginnings of the names of files that the program wrote and may remove.
     """
 
@@ -36,8 +36,12 @@ class Case:
     environment: Mapping[str, str | None] = field(default_factory=dict)
     shell: str = '"$@"'
     end_after: float | None = None
-    out: str = OUT
+    places: bool = False
     ours: tuple[str, ...] = ()
+
+    def told(self, done: str) -> Case:
+        """The same, with what was done to its files."""
+        return replace(self, what=f"{done}: {self.what}")
 
 
 Kind = Callable[[random.Random, Path], Case]
@@ -49,8 +53,8 @@ def table() -> Table:
     return model(2, friction=quadratic_linear(1e3))
 
 
-def write(folder: Path, content: Table | str | None = None, name: str = SCENE) -> None:
+def write(folder: Path, content: Table | str | None = None) -> None:
     """Write a scene file; the sound one if nothing else is given."""
     found = table() if content is None else content
     text = found if isinstance(found, str) else tomli_w.dumps(found)
-    (folder / name).write_bytes(text.encode("utf-8", "surrogateescape"))
+    (folder / SCENE).write_bytes(text.encode("utf-8", "surrogateescape"))

@@ -1,4 +1,4 @@
-"""Runs cases one after the other: ``python3 -m hostile.child FOLDER SEED FIRST LAST STEP``.
+"""Runs cases one after the other: ``python3 -m hostile.child FOLDER KINDS SEED FIRST LAST STEP``.
 
 The number of a case is on disk before it runs, so that whoever finds this process dead or stuck knows of what. What
 came of each is a line of FOLDER/outcomes.
@@ -25,37 +25,38 @@ from runs import command
 from hvi_fenicsx.cli import main
 from hvi_fenicsx.runtime.processes import SIGNALS
 
-from . import folders, surroundings
+from . import folders, requests, surroundings
 from .case import Case
 from .judge import Outcome, faults, owned, snapshot
 
-KINDS = [*folders.KINDS, *surroundings.KINDS]
+KINDS = {"surroundings": [*folders.KINDS, *surroundings.KINDS], "requests": requests.KINDS}
 LIMIT = 200.0
 """Seconds that a case may take in a process of its own."""
 
 
-def make(seed: int, number: int, folder: Path) -> Case:
-    """Write a case into an empty folder; its seed and number alone decide what it is."""
-    kind = KINDS[number % len(KINDS)]
-    return kind(random.Random(f"{seed}-{number}"), folder)
-
-
-def outcome(seed: int, number: int, folder: Path) -> dict[str, object]:
-    """Make a case, run it, judge it."""
+def outcome(kinds: str, seed: int, number: int, folder: Path) -> dict[str, object]:
+    """Make a case, which its kinds, seed and number alone decide; run it, judge it."""
     place = folder / str(number)
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir()
     (folder / "now").write_text(f"{number} is made\n", encoding="utf-8")
-    case = make(seed, number, place)
+    kind = KINDS[kinds][number % len(KINDS[kinds])]
+    case = kind(random.Random(f"{seed}-{number}"), place)
     (folder / "now").write_text(f"{number} {case.what}\n", encoding="utf-8", errors="replace")
-    before, mine, began = snapshot(place), owned(place, case.out), time.monotonic()
+    before, mine, began = snapshot(place), owned(place), time.monotonic()
     code, text = _alone(case, place) if case.alone else _within(case, place, folder / "words")
     found = Outcome(code, text, before, snapshot(place), mine)
     wrong, seconds = faults(case, found, place), round(time.monotonic() - began, 1)
-    kind = KINDS[number % len(KINDS)].__name__
     if not wrong:
         shutil.rmtree(place, ignore_errors=True)
-    told = {"number": number, "kind": kind, "what": case.what, "code": code, "seconds": seconds, "faults": wrong}
+    told = {
+        "number": number,
+        "kind": kind.__name__,
+        "what": case.what,
+        "code": code,
+        "seconds": seconds,
+        "faults": wrong,
+    }
     return told | ({"words": list(case.words), "text": text[-3000:]} if wrong else {"text": text[-200:]})
 
 
@@ -120,13 +121,13 @@ def _decoded(raw: bytes, case: Case) -> str:
     return text.replace("\0", "") if case.environment.get("PYTHONIOENCODING") == "utf-16" else text
 
 
-def run(folder: Path, seed: int, first: int, last: int, step: int) -> None:
+def run(folder: Path, kinds: str, seed: int, first: int, last: int, step: int) -> None:
     """All cases from first to last."""
     for number in range(first, last, step):
-        told = outcome(seed, number, folder)
+        told = outcome(kinds, seed, number, folder)
         with open(folder / "outcomes", "a", encoding="utf-8") as file:
             file.write(json.dumps(told) + "\n")
 
 
 if __name__ == "__main__":
-    run(Path(sys.argv[1]), *map(int, sys.argv[2:6]))
+    run(Path(sys.argv[1]), sys.argv[2], *map(int, sys.argv[3:7]))

@@ -16,17 +16,18 @@ LIMIT = 300.0
 """Seconds that a case may take."""
 
 
-def attack(folder: Path, seed: int, cases: range) -> list[dict[str, Any]]:
+def attack(folder: Path, kinds: str, seed: int, cases: range) -> list[dict[str, Any]]:
     """What came of each case.
 
     Args:
         folder: for the cases; what was at fault stays there.
+        kinds: of cases, a name of `child.KINDS`.
         seed: of the cases.
         cases: their numbers.
     """
     first, found = cases.start, []
     while first < cases.stop:
-        fault = _child(folder, seed, range(first, cases.stop, cases.step))
+        fault = _child(folder, kinds, seed, range(first, cases.stop, cases.step))
         if not fault:
             break
         number, _, what = (folder / "now").read_text(encoding="utf-8").strip().partition(" ")
@@ -37,10 +38,10 @@ def attack(folder: Path, seed: int, cases: range) -> list[dict[str, Any]]:
     return sorted([*map(json.loads, lines), *found], key=lambda told: int(told["number"]))
 
 
-def _child(folder: Path, seed: int, cases: range) -> str:
+def _child(folder: Path, kinds: str, seed: int, cases: range) -> str:
     """How a process ended; nothing if well."""
     environment = os.environ | {"PYTHONPATH": f"{ROOT}:{ROOT}/tests/support:{os.environ.get('PYTHONPATH', '')}"}
-    words = [sys.executable, "-m", "hostile.child", folder, seed, cases.start, cases.stop, cases.step]
+    words = [sys.executable, "-m", "hostile.child", folder, kinds, seed, cases.start, cases.stop, cases.step]
     (folder / "now").write_text(f"{cases.start} start", encoding="utf-8")
     with (folder / "errors").open("w") as errors:
         process = subprocess.Popen(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import json
 import random
 import shutil
@@ -10,25 +11,48 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import Any
+from unittest.mock import patch
+
+import tomli_w
+from scenes import model, quadratic_linear
 
 from hvi_fenicsx.cli import main
+from hvi_fenicsx.runtime.journal import Journal
 
 from .case import OUT, RUN, SCENE, Case, write
+from .requests import STUDY
 
-STUDY = ("study", SCENE, "--axis", "epsilon=1", "--repeat", "1", "--limit", "60")
+PATH = ("path", SCENE, "--no-pictures", "--out", OUT)
+SEARCH = ("equilibria", SCENE, "--no-pictures", "--out", OUT)
+COMMANDS = {"result": RUN, "study": ("study", SCENE, *STUDY, "--out", OUT), "path": PATH, "search": SEARCH}
+_APPEND = Journal.append
+UNTIL = {"study": (), "result": (), "path": (), "search": ("--limit", "1e-9")}
+"""What ends a search before it is done."""
 _JSON = [b"", b"[]", b"null", b"{}", b"\xff", b"nan", b"[" * 9999, b'{"files": 3}', b"9" * 5000, b'{"converged": true}']
 
 
 @cache
 def finished(kind: str) -> Path:
-    """A finished result or study, made once in this process."""
+    """A folder of results, of a study, of a path that was killed or of a search that was stopped; made once."""
     folder = Path(mkdtemp(prefix="hvi-finished-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    write(folder)
-    words = RUN if kind == "result" else STUDY
-    scene = str(folder / SCENE)
-    assert main([scene if w == SCENE else str(folder / OUT) if w == OUT else w for w in [*words, "--out", OUT]]) == 0
+    strong = model(3, 6e6, friction=quadratic_linear(3e6)) | {"path": {"to": 1.0}}
+    write(folder, tomli_w.dumps(strong) if kind in ("path", "search") else None)
+    with contextlib.chdir(folder), patch.object(Journal, "append", _appended_until_death), contextlib.suppress(_Dead):
+        assert main([*COMMANDS[kind], *UNTIL[kind]]) == (4 if kind == "search" else 0)
     return folder
+
+
+class _Dead(BaseException):
+    """The end of a process."""
+
+
+def _appended_until_death(journal: Journal, record: Any) -> None:
+    """As the journal does it, for a few rows of a path."""
+    if record.get("factor", 0.0) > 0.5:
+        raise _Dead
+    _APPEND(journal, record)
 
 
 def _manifest(out: Path, change: Callable[[dict[str, object]], object]) -> None:
@@ -66,7 +90,8 @@ def wrong_hashes(chance: random.Random, out: Path) -> None:
 
 def odd_json(chance: random.Random, out: Path) -> None:
     """The file that marks the end, and with a manifest that knows it: as another program would leave it."""
-    file = next(out / name for name in ("summary.json", "study.json") if (out / name).exists())
+    names = ("summary.json", "study.json", "path.journal", "search.journal")
+    file = next(out / name for name in names if (out / name).exists())
     file.write_bytes(chance.choice(_JSON))
     _manifest(out, lambda m: m["files"].update({file.name: None}))  # type: ignore[attr-defined]
 
@@ -113,7 +138,10 @@ def odd_lock(chance: random.Random, out: Path) -> None:
 
 def emptied(chance: random.Random, out: Path) -> None:
     for file in chance.sample([f for f in sorted(out.rglob("*")) if f.is_file()], 3):
-        file.write_bytes(b"" if chance.random() < 0.5 else file.read_bytes()[: file.stat().st_size // 2])
+        raw = file.read_bytes()
+        half = raw[: chance.randrange(len(raw) + 1)]
+        # shorter, or as a power cut leaves a file whose length is on disk and whose blocks are not
+        file.write_bytes(chance.choice([b"", half, half + bytes(len(raw) - len(half))]))
 
 
 def moved_around(chance: random.Random, out: Path) -> None:
@@ -140,8 +168,8 @@ _DAMAGES += [
 
 
 def damaged_folder(chance: random.Random, folder: Path) -> Case:
-    """A finished result or study, damaged, and one of the ways to go on."""
-    kind = chance.choice(["result", "result", "result", "study"])
+    """A folder that holds something, damaged, and one of the ways to go on."""
+    kind = chance.choice(["result", "result", *COMMANDS])
     shutil.copytree(finished(kind), folder, dirs_exist_ok=True)
     out = folder / OUT
     (folder / "mine.txt").write_text("precious")
@@ -156,7 +184,7 @@ def damaged_folder(chance: random.Random, folder: Path) -> Case:
             continue  # an earlier damage took away what this one works on
         names.append(damage.__name__)
     way = chance.choice([["--force"], ["--resume"], ["--force", "--resume"], []])
-    words = [*(RUN if kind == "result" else (*STUDY, "--out", OUT)), *way]
+    words = [*COMMANDS[kind], *way]
     return Case(what=f"{kind}: {', '.join(names)} {way}", words=words)
 
 

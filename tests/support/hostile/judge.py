@@ -12,13 +12,17 @@ from pathlib import Path
 
 from hvi_fenicsx.runtime import manifest
 
-from .case import Case
+from .case import OUT, Case
 
 CODES = {0, 2, 3, 4, 130}
 _CRASHES = re.compile(
     r"Traceback \(most recent|MPI_ABORT|PETSC ERROR|egmentation|Exception ignored|core dumped|Fatal Python"
 )
 
+_PLACES = re.compile(
+    r"\.toml|mesh|m\.msh|boundary|body|load '|material|domain|solver|interface|path|"
+    r"--(accuracy|quantity|axis|repeat|limit|np|out|gap|set|petsc)"
+)
 _MESSAGES = re.compile(r"^hvi: (?!plugin .*: its code is run$)", re.MULTILINE)
 
 
@@ -59,9 +63,9 @@ def _kind(path: Path) -> str:
     return "folder" if path.is_dir() else "other"
 
 
-def owned(folder: Path, out: str) -> frozenset[str]:
+def owned(folder: Path) -> frozenset[str]:
     """What the program's manifest lists in the folder for the output, relative to that of the case."""
-    target = (folder / out).resolve() if out != "loop" else folder / out
+    target = (folder / OUT).resolve()
     known = manifest.read(target)
     return frozenset(os.path.relpath(target / name, folder.resolve()) for name in known.owned) if known else frozenset()
 
@@ -81,11 +85,13 @@ def _of_words(case: Case, found: Outcome) -> list[str]:
         wrong.append(f"prints {odd}")
     if found.code == 2 and not case.shell.strip('"$@') and len(_MESSAGES.findall(found.text)) != 1:
         wrong.append("not one message")
+    if found.code == 2 and case.places and not _PLACES.search(found.text):
+        wrong.append("names no place")
     return wrong
 
 
 def _of_files(case: Case, found: Outcome, folder: Path) -> list[str]:
-    out = os.path.relpath((folder / case.out).resolve(), folder.resolve())
+    out = os.path.relpath((folder / OUT).resolve(), folder.resolve())
     wrong = []
     for name, kind in found.before.items():
         mine = name not in found.owned and not Path(name).name.startswith(case.ours or ("\0",))
@@ -94,8 +100,7 @@ def _of_files(case: Case, found: Outcome, folder: Path) -> list[str]:
     new = [n for n in found.after if n not in found.before and not any(p.startswith(case.ours) for p in Path(n).parts)]
     written = f"{out}/summary.json" in found.after  # also by a run that was interrupted while it solved
     if case.words[:1] == ["study"] or (found.code not in (2, 130) and found.code >= 0) or (found.code != 2 and written):
-        within = [n for n in new if out == "." or n == out or n.startswith((f"{out}/", f"{out.split('/')[0]}/"))]
-        new = [n for n in new if n not in within and not out.startswith(f"{n}/")]
+        new = [n for n in new if n != out and not n.startswith(f"{out}/")]
         wrong += _of_result(case, found, folder)
     return wrong + [f"left {n!r}" for n in new if ".kept" not in n]
 
@@ -111,10 +116,8 @@ def _is_kept(name: str, kind: str, after: dict[str, str]) -> bool:
 
 
 def _of_result(case: Case, found: Outcome, folder: Path) -> list[str]:
-    if case.words[0] != "run" or found.code not in (0, 3, 4) or case.end_after or "help" in " ".join(case.words):
+    if case.words[0] == "check" or found.code not in (0, 3, 4) or case.end_after or "help" in " ".join(case.words):
         return []
-    target = folder / case.out
-    results = [target] if case.out != "results" else [f for f in target.glob("*") if f.is_dir()]
-    known = manifest.read(results[0]) if results else None
-    damaged = known.damaged(results[0]) if known else "everything"
+    known = manifest.read(folder / OUT)
+    damaged = known.damaged(folder / OUT) if known else "everything"
     return [f"lacks {damaged}"] if damaged else []
