@@ -20,12 +20,11 @@ from mpi4py import MPI
 from runs import RANKS
 from scenes import NESTED
 
-from hvi_fenicsx import Model, read_scene, workflow
-from hvi_fenicsx.mesh import coarsening_2d, gmsh_file
-from hvi_fenicsx.mesh.coarsening_2d import HalfEdges
+from hvi_fenicsx import Scene, read_scene, workflow
+from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.shapes import HalfDisk, NotchedStrip
+from hvi_fenicsx.mesh.shapes import HalfDisk
 from hvi_fenicsx.mesh.thresholds import Thresholds
 from hvi_fenicsx.mesh.transfer import InterpolationTransfer
 
@@ -33,9 +32,7 @@ HERE = Path(__file__).parent
 DEMOS = Path(__file__).parents[2] / "demos"
 COMM = MPI.COMM_WORLD
 POLYGONS = {
-    "square": meshes.GOOD.replace("0.2", "0.03"),
     "halves": meshes.HALVES.replace("0.2", "0.03"),
-    "slanted": meshes.SLANTED.replace("0.3", "0.03"),
     "graded": meshes.GRADED,
     "two bodies": meshes.BLOCKS.format(size=0.04, dimension=2, named=True),
 }
@@ -71,51 +68,10 @@ def test_a_polygon_keeps_its_sides_and_regions(name: str, tmp_path: Path) -> Non
     assert 2.5 < fewer < 6
 
 
-def test_what_is_round_stays_nearly_so(tmp_path: Path) -> None:
-    """A hole and an inclusion keep their areas to what inscribed polygons lose."""
-    body = from_file(tmp_path, meshes.HOLLOW)
-    coarse = coarser_of(body)
-    assert area(coarse, "inclusion") == pytest.approx(np.pi * 0.01, rel=0.06)
-    assert area(coarse, "matrix") == pytest.approx(1 - 2 * np.pi * 0.01, rel=0.005)
-    assert measure(coarse, "bottom") == pytest.approx(1.0, rel=1e-12)
-
-
 def test_known_curves_are_met_on_all_levels() -> None:
     body = coarser_of(HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2))
     x = body.mesh.geometry.x[np.unique(entities_to_geometry(body.mesh, 1, body.sides["arc"]))]
     assert np.hypot(x[:, 0], x[:, 1] - 0.5) == pytest.approx(0.5, rel=1e-12)
-
-
-def test_what_is_finer_stays_finer(tmp_path: Path) -> None:
-    body = from_file(tmp_path, meshes.GRADED)
-    for level in (body, coarser_of(body)):
-        lengths = level.mesh.h(1, np.sort(level.sides["bottom"]))
-        assert lengths.max() / lengths.min() > 10
-
-
-def test_a_notch_is_not_lost() -> None:
-    strip = NotchedStrip(size=(1.0, 0.5), notch=(0.1, 0.2), mesh_size=0.02)
-    body = strip.build(COMM, 2)
-    assert measure(coarser_of(body), "notch") == pytest.approx(measure(body, "notch"), rel=1e-12)
-
-
-@pytest.mark.parametrize("body", [meshes.PINCHED], ids=["touches itself"])
-def test_what_cannot_be_outlined_stands_alone(body: str, tmp_path: Path) -> None:
-    assert with_hierarchy(from_file(tmp_path, body), COARSER).coarser() is None
-
-
-def test_outlines_that_cross_themselves_are_given_up() -> None:
-    """A hook whose thinned point reaches through its other side."""
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.4, -0.2], [0.0, 1.0]])
-    ends = np.column_stack([np.arange(5), (np.arange(5) + 1) % 5])
-    edges = HalfEdges(ends, corners[ends], np.zeros(5, dtype=np.int64), np.zeros(5, dtype=np.int64))
-    assert coarsening_2d.trace(edges, 1.0, COARSER) is None
-
-
-def test_a_coarse_mesh_of_another_area_is_given_up() -> None:
-    body = HalfDisk(radius=0.5, mesh_size=0.02).build(COMM, 2)
-    assert coarsening_2d.coarsen(body, 4.0, COARSER) is not None
-    assert coarsening_2d.coarsen(body, 4.0, replace(COARSER, remeshed_size=1e-6)) is None
 
 
 @pytest.mark.parametrize("name", POLYGONS)
@@ -129,7 +85,7 @@ def test_linear_fields_are_prolonged_as_they_are(name: str, tmp_path: Path) -> N
     assert found.array == pytest.approx(fields[0].x.array, abs=1e-12)
 
 
-def scene(path: Path, *overrides: str) -> Model:
+def scene(path: Path, *overrides: str) -> Scene:
     file = meshes.make(path / "m.msh", meshes.GOOD.replace("0.2", "0.03"))
     return read_scene(DEMOS / "strong_law.toml", [f'domain={{shape="file", file="{file}"}}', *overrides])
 
@@ -147,11 +103,6 @@ def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None
     assert direct.solve_result is not None
     assert direct.solve_result.levels == 1
     assert nested.examination.energy == pytest.approx(direct.examination.energy, rel=1e-9)  # type: ignore[union-attr]
-
-
-def test_built_in_blocks_keep_their_own_mesh_hierarchy() -> None:
-    shape = read_scene(DEMOS / "strong_law.toml", ["domain.cells=[9, 63]"]).domain
-    assert shape.build_hierarchy(COMM, 2, COARSER).coarser() is None
 
 
 @pytest.mark.parametrize("several", RANKS[1:])

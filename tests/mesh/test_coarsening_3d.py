@@ -85,15 +85,6 @@ def test_what_is_solved_does_not_change(bored: Path) -> None:
     assert nested.examination.energy == pytest.approx(alone.examination.energy, rel=1e-9)  # type: ignore[union-attr]
 
 
-def test_a_mesher_that_takes_too_long_is_not_waited_for(bored: Path) -> None:
-    impatient = replace(COARSER, gmsh_seconds=0.01)
-    assert with_hierarchy(gmsh_file.read(COMM, bored, 3), impatient).coarser() is None
-
-
-def test_a_coarse_mesh_of_another_size_is_given_up(bored: Path) -> None:
-    assert with_hierarchy(gmsh_file.read(COMM, bored, 3), replace(COARSER, remeshed_size=1e-6)).coarser() is None
-
-
 @pytest.mark.parametrize("ranks", LONG_RANKS[1:])
 def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(ranks: int, bored: Path) -> None:
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "remeshed_ranks.py", str(bored)]

@@ -12,13 +12,10 @@ import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-from runs import hvi, summary
 
-from hvi_fenicsx import InputError, Model, prepare, read_scene
+from hvi_fenicsx import InputError, Scene, prepare, read_scene
 from hvi_fenicsx.api import solve
-from hvi_fenicsx.mesh import facets as facet_sizes
 from hvi_fenicsx.mesh import gmsh_file, refinement
-from hvi_fenicsx.mesh.curved import CurvedFacets
 from hvi_fenicsx.mesh.domain import Domain
 
 DEMOS = Path(__file__).parents[2] / "demos"
@@ -88,54 +85,16 @@ def test_a_side_of_second_order_is_refined_onto_its_curve(script: str, dimension
     assert missing[0][0] / missing[0][1] == pytest.approx((4.0, 3.2)[dimension - 2], rel=0.05)  # Plaza's faces
 
 
-@pytest.mark.parametrize(("script", "dimension"), [(DISK, 2), (BALL, 3)])
-def test_the_nearest_points_are_on_the_circle_to_high_order(script: str, dimension: int, tmp_path: Path) -> None:
-    found, widths = [], []
-    x = np.random.default_rng(1).normal(size=(500, dimension))
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    for size in (0.4, 0.15):
-        curve = read(tmp_path, script, dimension, size=size, order=2).curves["rim"]
-        assert isinstance(curve, CurvedFacets)
-        nearest = curve.nearest(0.99 * x)
-        np.testing.assert_allclose(curve.nearest(nearest), nearest, atol=1e-12)
-        found.append(np.abs(nearest - x).max())
-        widths.append(np.linalg.norm(curve.points[:, 1] - curve.points[:, 0], axis=1).max())
-    assert np.log(found[1] / found[0]) / np.log(widths[1] / widths[0]) > (3.8, 2.8)[dimension - 2]
-    assert found[1] < 1e-3
-
-
-def test_a_side_is_moved_with_its_body() -> None:
-    facets = CurvedFacets(np.array([[[0.0, 0.0], [1.0, 0.0], [0.5, 0.1]]]))
-    turned = facets.moved(np.array([3.0, 4.0]), np.array([[0.0, -1.0], [1.0, 0.0]]))
-    found = turned.nearest(np.array([[2.8, 4.5], [3.2, 3.0]]))
-    np.testing.assert_allclose(found, [[2.9, 4.5], [3.0, 4.0]], atol=1e-12)
-
-
-def hertz(domain: str) -> Model:
+def hertz(domain: str) -> Scene:
     return read_scene(DEMOS / "hertz.toml", ["solver.degree=2", f"domain={domain}"])
 
 
-@pytest.mark.parametrize(("order", "degree", "warned"), [(1, 2, True), (2, 2, False), (1, 1, False)])
+@pytest.mark.parametrize(("order", "degree", "warned"), [(1, 2, True), (2, 2, False)])
 def test_curved_sides_of_first_order_are_warned_of(order: int, degree: int, warned: bool, tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "half.msh", HALF.format(order=order))
     scene = hertz(f'{{shape="file", file="{file}"}}').with_solver(degree=degree)
     found = [text for text in prepare(scene).warnings if "of a curved side" in text]
     assert [text.startswith("boundary.floor.contact") for text in found] == [True] * warned
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_angles_between_facets_are_those_of_the_body(dimension: int) -> None:
-    """Of a square or cube a right one at corners and edges, and none elsewhere; no vertex counts that has one facet."""
-    mesh = (dmesh.create_unit_square, dmesh.create_unit_cube)[dimension - 2](MPI.COMM_SELF, *[4] * dimension)
-    mesh.topology.create_connectivity(dimension - 1, dimension)
-    everywhere = dmesh.exterior_facet_indices(mesh.topology)
-    angles = facet_sizes.turns(mesh, everywhere)
-    assert len(angles) == (16, 98)[dimension - 2]
-    assert np.sum(np.isclose(angles, np.pi / 2)) == (4, 44)[dimension - 2]
-    assert np.sum(angles < 1e-7) == len(angles) - (4, 44)[dimension - 2]
-    floor = dmesh.locate_entities_boundary(mesh, dimension - 1, lambda x: np.isclose(x[0], 0.0))
-    assert np.all(facet_sizes.turns(mesh, floor) < 1e-7)
-    assert len(facet_sizes.turns(mesh, floor[:1])) == 0
 
 
 @pytest.mark.long
@@ -149,30 +108,6 @@ def test_hertz_pressure_of_a_file_of_second_order_is_that_of_the_built_in_shape(
         away.append(np.abs(np.interp(own.x[:, 0], part.x[:, 0], part.pressure) - own.pressure).max())
     assert away[0] > 0.03 * own.pressure.max()
     assert away[1] < 1e-5 * own.pressure.max()
-
-
-@pytest.mark.long
-def test_curves_of_files_are_the_same_on_ranks(tmp_path: Path) -> None:
-    file = meshes.make(tmp_path / "half.msh", HALF.format(order=2))
-    domain = f'{{shape="file", file="{file}", refinements=1}}'
-    found = []
-    for ranks in (1, 3):
-        out = tmp_path / str(ranks)
-        words = ("--set", f"domain={domain}", "--set", "solver.degree=2", "--out", out, "--no-pictures")
-        assert hvi("run", DEMOS / "hertz.toml", *words, ranks=ranks).returncode == 0
-        found.append(summary(out)["energy"])
-    assert found[1] == pytest.approx(found[0], rel=1e-10)
-
-
-def test_straight_sides_of_second_order_are_no_curves(tmp_path: Path) -> None:
-    file = meshes.make(tmp_path / "square.msh", "square(0.3)\nmesh.generate(2)\nmesh.setOrder(2)")
-    domain, plain = (
-        gmsh_file.read(MPI.COMM_WORLD, f, 2)
-        for f in (file, meshes.make(tmp_path / "plain.msh", "square(0.3)\nmesh.generate(2)"))
-    )
-    assert domain.curves == {}
-    assert {name: len(f) for name, f in domain.sides.items()} == {name: len(f) for name, f in plain.sides.items()}
-    assert volume(domain) == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,8 @@ from typing import Any
 import meshes
 import numpy as np
 import pytest
-from mpi4py import MPI
 from runs import contact, hvi, write_scene
 from scenes import NU, STEEL, E, P, Q, Table, displacement, energy, far, model, points, quadratic_linear, solved
-
-from hvi_fenicsx import InputError
-from hvi_fenicsx.mesh import gmsh_file
 
 
 def on_file(file: Path, table: Table, **domain: Any) -> Table:
@@ -78,18 +74,6 @@ def test_a_force_in_one_region_weighs_as_much_as_that_region(tmp_path: Path) -> 
     assert bearing == pytest.approx(-6.0e5, rel=1e-9)
 
 
-def test_a_force_need_be_finite_in_its_own_region_only(tmp_path: Path) -> None:
-    """sqrt(x - 0.4) is no number at the left, where it is not meant to act."""
-    file = meshes.make(tmp_path / "halves.msh", meshes.HALVES)
-    table = on_file(file, model(press=Q))
-    table["material"] = {"a": STEEL | {"region": ["soft", "hard"]}}
-    table["body"] = {"weight": {"region": "hard", "force": [0.0, "-1e5*sqrt(x - 0.4)"]}}
-    assert solved(table).exit_code == 0
-    table["body"]["weight"]["region"] = "soft"
-    with pytest.raises(InputError, match=r"body\.soft\.force: .* is not finite"):
-        solved(table)
-
-
 def test_a_floor_of_two_groups_is_one_part(tmp_path: Path) -> None:
     """The bottom in two pieces, named together: weights, order and arc length run through."""
     file = meshes.make(tmp_path / "halves.msh", meshes.HALVES + _SPLIT)
@@ -112,13 +96,3 @@ for name, at in (("first", 0.0), ("second", 0.5)):
 whole = [t for _, t in gmsh.model.getPhysicalGroups(1) if gmsh.model.getPhysicalName(1, t) == "bottom"]
 gmsh.model.removePhysicalGroups([(1, t) for t in whole])
 """
-
-
-def test_a_broken_file_does_not_spoil_the_next(tmp_path: Path) -> None:
-    """Each file is read in a process of its own: gmsh's parser would keep the rest of a broken one."""
-    broken = tmp_path / "broken.geo"
-    broken.write_text("Point(1) = {0, 0, 0 this is broken; letters\nfoo bar {")
-    good = Path(__file__).parents[2] / "demos" / "thermal_bar.geo"
-    with pytest.raises(InputError, match="gmsh cannot read it"):
-        gmsh_file.read(MPI.COMM_WORLD, broken, 2)
-    assert gmsh_file.read(MPI.COMM_WORLD, good, 2).regions

@@ -45,16 +45,6 @@ def read(path: Path, seconds: float = 60.0) -> Domain:
     return gmsh_file.read(MPI.COMM_WORLD, path, 2, thresholds=Thresholds(gmsh_file_seconds=seconds))
 
 
-def test_the_words_of_harmless_scripts_are_allowed(tmp_path: Path) -> None:
-    words = """
-    // Print "x"; SystemCall "x"
-    /* Save "y"; */ Print.Background = 1; Save = 2; Printf("Save > Print"); Include "more.geo";
-    Physical Point('SystemCall "here"') = {1}; Printf("%g", Save > 1);
-    """
-    written(tmp_path / "more.geo", "Printf('%g', 1);")
-    assert set(read(written(tmp_path / "m.geo", TRIANGLE + words)).sides) == {"bottom", "rest"}
-
-
 def test_a_script_under_the_name_of_a_mesh_is_refused(tmp_path: Path) -> None:
     file = written(tmp_path / "m.msh", TRIANGLE + f'SystemCall "touch {tmp_path / MARK}";')
     with pytest.raises(InputError, match=r"does not begin with \$MeshFormat"):
@@ -169,15 +159,6 @@ def test_a_mesh_that_was_partitioned_is_read_as_a_whole(version: float, tmp_path
     assert found.mesh.topology.index_map(2).size_local == wanted.mesh.topology.index_map(2).size_local
 
 
-def test_a_name_that_is_not_in_utf_8_is_refused_with_its_line(tmp_path: Path) -> None:
-    file = meshes.make(tmp_path / "m.msh", meshes.GOOD)
-    file.write_bytes(file.read_bytes().replace(b'"left"', '"côté"'.encode("latin-1")))
-    lines = file.read_bytes().decode("latin-1").splitlines()
-    line = next(number for number, text in enumerate(lines, 1) if "côté" in text)
-    with pytest.raises(InputError, match=rf"m\.msh:{line}: the name 'côté' is not in UTF-8"):
-        read(file)
-
-
 def test_an_element_in_two_groups_is_told_with_both(tmp_path: Path) -> None:
     twice = TRIANGLE.replace('"rest") = {2, 3}', '"rest") = {1, 2, 3}')
     with pytest.raises(InputError, match=r"nodes 1, \d is in the groups bottom and rest; leave it in one"):
@@ -191,17 +172,6 @@ def test_an_element_in_two_groups_is_told_with_both(tmp_path: Path) -> None:
 def test_a_file_of_another_kind_is_told_how_to_convert(name: str, way: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"is no mesh: .*{way}"):
         read(written(tmp_path / name, "<VTKFile>"))
-
-
-def test_a_file_without_a_mesh_says_so(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="neither a mesh nor a geometry"):
-        read(written(tmp_path / "m.geo", "a = 1;\n"))
-
-
-@pytest.mark.parametrize(("call", "way"), [("setOrder(3)", "with -order 2"), ("recombine()", "without recombination")])
-def test_cells_that_are_not_taken_are_told_how_to_remesh(call: str, way: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"linear triangles only, or those of order 2; remesh {way}"):
-        read(meshes.make(tmp_path / "m.msh", f"{meshes.GOOD}\ngmsh.model.mesh.{call}"))
 
 
 @pytest.mark.parametrize(

@@ -13,20 +13,15 @@ import numpy as np
 import pytest
 from domains import lost, space_on
 from mpi4py import MPI
-from petsc4py import PETSc
 from scenes import NESTED, solved_system
 
 from hvi_fenicsx import InputError, read_scene, workflow
-from hvi_fenicsx.mesh.blocks import block, coarser_cells
+from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.solvers.nested_iteration import coarser_levels
 from hvi_fenicsx.solvers.resting_start import contact_dofs
 from hvi_fenicsx.system import held_solver as linear
-from hvi_fenicsx.system.levels import Levels
-from hvi_fenicsx.system.linear_settings import Kind, LinearSettings
-from hvi_fenicsx.system.system import System
+from hvi_fenicsx.system.linear_settings import LinearSettings
 
 DEMOS = Path(__file__).parents[2] / "demos"
 SHAPES: list[tuple[list[float], list[int]]] = [
@@ -47,24 +42,8 @@ def test_prolongation_keeps_a_coarse_field(size: list[float], cells: list[int]) 
     assert lost(coarser[1].prolongation(fine, coarse), fine, coarse) < 1e-13
 
 
-def test_small_odd_meshes_have_no_coarser_ones() -> None:
-    for cells in ([9, 16], [6, 8], [15, 15]):
-        assert block(MPI.COMM_WORLD, [1.0, 1.0], cells).coarser() is None
-
-
-def test_large_odd_meshes_have_coarser_ones_that_can_be_halved_often() -> None:
-    """Near to half the cells, and nested for two more levels."""
-    for cells in ([511, 511], [701, 350], [175, 1001], [47, 51, 53], [99, 20_001]):
-        fewer = coarser_cells(cells)
-        assert fewer is not None
-        assert np.array(fewer) == pytest.approx(np.array(cells) / 2, rel=0.07)
-        assert all(n % 4 == 0 for n in fewer)
-    assert coarser_cells([6, 20_001]) is None
-
-
-@pytest.mark.parametrize("demo", ["wall_left", "strong_law"])
-def test_nested_solutions_are_certified(demo: str) -> None:
-    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[64, 64]"]), thresholds=NESTED)
+def test_a_nested_solution_is_certified() -> None:
+    found = workflow.solve(read_scene(DEMOS / "strong_law.toml", ["domain.cells=[64, 64]"]), thresholds=NESTED)
     assert found.converged
     assert found.solve_result is not None
     assert found.solve_result.levels == 3
@@ -80,7 +59,7 @@ def test_a_convex_scene_ends_where_the_direct_solve_ends() -> None:
 
 
 def test_multigrid_iterations_do_not_grow_with_the_mesh() -> None:
-    assert [iterations(n) for n in (32, 64, 127, 128)] == pytest.approx([iterations(32)] * 4, abs=2)
+    assert [iterations(n) for n in (64, 127)] == pytest.approx([iterations(32)] * 2, abs=2)
 
 
 def iterations(cells: int) -> int:
@@ -95,53 +74,6 @@ def iterations(cells: int) -> int:
     load.array[contact] = 0.0
     x.set(0.0)
     return solver.held.solve(load, x, linear.Goal(rtol=1e-8))[0]
-
-
-@pytest.mark.parametrize("kind", ["lu", "gamg", "mg"])
-def test_a_preconditioner_used_before_is_that_made_anew(kind: Kind) -> None:
-    """Factors, levels and prolongations are kept; what was held before must leave no trace in them."""
-    used, new = (
-        linear.HeldPreconditioner(*with_levels("wall_left", 32), LinearSettings(kind), Timer()) for _ in range(2)
-    )
-    dofs = used.system.jacobian.rows.dofs.astype(np.int32)
-    for stiffness, held in ((0.7, dofs[::3]), (0.2, dofs[:20]), (0.9, dofs[:0]), (0.4, dofs[5::2])):
-        used.system.jacobian.set_rates(tangent(used.system, stiffness))
-        used.prepare(held)
-    new.system.jacobian.set_rates(tangent(new.system, stiffness))
-    new.prepare(held)
-    right = np.random.default_rng(3).standard_normal(used.system.dofs - len(held))
-    found, wanted = (applied(preconditioner, held, right) for preconditioner in (used, new))
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.max(np.abs(wanted)))
-
-
-def with_levels(demo: str, cells: int) -> tuple[System, Levels]:
-    """A demo on a square of so many cells a side, with its coarser levels."""
-    scene = read_scene(DEMOS / f"{demo}.toml", [f"domain.cells=[{cells}, {cells}]"])
-    prepared, control = workflow.prepare(scene, thresholds=NESTED), RunControl(timer=Timer())
-    return prepared.system, coarser_levels(prepared.model, prepared.system, prepared.options, control)
-
-
-def tangent(system: System, stiffness: float) -> list[np.ndarray]:
-    """K of laws that grow along the part."""
-    return [np.linspace(0, stiffness, len(k))[:, None, None] * np.eye(k.shape[1]) for k in system.jacobian.rates]
-
-
-def applied(preconditioner: linear.HeldPreconditioner, held: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """To a vector on the dofs that are not held."""
-    free = np.setdiff1d(np.arange(preconditioner.system.dofs), held).astype(PETSc.IntType)
-    preconditioner.select(PETSc.IS().createGeneral(free, comm=MPI.COMM_WORLD))
-    x, y = (PETSc.Vec().createWithArray(values, comm=MPI.COMM_WORLD) for values in (right, np.zeros_like(right)))
-    preconditioner.apply_reduced(x, y)
-    return y.array.copy()
-
-
-@pytest.mark.parametrize(("demo", "steady"), [("strong_law", True), ("lift_off", False)])
-def test_only_what_stood_on_every_level_is_solved_in_one_step(demo: str, steady: bool) -> None:
-    """The floor stays closed and its pieces stand, or the end of contact and the drop move from level to level."""
-    found = workflow.solve(read_scene(DEMOS / f"{demo}.toml", ["domain.cells=[128, 128]"]), thresholds=NESTED)
-    assert found.converged
-    assert found.solve_result is not None
-    assert found.solve_result.steady is steady
 
 
 @pytest.mark.parametrize("body", [meshes.GOOD, meshes.SLANTED], ids=["straight", "slanted"])

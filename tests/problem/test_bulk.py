@@ -12,8 +12,7 @@ import pytest
 from dolfinx import fem
 from scenes import STEEL
 
-from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.problem import elastic_operator
+from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.problem.problem import Problem
 
 RUBBER: dict[str, Any] = {"model": "plane_strain", "youngs_modulus": 1e6, "poisson_ratio": 0.499}
@@ -21,7 +20,7 @@ RUBBER: dict[str, Any] = {"model": "plane_strain", "youngs_modulus": 1e6, "poiss
 
 def composed(material: dict[str, Any]) -> Problem:
     return prepare(
-        read_tables(
+        Scene.model_validate(
             {
                 "domain": {"shape": "rectangle", "size": [2.0, 1.0], "cells": [6, 4]},
                 "material": material,
@@ -61,24 +60,3 @@ def test_the_energies_of_the_cells_add_up_to_that_of_the_matrix() -> None:
     wanted = u.x.petsc_vec.dot(problem.bulk.matrix() * u.x.petsc_vec)
     assert problem.bulk.energy_by_cell(u).sum() == pytest.approx(wanted, rel=1e-12)
     assert problem.bulk.force_in(problem.space, u).values().ravel() @ u.x.array == pytest.approx(wanted, rel=1e-12)
-
-
-@pytest.mark.parametrize("most", [1000, 7])
-def test_the_energies_of_the_cells_do_not_depend_on_pieces(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = composed(STEEL)
-    u, whole = bent(problem), problem.bulk.energy_by_cell(bent(problem))
-    found = list(elastic_operator.pieces(problem.space.mesh, most))
-    assert np.concatenate(found).tolist() == list(range(len(whole)))
-    assert max(map(len, found)) <= most
-    monkeypatch.setattr(elastic_operator, "pieces", lambda mesh: found)
-    assert problem.bulk.energy_by_cell(u) == pytest.approx(whole, rel=1e-14)
-
-
-def test_a_constant_dilatation_is_its_own_average() -> None:
-    problem = composed(RUBBER)
-    u = fem.Function(problem.space)
-    u.interpolate(lambda x: np.stack([x[0], x[1]]))
-    assert problem.bulk.dilatation_error(u) == pytest.approx(0.0, abs=1e-20)
-    assert problem.bulk.dilatation_error(bent(problem)).max() > 1e-6
-    (pressure,) = problem.bulk.pressures(u)
-    assert np.ptp(pressure.x.array) == pytest.approx(0.0, abs=1e-10 * pressure.x.array.max())

@@ -6,7 +6,6 @@ An integral that nobody needs is compiled and assembled for ever unnoticed; so i
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,16 +13,11 @@ from typing import Any
 import dolfinx
 import numpy as np
 import pytest
-from petsc4py import PETSc
 from runs import hvi, summary, write_scene
-from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved, solved_system
+from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved
 
-from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.solvers import SolveResult
-from hvi_fenicsx.solvers.registry import choose
-from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
-from hvi_fenicsx.workflow import Preparation, Thresholds, finish
+from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx.workflow import finish
 
 SPRING = {"law": "linear_spring", "stiffness": 1e12}
 LAW = quadratic_linear(1e3)
@@ -91,32 +85,17 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> Compiled:
     return found
 
 
-@pytest.fixture
-def events() -> None:
-    PETSc.Log.begin()
-
-
-def calls(name: str) -> int:
-    """How often PETSc entered an event."""
-    return int(PETSc.Log.Event(name).getPerfInfo()["count"])
-
-
-def found_by_solver(ready: Preparation) -> SolveResult:
-    """The solve alone: certificate and error estimate have systems of their own."""
-    return solved_system(ready).result
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_only_what_is_named_is_compiled(name: str, compiled: Compiled) -> None:
     table, integrals, _, _ = SCENES[name]
-    prepare(read_tables(table))
+    prepare(Scene.model_validate(table))
     assert compiled.integrals == integrals
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_solver_follows_from_what_acts(name: str) -> None:
     table, _, method, bounds = SCENES[name]
-    ready = prepare(read_tables(table))
+    ready = prepare(Scene.model_validate(table))
     box = np.concatenate([ready.system.lower.array, ready.system.upper.array])
     assert bool(np.isfinite(box).any()) is bounds
     found = finish(ready)
@@ -124,25 +103,6 @@ def test_the_solver_follows_from_what_acts(name: str) -> None:
     assert found.solve_result is not None
     assert found.solve_result.method == method
     assert (found.solve_result.counts.branch > 0) is (method == "branch")
-
-
-@pytest.mark.usefixtures("events")
-@pytest.mark.parametrize("name", [n for n, case in SCENES.items() if case[2] == "linear"])
-def test_a_scene_without_nonsmooth_effects_is_one_ksp_solve(name: str) -> None:
-    """By PETSc's own count of events."""
-    ready = prepare(read_tables(SCENES[name][0]))
-    before = calls("KSPSolve"), calls("SNESSolve")
-    assert found_by_solver(ready).converged
-    assert (calls("KSPSolve") - before[0], calls("SNESSolve") - before[1]) == (1, 0)
-
-
-@pytest.mark.usefixtures("events")
-def test_contact_alone_is_one_snes_solve_after_the_start() -> None:
-    """The body comes down on an inclined floor: some vertices lift, so that there is something to iterate."""
-    ready = prepare(read_tables(scene({"contact": {"gap": "1e-6*x"}})))
-    before = calls("SNESSolve")
-    assert found_by_solver(ready).converged
-    assert calls("SNESSolve") - before == 1
 
 
 @pytest.mark.parametrize("name", [n for n, case in SCENES.items() if case[2] != "branch"])
@@ -153,35 +113,6 @@ def test_the_simple_solvers_find_what_the_branch_iteration_finds(name: str) -> N
     assert other.solve_result.method == "branch"
     assert energy(one) == pytest.approx(energy(other), rel=1e-10)
     assert displacement(one) == pytest.approx(displacement(other), abs=1e-9 * np.abs(displacement(other)).max())
-
-
-def test_a_linear_scene_takes_coarser_levels_for_its_multigrid_only() -> None:
-    never_direct = LinearThresholds(largest_direct={2: 0, 3: 0})
-    nested = Thresholds(solvers=SolverThresholds(nested_from=0, linear=never_direct))
-    table = rolling()
-    table["domain"]["cells"] = [64, 64]
-    found, direct = solved(table, nested), solved(table | {"solver": {"linear_solver": "lu"}}, nested)
-    assert found.converged
-    assert found.solve_result is not None
-    assert (found.solve_result.levels, found.solve_result.counts.newton) == (1, 0)
-    assert 1 < found.solve_result.counts.linear < 15
-    assert energy(found) == pytest.approx(energy(direct), rel=1e-9)
-
-
-def test_a_method_that_is_named_is_the_one() -> None:
-    ready = prepare(read_tables(rolling() | {"solver": {"method": "condensed"}}))
-    assert choose(ready.options, ready.system).name == "condensed"
-
-
-def test_check_tells_effect_by_effect_what_is_added(tmp_path: Path) -> None:
-    file = write_scene(tmp_path / "square.toml", scene({"contact": {"gap": 0.0}, "friction": LAW}))
-    words = hvi("check", file).stdout
-    rows = {cells[0]: cells[1:] for line in words.splitlines() if len(cells := re.split(r" {2,}", line)) > 1}
-    assert rows["effect"] == ["terms", "bounds", "unknowns", "output", "solver"]
-    assert rows["contact on floor"] == ["none", "5", "none", "gap, sigma_n, contact", "bounds"]
-    assert rows["friction on floor"] == ["1 law", "none", "none", "friction_t, branch_t", "branch iteration"]
-    assert rows["displacement on wall"] == ["none", "none", "-5", "none", "linear"]
-    assert "solver: a branch iteration (DC) over SNES VI (reduced space), MUMPS" in words
 
 
 def test_check_tells_the_same_as_data(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.geometry import tangents
 from hvi_fenicsx.problem.contact_surface import Surface, decide
 
-SLOPES = [2e-9, 1e-7, 1e-5, 5e-5, 1.2e-4, 1e-2]
+SLOPES = [2e-9, 5e-5, 1e-2]
 """Between and on both sides of the angles at which normals were once rounded to an axis."""
 
 
@@ -138,10 +138,9 @@ def test_a_mesh_file_with_an_uneven_floor_is_certified(tmp_path: Path, amplitude
     assert -held[1] == pytest.approx(Q / found.problem.scales.stress, rel=1e-3)
 
 
-@pytest.mark.parametrize("wall", [pytest.param("no wall", marks=pytest.mark.long), "prescribed"])
-def test_in_space_too(tmp_path: Path, wall: str) -> None:
+def test_in_space_too(tmp_path: Path) -> None:
     path = make(tmp_path / "uneven.msh", UNEVEN_BOX.format(amplitude=1e-4))
-    table = {part: effect | {"displacement": [0.0, "free", "free"]} for part, effect in WALLS[wall].items()}
+    table = {part: effect | {"displacement": [0.0, "free", "free"]} for part, effect in WALLS["prescribed"].items()}
     assert solved(on_uneven(path, table, dimension=3)).exit_code == 0
 
 
@@ -169,25 +168,6 @@ def decided(
     parts = {name: part(name, n, 1e-3 if name in uneven else 0.0, i) for i, (name, n) in enumerate(normals.items(), 1)}
     found = decide(MPI.COMM_SELF, parts, {}, np.array(fixed, np.int32), 1.0)
     return tuple(found[name].normals[0] for name in parts)
-
-
-def test_rounding_of_the_coordinates_and_nothing_more_is_taken_away() -> None:
-    (normal, _) = decided((1e-15, -1.0), (0.0, -1.0))
-    assert normal.tolist() == [0.0, -1.0]
-    found = decide(MPI.COMM_SELF, {"one": part("one", (1e-11, -1.0), 0.0, 1)}, {}, np.empty(0, np.int32), 1.0)
-    assert found["one"].normals[0].tolist() == [1e-11, -1.0]
-
-
-def test_what_is_flat_stays_and_what_is_uneven_is_turned_to_it() -> None:
-    one, other = decided((-1.0, 3e-3), (5e-3, -1.0), uneven=("one",))
-    assert other == pytest.approx([5e-3, -1.0], rel=1e-4)
-    assert float(one @ other) == pytest.approx(0.0, abs=1e-16)
-    assert one == pytest.approx([-1.0, -5e-3], rel=1e-4)
-
-
-def test_two_parts_of_one_uneven_floor_have_one_normal_where_they_meet() -> None:
-    one, other = decided((3e-3, -1.0), (-4e-3, -1.0), uneven=("one", "other"))
-    assert one.tolist() == other.tolist()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from scenes import Table, quadratic_linear
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from hvi_fenicsx import InputError, Model, Solution, prepare, read_tables, solve
+from hvi_fenicsx import InputError, Scene, Solution, prepare, solve
 from hvi_fenicsx.certify import placed_forces
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.joined import PlacedBody, joined
@@ -33,14 +33,14 @@ Plan = tuple[tuple[float, float], tuple[float, float]]
 WHOLE: Plan = ((0.0, 0.0), (1.0, 1.0))
 
 
-def stacked(boundary: Table, between: Table, upper: Plan = WHOLE, **solver: Any) -> Model:
+def stacked(boundary: Table, between: Table, upper: Plan = WHOLE, **solver: Any) -> Scene:
     """A block on a block of 1 x 1 x 0.5, cut otherwise; upper: the corner of its base, and the base's size."""
     low = {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [4, 3, 2]}
     high = {"shape": "box", "size": [*upper[1], 0.4], "cells": [3, 4, 2], "origin": [*upper[0], 0.5]}
     return seam_scene(low, high, MATERIAL, boundary, between, **solver)
 
 
-def placed(scene: Model, rotation: Array) -> Domain:
+def placed(scene: Scene, rotation: Array) -> Domain:
     """The bodies of a scene, turned together about the origin."""
     bodies: Any = scene.domain
     found = []
@@ -50,7 +50,7 @@ def placed(scene: Model, rotation: Array) -> Domain:
     return joined(MPI.COMM_WORLD, found)
 
 
-def solved(scene: Model, rotation: Array = STRAIGHT) -> Solution:
+def solved(scene: Scene, rotation: Array = STRAIGHT) -> Solution:
     return finish(prepare(scene, domain=placed(scene, rotation)), estimating=False)
 
 
@@ -116,7 +116,7 @@ def test_affine_fields_open_nothing_and_a_pressure_loads_both_sides_alike(plan: 
         assert moment == pytest.approx(np.cross(centre, total), abs=1e-13)
 
 
-def pushed(push: float, **between: Any) -> Model:
+def pushed(push: float, **between: Any) -> Scene:
     boundary = {
         "base": {"on": "lower.bottom", "displacement": [0.0, 0.0, 0.0]},
         "press": {"on": "upper.top", "traction": [0.0, 0.0, -1e6]},
@@ -136,63 +136,12 @@ def test_both_sides_carry_opposite_forces() -> None:
     assert forces["seam"] + forces[f"seam{placed_forces.SECOND}"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
 
 
-def test_a_block_slides_off_the_other_at_the_load_of_statics() -> None:
-    friction = {"law": "graph", "points": [[0, 0], [1e-6, 8e5], [1e-6, 5e5]]}
-    factors = prepare(pushed(1e6, friction=friction)).load_factors("push")
-    assert factors.held == pytest.approx(5e5 * 0.6 / (1e6 * 0.4), rel=1e-6)
-    assert factors.peak == pytest.approx(8e5 * 0.6 / (1e6 * 0.4), rel=1e-6)
-
-
-@pytest.mark.long
-def test_words_say_which_block_leaves_and_how() -> None:
-    friction = {"law": "graph", "points": [[0, 0], [1e-6, 8e5], [1e-6, 5e5]]}
-    escaped = solved(pushed(1.3e6, friction=friction))
-    assert escaped.solvability.state == "escapes"
-    assert escaped.solvability.direction is not None
-    assert escaped.solvability.direction.name == 'translation along +x of body "upper": it slides off body "lower"'
-    lifted = pushed(0.0).tables()
-    lifted["boundary"]["press"]["traction"] = [0.0, 0.0, 1e5]
-    away = solved(read_tables(lifted)).solvability
-    assert away.state == "escapes"
-    assert away.direction is not None
-    assert away.direction.name == 'translation along +z of body "upper": it lifts off body "lower"'
-
-
-@pytest.mark.long
-def test_a_block_tips_over_on_the_other_at_the_load_of_statics() -> None:
-    stuck = {"law": "graph", "points": [[0, 0], [1e-6, 1e9]]}
-    factors = prepare(pushed(1e6, friction=stuck)).load_factors("push")
-    assert factors.held == pytest.approx(1e6 * 0.6 * 0.3 / (1e6 * 0.4 * 0.2), rel=1e-6)
-
-
-@pytest.mark.long
-def test_a_stiff_partner_is_a_rigid_floor() -> None:
-    friction = quadratic_linear(2e6, 1e-6)
-    table = pushed(4e5, friction=friction).tables()
-    stiff = {"region": "lower", "youngs_modulus": 1e6 * E}
-    table["material"] = {"soft": {**MATERIAL, "region": "upper"}, "stiff": {**MATERIAL, **stiff}}
-    floor = {"seam": {"on": "upper.bottom", **CONTACT, "friction": friction}}
-    one_body = {
-        "domain": {"upper": table["domain"]["upper"]},
-        "material": MATERIAL,
-        "boundary": {name: table["boundary"][name] for name in ("press", "push")} | floor,
-        "solver": {"tolerance": 1e-10},
-    }
-    two, one = (solve(read_tables(scene)) for scene in (table, one_body))
-    assert two.exit_code == one.exit_code == 0
-    order = [np.lexsort(np.round(seam(found).surface.points, 9).T) for found in (two, one)]
-    for name in ("pressure", "friction"):
-        pairs = zip((two, one), order, strict=True)
-        values = [getattr(seam(found), name)[at] * found.problem.scales.stress for found, at in pairs]
-        assert np.abs(values[0] - values[1]).max() < 1e-5 * np.abs(values[1]).max()
-
-
 def test_bodies_that_overlap_or_do_not_meet_are_refused() -> None:
     for origin, words in (([0.2, 0.1, 0.3], "it overlaps the body"), ([1.2, 0.1, 0.5], "do not face each other")):
         table = pushed(3e5).tables()
         table["domain"]["upper"]["origin"] = origin
         with pytest.raises(InputError, match=words):
-            prepare(read_tables(table))
+            prepare(Scene.model_validate(table))
 
 
 def triangulated(size: tuple[float, float], height: float, seed: int, up: float) -> Facets:
@@ -254,7 +203,7 @@ def test_three_blocks_in_a_row_pass_a_pressure_on() -> None:
     }
     domain = {n: {**box, "cells": c, "origin": [0.0, 0.0, 0.3 * i]} for i, (n, c) in enumerate(cells.items())}
     table = {"domain": domain, "material": MATERIAL, "boundary": boundary, "interface": interface}
-    found = solve(read_tables(table))
+    found = solve(Scene.model_validate(table))
     assert found.exit_code == 0
     assert found.examination is not None
     assert len(found.examination.states) == 2

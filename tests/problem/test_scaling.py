@@ -44,12 +44,3 @@ def test_without_a_load_displacements_and_heat_count_as_strains() -> None:
     moved = scales(pull={"on": "right", "displacement": [3.0e-4, "free"]})
     assert moved.stress == pytest.approx(E * 1.0e-4)
     assert scales(body={"temperature": 20.0}).stress == pytest.approx(E * 2.0e-4)
-
-
-def test_energy_and_force_are_those_of_stress_and_displacement() -> None:
-    """In the plane J/m and N/m, in space J and N."""
-    for dimension, area in ((2, 3.0), (3, 9.0)):
-        found = Scales(length=3.0, stress=2.0, modulus=8.0, dimension=dimension)
-        assert found.displacement == pytest.approx(0.75)
-        assert found.force == pytest.approx(2.0 * area)
-        assert found.energy == pytest.approx(0.75 * 2.0 * area)

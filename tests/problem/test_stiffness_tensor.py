@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scenes import STEEL
 
-from hvi_fenicsx import prepare, read_scene, read_tables
+from hvi_fenicsx import Scene, prepare
 from hvi_fenicsx.problem.elastic_operator import stiffness_tensor
 from hvi_fenicsx.problem.problem import Problem
 
@@ -28,7 +27,7 @@ def composed(material: dict[str, Any]) -> Problem:
             "b": {"on": "right", "traction": [1e4, 0.0, 0.0][:d]},
         },
     }
-    return prepare(read_tables(scene)).problem
+    return prepare(Scene.model_validate(scene)).problem
 
 
 def hooke(trace: float, twice_shear: float, d: int) -> np.ndarray:
@@ -46,14 +45,3 @@ def test_the_stiffness_of_cells_is_hookes(material: dict[str, Any]) -> None:
     found = stiffness_tensor(problem.bulk, np.array([5, 1], dtype=np.int32))
     for cell in found:
         assert cell == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
-
-
-def test_each_region_has_its_own() -> None:
-    problem = prepare(read_scene(Path(__file__).parents[2] / "demos" / "thermal_bar.toml")).problem
-    regions = problem.domain.regions
-    assert len(regions) > 1
-    for name, cells in regions.items():
-        (material,) = [effect for where, effect in problem.bulk.origin[3:] if where == name]
-        (found,) = stiffness_tensor(problem.bulk, cells[:1])
-        trace, twice_shear = np.array(material.lame()) / problem.scales.modulus
-        assert found == pytest.approx(hooke(trace, twice_shear, 2), rel=1e-12, abs=1e-12)

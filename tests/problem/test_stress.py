@@ -12,10 +12,9 @@ import numpy.typing as npt
 import pytest
 import ufl
 from dolfinx import fem
-from runs import ROOT
 from scenes import Table, solved
 
-from hvi_fenicsx import Solution, prepare, read_scene, read_tables, solve
+from hvi_fenicsx import Scene, Solution, prepare
 from hvi_fenicsx.effects import Contribution
 from hvi_fenicsx.problem import elastic_operator, stress
 from hvi_fenicsx.problem.problem import PlacedContribution
@@ -107,7 +106,7 @@ def test_wood_in_plane_strain_is_held_across_by_its_own_compliance() -> None:
 
 def test_a_users_own_form_of_the_strain_belongs_to_the_stress() -> None:
     """Fibres along x beside the material; an elastic bed is no stress, and a force instead."""
-    problem = prepare(read_tables(pulled(body("plane_stress", youngs_modulus=E, poisson_ratio=0.0)))).problem
+    problem = prepare(Scene.model_validate(pulled(body("plane_stress", youngs_modulus=E, poisson_ratio=0.0)))).problem
     v, u = problem.bulk.form.arguments()
     fibres = Contribution(bilinear=(0.5 * ufl.grad(u)[0, 0] * ufl.grad(v)[0, 0] * ufl.dx,))
     bed = Contribution(bilinear=(2.0 * ufl.inner(u, v) * ufl.dx,))
@@ -130,11 +129,3 @@ def test_pure_shear_and_its_von_mises_stress() -> None:
     shear = E / 2.6 * 2e-5
     np.testing.assert_allclose(found[:, 0, 1], shear, rtol=1e-9)
     np.testing.assert_allclose(stress.von_mises(found), np.sqrt(3) * shear, rtol=1e-9)
-
-
-def test_two_materials_end_to_end_bear_one_stress() -> None:
-    """Without lateral contraction and with one α, the plane bar is the slender one."""
-    same = {"poisson_ratio": 0.0, "thermal_expansion": ALPHA}
-    changes = [f"material.{m}.{k}={v}" for m in ("aluminium", "steel") for k, v in same.items()]
-    found = stresses(solve(read_scene(ROOT / "demos" / "thermal_bar.toml", changes)))
-    assert_uniform(found, -(ALPHA * 60.0 - 0.5e-3) / (0.4 / 7e10 + 0.6 / 2.1e11), 0.0, 0.0)

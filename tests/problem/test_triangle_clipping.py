@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 from hvi_fenicsx.problem import facet_polygons
-from hvi_fenicsx.problem.facet_overlaps import Facets
 from hvi_fenicsx.problem.facet_polygons import CORNERS
-
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def test_a_triangle_beyond_a_shared_edge_has_nothing_in_common() -> None:
@@ -38,15 +35,3 @@ def test_the_parts_of_a_cut_plane_fill_the_triangle() -> None:
         for corner in CORNERS:
             full = {0.0: np.pi / 2}.get(float(corner.sum()), np.pi / 4)
             assert pieces.chosen(pieces.areas > 1e-14).angles_at(corner, 1e-9)[1].sum() == pytest.approx(full)
-
-
-def test_a_corner_in_a_tiny_part_is_covered() -> None:
-    """A vertex of the other side nearly meets it: the part between is small, and is no gap."""
-    first = Facets(nodes=np.array([[0, 1, 2]]), points=np.pad(CORNERS, ((0, 0), (0, 1)))[None], normals=UP[None])
-    near = np.array([1.0 - 1.05e-6, 0.45e-6, 0.0])
-    around = near + 10.0 * np.array([[-0.11, -0.99, 0.0], [0.58, 0.81, 0.0], [-0.89, 0.45, 0.0]])
-    points = np.array([[near, around[i], around[(i + 1) % 3]] for i in range(3)])
-    second = Facets(nodes=np.arange(9).reshape(3, 3), points=points, normals=np.tile(-UP, (3, 1)))
-    found = facet_polygons.in_space(first, second)
-    assert found.covered.all()
-    assert found.areas.sum() == pytest.approx(0.5, rel=1e-12)

@@ -123,31 +123,6 @@ groups(["left", "bottom"])
 body()
 mesh.generate(2)
 """
-PINCHED = """
-gmsh.option.setNumber("Mesh.MeshSizeMax", 0.05)
-places = [(0, 0), (0, -1), (1, -1), (2, -1), (2, 0), (2, 1), (1, 1)]
-parts = [(2, occ.addRectangle(x, y, 0, 1, 1)) for x, y in places]
-occ.fragment(parts[:1], parts[1:])
-occ.synchronize()
-groups(["left"])
-body()
-mesh.generate(2)
-"""
-"""A ring of squares whose first and last one share a vertex."""
-HOLLOW = """
-gmsh.option.setNumber("Mesh.MeshSizeMax", 0.03)
-parts = [(2, occ.addRectangle(0, 0, 0, 0.5, 1)), (2, occ.addRectangle(0.5, 0, 0, 0.5, 1))]
-hole = occ.addDisk(0.25, 0.5, 0, 0.1, 0.1), occ.addDisk(0.75, 0.5, 0, 0.1, 0.1)
-ring = occ.cut(parts[:1], [(2, hole[0])])[0]
-occ.fragment(ring + parts[1:], [(2, hole[1])])
-occ.synchronize()
-groups(SIDES)
-inclusion = [t for d, t in gmsh.model.getEntitiesInBoundingBox(0.6, 0.3, -1, 0.9, 0.7, 1, 2)]
-gmsh.model.addPhysicalGroup(2, inclusion, name="inclusion")
-gmsh.model.addPhysicalGroup(2, [t for d, t in gmsh.model.getEntities(2) if t not in inclusion], name="matrix")
-mesh.generate(2)
-"""
-"""Two halves of one region, one with a round hole, the other with a round inclusion."""
 GRADED = """
 p = [occ.addPoint(*x, 0, 0.005 if x == (0, 0) else 0.1) for x in ((0, 0), (1, 0), (1, 1), (0, 1))]
 occ.addPlaneSurface([occ.addCurveLoop([occ.addLine(p[i], p[(i + 1) % 4]) for i in range(4)])])

@@ -18,7 +18,7 @@ import hvi_fenicsx as hvi
 SHELLS = """
 SetFactory("OpenCASCADE");
 Sphere(1) = {{0, 0, 0, 1, 0, Pi/2, Pi/2}}; Sphere(2) = {{0, 0, 0, 1.5, 0, Pi/2, Pi/2}};
-Sphere(3) = {{0, 0, 0, {around}, 0, Pi/2, Pi/2}}; Sphere(4) = {{0, 0, 0, 2, 0, Pi/2, Pi/2}};
+Sphere(3) = {{0, 0, 0, 1.5, 0, Pi/2, Pi/2}}; Sphere(4) = {{0, 0, 0, 2, 0, Pi/2, Pi/2}};
 BooleanDifference(5) = {{ Volume{{2}}; Delete; }}{{ Volume{{1}}; Delete; }};
 BooleanDifference(6) = {{ Volume{{4}}; Delete; }}{{ Volume{{3}}; Delete; }};
 Physical Volume("first") = {{5}}; Physical Volume("second") = {{6}};
@@ -38,34 +38,30 @@ def displacement(r: Any) -> Any:
     return P / 7 * (r / (3 * BULK) + 8 / (4 * SHEAR * r**2))
 
 
-def script(size: float, other: float, order: int = 2, apart: float = 0.0) -> str:
+def script(size: float, other: float) -> str:
     """The bodies for gmsh.
 
     Args:
         size: of the cells of the first body, m.
         other: of those of the second; where it is the same and the bodies meet, the meshes match.
-        order: of the mesh.
-        apart: the distance between the bodies, m.
     """
-    matching = "Periodic Surface {26} = {17} Translate {0, 0, 0};" if size == other and not apart else ""
-    return SHELLS.format(size=size, other=other, order=order, matching=matching, around=1.5 + apart)
+    matching = "Periodic Surface {26} = {17} Translate {0, 0, 0};" if size == other else ""
+    return SHELLS.format(size=size, other=other, order=2, matching=matching)
 
 
-def bodies(size: float, other: float, order: int = 2, *, exchanged: bool = False, apart: float = 0.0) -> hvi.Body:
+def bodies(size: float, other: float) -> hvi.Body:
     """The bodies with the interface ``fit``.
 
     Args:
         size: of the cells of the first body, m.
         other: of those of the second.
         order: of the mesh.
-        exchanged: whether the outer body's side is the first.
         apart: the distance between the bodies, m.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "shells.geo"
-        file.write_text(script(size, other, order, apart))
-        names = ("around", "within") if exchanged else ("within", "around")
-        return hvi.Body.file(file, dimension=3).interface("fit", *names)
+        file.write_text(script(size, other))
+        return hvi.Body.file(file, dimension=3).interface("fit", "within", "around")
 
 
 def material(expansion: float = 0.0) -> hvi.Isotropic:

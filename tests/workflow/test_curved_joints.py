@@ -23,8 +23,6 @@ from runs import hvi as command
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
-from hvi_fenicsx.problem.curved_overlaps import in_plane
-from hvi_fenicsx.problem.facet_overlaps import Facets
 
 HELD = [hvi.Displacement("bottom", [0.0, 0.0]), hvi.Displacement("left", [0.0, 0.0])]
 SYMMETRY = [hvi.Displacement("bottom", [None, 0.0]), hvi.Displacement("left", [0.0, None])]
@@ -140,56 +138,6 @@ def test_a_law_in_a_twisted_joint_slips_as_in_closed_form_and_the_estimate_is_th
         assert found.estimate.relative == pytest.approx(lame.energy_error(found, wanted), rel=0.06)
     assert away[1] < 2e-4
     assert away[1] < 0.25 * away[0]
-
-
-def test_the_estimate_of_a_ring_that_is_glued_to_a_rigid_wall_is_the_error(tmp_path: Path) -> None:
-    file, b, shear = tmp_path / "ring.geo", 2.0, E / (2 * (1 + NU))
-    B = GLUE * TURN * b / (2 * shear / b**2 - GLUE / b + GLUE * b)
-    for size in (1 / 4, 1 / 8):
-        file.write_text(rings.RING.format(size=size, order=2))
-        found = hvi.solve(hvi.Model(hvi.Body.file(file), [MATERIAL, *TWISTED, glued("outer")]), degree=2)
-        assert found.estimate is not None
-        error = lame.energy_error(found, around(found, lambda r: (TURN - B) * r + B / r))
-        assert found.estimate.relative == pytest.approx(error, rel=0.05)
-
-
-@pytest.mark.parametrize(("begin", "end"), [(0.0, 1.0), (0.17, 0.83)])
-def test_pairs_of_points_lie_on_one_normal_of_the_chord(begin: float, end: float) -> None:
-    """And lengths are those of the arcs; facets of another circle, whose parts cover the first's or end within them."""
-
-    def side(radius: float, first: float, last: float, count: int, sign: float) -> Facets:
-        angles = np.linspace(first, last, 2 * count + 1)
-        around = radius * np.column_stack([np.cos(angles), np.sin(angles)])
-        points = np.stack([around[0:-1:2], around[2::2], around[1::2]], axis=1)
-        chords = points[:, 1] - points[:, 0]
-        normals = sign * np.column_stack([chords[:, 1], -chords[:, 0]]) / np.linalg.norm(chords, axis=1)[:, None]
-        nodes = np.stack([2 * np.arange(count), 2 * np.arange(count) + 2, 2 * np.arange(count) + 1], axis=1)
-        return Facets(nodes=nodes, points=points, normals=normals)
-
-    first, second = side(1.0, 0.0, 1.0, 5, 1.0), side(1.01, begin, end, 7, -1.0)
-    points = in_plane(first, second).points(2)
-    places = [
-        np.einsum("pn,pnd->pd", of.functions(on), of.points[facets])
-        for of, on, facets in ((first, points.on_first, points.first), (second, points.on_second, points.second))
-    ]
-    assert np.abs(np.linalg.norm(places[1], axis=1) - 1.01).max() < 1e-5
-    apart = places[1] - places[0]
-    along = apart - np.sum(apart * first.normals[points.first], axis=1)[:, None] * first.normals[points.first]
-    assert np.abs(along).max() < 1e-15
-    assert points.weights.sum() == pytest.approx(end - begin, abs=2e-3 if begin else 5e-6)
-
-
-@pytest.mark.long
-def test_an_accuracy_is_kept_where_refined_sides_follow_their_curves(tmp_path: Path) -> None:
-    """The file's curves are the body: parabolas of 6.9 degrees, whose mean radius is wrong by φ⁴/60, φ half of that."""
-    file, accuracy, wrong = tmp_path / "rings.geo", 2e-3, (np.pi / 52) ** 4 / 60
-    file.write_text(RINGS.format(size=0.125, other=0.0875, order=2))
-    out = tmp_path / "out"
-    done = command("run", scene(tmp_path, file), "--out", out, "--no-pictures", "--accuracy", accuracy)
-    assert done.returncode == 0
-    energy = -0.25 * np.pi * P * rings.displacement(1.0)
-    assert 0.0 < 1.0 - summary(out)["energy"] / energy < accuracy**2 + 4.0 * wrong
-    assert summary(out)["accuracy"]["estimated"] < accuracy
 
 
 @pytest.mark.parametrize("ranks", LONG_RANKS[1:])

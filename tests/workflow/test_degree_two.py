@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import ufl
 from dolfinx import fem
@@ -20,15 +19,11 @@ from runs import summary, table
 from scenes import NESTED, STEEL, Table, model, quadratic_linear
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx import read_tables, solve
-from hvi_fenicsx.mesh import blocks, nodes, refinement
-from hvi_fenicsx.mesh.transfer import DegreeTransfer
-from hvi_fenicsx.problem import spaces
+from hvi_fenicsx import Scene, solve
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 from hvi_fenicsx.workflow import Thresholds
 
-Array = npt.NDArray[np.float64]
 TRESCA: Table = {"law": "tresca", "yield_traction": 5e5}
 P, E, NU, LIFTING = 1.0e6, 2.15e11, 0.29, {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}
 
@@ -77,50 +72,6 @@ def test_a_uniform_pressure_is_uniform(dimension: int, law: str) -> None:
     np.testing.assert_allclose(floor.pressure, P, rtol=1e-10)
     assert found.converged
     assert len(floor.pressure) == 7 ** (dimension - 1)
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_the_weights_are_the_integrals_of_the_basis(dimension: int) -> None:
-    """By quadrature of the space's own functions; and all of them are positive."""
-    domain = blocks.block(MPI.COMM_SELF, [1.0, 2.0, 3.0][:dimension], [2, 1, 2][:dimension])
-    space = spaces.displacement_space(domain.mesh, 2)
-    facets = domain.facets(["bottom"])
-    tags = dmesh.meshtags(domain.mesh, dimension - 1, facets, np.ones(len(facets), dtype=np.int32))
-    form = fem.form(ufl.TestFunction(space)[0] * ufl.Measure("ds", subdomain_data=tags)(1))
-    exact = fem.assemble_vector(form).array.reshape(-1, dimension)[:, 0]
-    found = np.zeros(len(exact))
-    np.add.at(found, nodes.facet_nodes(space, facets), spaces.facet_weights(space, np.full(len(facets), 0.5)))
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-15)
-    assert np.all(found[np.unique(nodes.facet_nodes(space, facets))] > 1e-3)
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_the_transfer_from_degree_one_is_exact(dimension: int) -> None:
-    """A P1 field is a field of degree 2: the prolongation gives the same function, and the same nodal values."""
-    mesh = blocks.block(MPI.COMM_SELF, [1.0] * dimension, [2] * dimension).mesh
-    coarse, fine = spaces.displacement_space(mesh, 1), spaces.displacement_space(mesh, 2)
-    u, v = fem.Function(coarse), fem.Function(fine)
-    u.x.array[:] = np.random.default_rng(3).normal(size=len(u.x.array))
-    DegreeTransfer().prolongation(fine, coarse).mult(u.x.petsc_vec, v.x.petsc_vec)
-    assert fem.assemble_scalar(fem.form(ufl.inner(u - v, u - v) * ufl.dx)) < 1e-28
-    ends = nodes.edge_ends(fine)
-    by_node = spaces.values(fine, v.x.array)
-    np.testing.assert_allclose(by_node, by_node[ends].mean(axis=1), atol=1e-14)
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_the_parts_of_cells_and_facets_fill_them(dimension: int) -> None:
-    """The once refined mesh, of which files and pictures are made, has the volume and the area of the mesh."""
-    domain = blocks.block(MPI.COMM_SELF, [1.0, 2.0, 3.0][:dimension], [2, 1, 2][:dimension])
-    space = spaces.displacement_space(domain.mesh, 2)
-    x = nodes.points(space)[:, :dimension]
-    cells = x[nodes.linear_cells(space)]
-    volumes = np.abs(np.linalg.det(cells[:, 1:] - cells[:, :1]))
-    assert np.ptp(volumes) < 1e-14
-    assert volumes.sum() == pytest.approx([4.0, 36.0][dimension - 2], rel=1e-14)
-    parts = x[nodes.linear_facets(space, domain.facets(["bottom"]))][:, :, :-1]
-    sizes = np.abs(np.linalg.det(parts[:, 1:] - parts[:, :1]))
-    assert sizes.sum() == pytest.approx([1.0, 4.0][dimension - 2], rel=1e-14)
 
 
 def smooth_error(cells: int, degree: int) -> float:
@@ -195,7 +146,7 @@ def test_all_linear_solvers_find_the_same(name: str) -> None:
     scene["boundary"]["press"] = scene["boundary"]["press"] if name == "space" else LIFTING
 
     def found(linear: str, **more: Any) -> hvi.ModelSolution:
-        return hvi.solve(read_tables(scene), linear_solver=linear, estimate=False, **more)
+        return hvi.solve(Scene.model_validate(scene), linear_solver=linear, estimate=False, **more)
 
     direct, algebraic, nested = found("lu"), found("gamg"), found("auto", thresholds=NESTED)
     assert nested.solve_result is not None
@@ -209,7 +160,7 @@ def test_all_linear_solvers_find_the_same(name: str) -> None:
 @pytest.mark.parametrize("method", ["snes_vi", "condensed"])
 def test_the_other_methods_find_the_same(method: str) -> None:
     scene = model(4, 3e6, friction=TRESCA, epsilon=0.1, degree=2)
-    solutions = [hvi.solve(read_tables(scene), method=name, estimate=False) for name in ("auto", method)]
+    solutions = [hvi.solve(Scene.model_validate(scene), method=name, estimate=False) for name in ("auto", method)]
     assert all(solution.converged for solution in solutions)
     assert solutions[1].energy == pytest.approx(solutions[0].energy, rel=1e-9)
 
@@ -222,7 +173,7 @@ def test_nearly_incompressible_bodies_do_not_lock() -> None:
         for scene in scenes:
             scene["material"] = {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": nu}
             scene["boundary"]["press"] = LIFTING
-        return [hvi.solve(read_tables(scene), estimate=False).energy for scene in scenes]
+        return [hvi.solve(Scene.model_validate(scene), estimate=False).energy for scene in scenes]
 
     ratios = [coarse / fine - 1 for coarse, fine in map(energies, (0.3, 0.4999))]
     assert abs(ratios[1]) < 3 * abs(ratios[0]) + 1e-3
@@ -241,7 +192,7 @@ def test_nearly_incompressible_bodies_are_solved_by_multigrid(nu: float, largest
         scene = model(cells, 3e6, friction=quadratic_linear(1e6), degree=2)
         scene["material"] = {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": nu}
         nested, direct = (
-            solve(read_tables(scene).with_solver(linear_solver=kind), thresholds=small_nested)
+            solve(Scene.model_validate(scene).with_solver(linear_solver=kind), thresholds=small_nested)
             for kind in ("auto", "lu")
         )
         assert nested.solve_result is not None
@@ -259,7 +210,7 @@ def test_files_have_all_nodes(name: str, tmp_path: Path) -> None:
     """One row a node, in the plane in the order of the arc; ParaView's field has the values of the table."""
     scene = in_space(2) if name == "space" else model(4, 6e6, 1e6, quadratic_linear(3e6), degree=2)
     folder = tmp_path / "result"
-    hvi.solve(read_tables(scene)).write(folder, pictures=False)
+    hvi.solve(Scene.model_validate(scene)).write(folder, pictures=False)
     rows, record = table(folder / "contact.csv"), summary(folder)
     assert len(rows) == (25 if name == "space" else 9)
     assert record["contact"]["vertices"] == len(rows)
@@ -276,22 +227,3 @@ def test_files_have_all_nodes(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(along, rows["u_n"], atol=1e-12 * np.abs(along).max())
     surface = pyvista.get_reader(folder / "contact.pvd").read()[0]
     assert len(np.unique(np.round(surface.points, 9), axis=0)) == len(rows)
-
-
-def test_what_degree_two_cannot_do_is_refused() -> None:
-    with pytest.raises(Exception, match="degree"):
-        read_tables(model(4, degree=3))
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_the_transfer_to_a_refined_mesh_is_exact(dimension: int) -> None:
-    """A field of degree 2 is one on the refined mesh too, where it has the same values."""
-    domain = blocks.block(MPI.COMM_SELF, [1.0] * dimension, [2] * dimension)
-    step = refinement.marked(domain, np.array([0, 3], dtype=np.int32))
-    coarse, fine = (spaces.displacement_space(mesh, 2) for mesh in (domain.mesh, step.domain.mesh))
-    u, v = fem.Function(coarse), fem.Function(fine)
-    wanted = [lambda x: x[0] * (1 + x[1]) - x[1] ** 2, lambda x: 3 * x[0] ** 2 - x[-1] * x[0], lambda x: x[2] * x[1]]
-    for function in (u, v):
-        function.interpolate(lambda x: np.stack([f(x) for f in wanted[:dimension]]))
-    found = step.transfer.prolongation(fine, coarse) * u.x.petsc_vec
-    np.testing.assert_allclose(found.array_r, v.x.array, atol=1e-14)

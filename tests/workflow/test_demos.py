@@ -55,11 +55,6 @@ def test_the_pushed_block_sticks_with_the_slip_that_its_friction_needs() -> None
     assert slip == pytest.approx(0.6e6 * 9e-6 / 1e6, rel=1e-9)
 
 
-def test_the_pushed_block_goes_where_its_header_says() -> None:
-    assert demo("pushed_block", "boundary.push.traction=[0.4e6, 0]").solvability.state == "held"
-    assert demo("pushed_block", "boundary.push.traction=[1.1e6, 0]").exit_code == ESCAPES
-
-
 def test_the_tower_tips_about_its_front_edge() -> None:
     """Weight times b/2 over wind times h/2."""
     assert state(demo("tipping_tower"), "floor").contact.any()

@@ -11,7 +11,7 @@ from runs import ROOT, hvi, summary
 
 WIDTH, HEIGHT, G = 20.0, 1.5, 0.28
 """mm, mm, N/mm."""
-E1, E2, G12, NU12 = 135.3e3, 9.0e3, 5.2e3, 0.24
+E1, E2, NU12 = 135.3e3, 9.0e3, 0.24
 """N/mm², the ratio without unit."""
 
 
@@ -20,19 +20,6 @@ def beam(opening: float) -> float:
     stiffness = WIDTH * E1 * HEIGHT**3 / (12 * (1 - NU12**2 * E2 / E1))
     effective = np.sqrt(1.5 * opening * np.sqrt(stiffness / (G * WIDTH)))
     return float(np.sqrt(G * WIDTH * stiffness) / effective)
-
-
-@pytest.mark.long
-def test_two_arms_are_pulled_apart_as_one_is_off_its_plane_of_symmetry(tmp_path: Path) -> None:
-    peaks = []
-    for name in ("double_cantilever", "two_arms"):
-        scene, out = ROOT / "demos" / f"{name}.toml", tmp_path / name
-        done = hvi("path", scene, "--set", "path.to=1.02", "--out", out, "--no-pictures")
-        assert done.returncode == 0, done.stderr
-        with (out / "path.csv").open(encoding="utf-8") as stream:
-            peaks.append(max((float(r["pull.fy"]), float(r["factor"])) for r in csv.DictReader(stream)))
-        assert summary(out)["path"]["uncertified"] == 0
-    assert peaks[1] == pytest.approx(peaks[0], rel=1e-5)
 
 
 @pytest.mark.long

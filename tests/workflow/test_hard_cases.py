@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from enumeration import Floor, polyline
 from mpi4py import MPI
-from scenes import DELTA, model, quadratic_linear, solved
 
 from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.equilibrium_search.bodies import Equilibria
@@ -28,7 +26,6 @@ from hvi_fenicsx.solvers.refinement import refined
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
-import hard_cases  # noqa: E402 (a script's neighbour, not a package)
 import hard_equilibria  # noqa: E402
 import hard_run  # noqa: E402
 import hard_scenes  # noqa: E402
@@ -55,12 +52,6 @@ def solve_and_judge(case: Case, degree: int = 1) -> None:
 @pytest.mark.parametrize("case", parameters(FAST))
 def test_auto_solves_a_small_case(case: Case) -> None:
     solve_and_judge(case)
-
-
-def test_a_line_has_the_time_that_the_limit_is_of() -> None:
-    ended = {"number": 7, "method": "auto", "outcome": "failed", "reason": "time limit", "seconds": 45.0, "cpu": 20.1}
-    assert hard_cases.told(ended) == "7 auto failed, 20.1 s of processor time: time limit"
-    assert hard_cases.told({**ended, "reason": ""}) == "7 auto failed, 20.1 s of processor time"
 
 
 def test_a_bonded_block_just_below_its_peak_has_no_equilibrium_proven_in_few_cells() -> None:
@@ -131,10 +122,6 @@ def test_the_list_covers_what_it_promises() -> None:
     assert all(TABLE.allowed(c.values) for c in LISTED)
 
 
-def test_the_list_is_the_same_every_time() -> None:
-    assert [c.key for c in cases(Table.read(BENCHMARKS / "hard_cases.toml"))] == [c.key for c in LISTED]
-
-
 AGREED = [
     ("quadratic_linear", "peak", "exact", 4, 0),
     pytest.param("one_sided", "peak", "quadratic", 4, 0, marks=pytest.mark.long),
@@ -160,34 +147,6 @@ def test_algebraic_multigrid_that_takes_too_long_goes_over_to_the_direct_solver(
     solve_and_judge(
         next(c for c in LISTED if (c["material"], c["linear"]) == ("plane_strain 0.4999", "gamg") and c["ranks"] == 1)
     )
-
-
-def naive_states(floor: Floor, gamma1: float, steps: int) -> list[tuple[float, ...]]:
-    """Each vertex on the signed piece of its law that its last slip lies on, contact closed; the broken one first."""
-    stiffness, load, _ = floor._condensed
-    m = len(floor.tangential)
-    weights = floor.weights[floor.tangential // 2]
-    piece, found = np.ones(m), []
-    for _ in range(steps):
-        rising = np.diag(np.where(piece == 0.0, weights * gamma1 / DELTA, 0.0))
-        slip = np.linalg.solve(stiffness[:m, :m] + rising, load[:m] - weights * gamma1 / 2 * piece)
-        piece = np.where(np.abs(slip) <= DELTA, 0.0, np.sign(slip))
-        found.append(tuple(piece))
-    return found
-
-
-def test_where_the_naive_iteration_cycles_for_ever_the_energy_falls_to_a_solution() -> None:
-    """8 x 8 cells, P = 1e6, γ1 = 1e7, begun beyond the drop."""
-    gamma1 = 1e7
-    law = polyline([(0.0, 0.0), (DELTA, gamma1), (DELTA, gamma1 / 2)])
-    states = naive_states(Floor(8, 1e6, 1e6, law), gamma1, 100)
-    assert states[-1] != states[-2]
-    assert states[-1] in states[-10:-1]
-    found = solved(model(8, 1e6, friction=quadratic_linear(gamma1), start="broken"))
-    assert found.converged
-    energies = found.solve_result.energies if found.solve_result else ()
-    assert len(energies) > 1
-    assert np.all(np.diff(energies) <= 1e-10 * np.abs(energies[:-1]))
 
 
 PLAIN = {
