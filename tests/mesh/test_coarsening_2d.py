@@ -20,7 +20,7 @@ from mpi4py import MPI
 from runs import RANKS
 from scenes import NESTED
 
-from hvi_fenicsx import Scene, read_scene, workflow
+from hvi_fenicsx import Model, read_scene, workflow
 from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
@@ -85,7 +85,7 @@ def test_linear_fields_are_prolonged_as_they_are(name: str, tmp_path: Path) -> N
     assert found.array == pytest.approx(fields[0].x.array, abs=1e-12)
 
 
-def scene(path: Path, *overrides: str) -> Scene:
+def scene(path: Path, *overrides: str) -> Model:
     file = meshes.make(path / "m.msh", meshes.GOOD.replace("0.2", "0.03"))
     return read_scene(DEMOS / "strong_law.toml", [f'domain={{shape="file", file="{file}"}}', *overrides])
 

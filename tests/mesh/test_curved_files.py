@@ -13,7 +13,7 @@ import pytest
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from hvi_fenicsx import InputError, Scene, prepare, read_scene
+from hvi_fenicsx import InputError, Model, prepare, read_scene
 from hvi_fenicsx.api import solve
 from hvi_fenicsx.mesh import gmsh_file, refinement
 from hvi_fenicsx.mesh.domain import Domain
@@ -85,7 +85,7 @@ def test_a_side_of_second_order_is_refined_onto_its_curve(script: str, dimension
     assert missing[0][0] / missing[0][1] == pytest.approx((4.0, 3.2)[dimension - 2], rel=0.05)  # Plaza's faces
 
 
-def hertz(domain: str) -> Scene:
+def hertz(domain: str) -> Model:
     return read_scene(DEMOS / "hertz.toml", ["solver.degree=2", f"domain={domain}"])
 
 

@@ -18,7 +18,7 @@ from mpi4py import MPI
 from runs import LONG_RANKS, hvi, on_ranks, summary, write_scene
 from scenes import NU, E, Table, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, prepare, read_scene, solve
+from hvi_fenicsx import InputError, prepare, read_scene, read_tables, solve
 
 GAMMA = 1.0e6
 WORDS = ("translation along x", "translation along y")
@@ -128,7 +128,7 @@ def test_both_escapes_count_in_the_margin(answers: dict[str, Any]) -> None:
 
 
 def test_bodies_without_regions_of_their_own_are_numbered_from_the_left(folder: Path) -> None:
-    verdict = prepare(Scene.model_validate(blocks(folder / "nameless.msh", 2, 0.3e6, -2.0e6))).solvability
+    verdict = prepare(read_tables(blocks(folder / "nameless.msh", 2, 0.3e6, -2.0e6))).solvability
     assert verdict.direction is not None
     assert verdict.direction.name == "translation along -x of body 2 at (2.5, 0.5)"
     assert verdict.kernel[2].name == "rotation about (0.5, 0.5) of body 1 at (0.5, 0.5)"
@@ -145,7 +145,7 @@ def test_a_body_of_a_file_is_called_by_its_table(tmp_path: Path) -> None:
         "pull": {"on": "upper.top", "traction": [0.0, 1e6]},
     }
     table["interface"] = {"seam": {"between": ["upper.bottom", "lower.top"], "contact": {"gap": 0.0}}}
-    verdict = prepare(Scene.model_validate(table)).solvability
+    verdict = prepare(read_tables(table)).solvability
     assert verdict.direction is not None
     assert verdict.direction.name == 'translation along +y of body "upper": it lifts off body "lower"'
 
@@ -164,7 +164,7 @@ def test_the_kernel_is_the_null_space_of_the_matrix(conditions: dict[str, Any], 
     """‖A y‖ = 0 for each mode, and A has no other null vectors: its dense eigenvalues count them."""
     table = blocks(folder / "nameless.msh", 2, 0.0, 0.0)
     table["boundary"] = {side: {"on": [side], "displacement": u} for side, u in conditions.items()}
-    prepared = prepare(Scene.model_validate(table))
+    prepared = prepare(read_tables(table))
     problem, modes = prepared.problem, prepared.solvability.kernel
     assert len(modes) == left
     matrix = problem.bulk.matrix()
@@ -186,7 +186,7 @@ def test_a_hinge_is_refused(tmp_path: Path) -> None:
     table = blocks(tmp_path / "hinge.msh", 2, 0.0, 0.0)
     table["boundary"] = {"left": {"on": ["left"], "displacement": [0.0, 0.0]}}
     with pytest.raises(InputError, match=r"at \(1, 1\) two bodies share a vertex but no facet"):
-        prepare(Scene.model_validate(table))
+        prepare(read_tables(table))
 
 
 def test_only_the_body_that_escapes_moves_in_the_field(folder: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from dolfinx import fem
 from scenes import STEEL
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.problem.problem import Problem
 
 RUBBER: dict[str, Any] = {"model": "plane_strain", "youngs_modulus": 1e6, "poisson_ratio": 0.499}
@@ -20,7 +20,7 @@ RUBBER: dict[str, Any] = {"model": "plane_strain", "youngs_modulus": 1e6, "poiss
 
 def composed(material: dict[str, Any]) -> Problem:
     return prepare(
-        Scene.model_validate(
+        read_tables(
             {
                 "domain": {"shape": "rectangle", "size": [2.0, 1.0], "cells": [6, 4]},
                 "material": material,

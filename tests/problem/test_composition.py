@@ -16,7 +16,7 @@ import pytest
 from runs import hvi, summary, write_scene
 from scenes import STEEL, Table, displacement, energy, model, quadratic_linear, solved
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.workflow import finish
 
 SPRING = {"law": "linear_spring", "stiffness": 1e12}
@@ -88,14 +88,14 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> Compiled:
 @pytest.mark.parametrize("name", SCENES)
 def test_only_what_is_named_is_compiled(name: str, compiled: Compiled) -> None:
     table, integrals, _, _ = SCENES[name]
-    prepare(Scene.model_validate(table))
+    prepare(read_tables(table))
     assert compiled.integrals == integrals
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_solver_follows_from_what_acts(name: str) -> None:
     table, _, method, bounds = SCENES[name]
-    ready = prepare(Scene.model_validate(table))
+    ready = prepare(read_tables(table))
     box = np.concatenate([ready.system.lower.array, ready.system.upper.array])
     assert bool(np.isfinite(box).any()) is bounds
     found = finish(ready)

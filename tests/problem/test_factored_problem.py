@@ -7,7 +7,7 @@ import pytest
 from dolfinx import fem
 from scenes import STEEL, Table, quadratic_linear
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.problem.factored_problem import FactoredProblem
 from hvi_fenicsx.problem.vectors import assembled, nodal
@@ -32,8 +32,8 @@ def scene(factor: float = 1.0) -> Table:
 
 
 def test_loads_and_displacements_are_those_of_the_scene_with_multiplied_values() -> None:
-    problem = prepare(Scene.model_validate(scene())).problem
-    wanted = prepare(Scene.model_validate(scene(FACTOR)))
+    problem = prepare(read_tables(scene())).problem
+    wanted = prepare(read_tables(scene(FACTOR)))
     made = FactoredProblem(problem, ["body.temperature", "wall.displacement", "grip.displacement"])
     made.at(7.0)
     found = made.at(FACTOR)
@@ -53,8 +53,8 @@ def test_the_certificate_at_a_factor_passes_for_its_own_solution_alone(factor: f
     """Solved as a scene of its own; at another factor the same displacement fails."""
     from hvi_fenicsx import solve
 
-    solution = solve(Scene.model_validate(scene(factor)), estimate=False)
-    problem = prepare(Scene.model_validate(scene())).problem
+    solution = solve(read_tables(scene(factor)), estimate=False)
+    problem = prepare(read_tables(scene())).problem
     made = FactoredProblem(problem, ["body.temperature", "wall.displacement", "grip.displacement"])
     assert solution.solve_result is not None
     u = fem.Function(problem.space)

@@ -13,7 +13,7 @@ from joint_scenes import away_from_affine, differences_by_side, seam, seam_scene
 from petsc4py import PETSc
 from scenes import NESTED, Table, quadratic_linear
 
-from hvi_fenicsx import InputError, Scene, prepare, solve
+from hvi_fenicsx import InputError, Model, prepare, read_tables, solve
 from hvi_fenicsx.certify import placed_forces
 from hvi_fenicsx.problem.problem import Problem
 
@@ -34,7 +34,7 @@ def turned(angle: float, x: float, y: float) -> list[float]:
 
 def stacked(
     boundary: Table, between: Table, angle: float = 0.0, upper: tuple[float, float] = (0.0, 1.0), **solver: Any
-) -> Scene:
+) -> Model:
     """A block (0.9 high) on a block of width 1 and height 0.5, cut otherwise; upper: where it begins and its width."""
     low, high = rectangle([1.0, 0.5], [7, 4], angle=angle), rectangle([upper[1], 0.4], [5, 3], angle=angle)
     high["origin"] = turned(angle, upper[0], 0.5)
@@ -137,7 +137,7 @@ def test_what_is_prescribed_leaves_its_share_to_its_neighbour(degree: int) -> No
     assert away_from_affine(found) < 1e-10
 
 
-def pushed(push: float, degree: int = 1, **between: Any) -> Scene:
+def pushed(push: float, degree: int = 1, **between: Any) -> Model:
     boundary = {
         "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
         "press": {"on": "upper.top", "traction": [0.0, -1e6]},
@@ -198,7 +198,7 @@ def test_multigrid_on_levels_with_their_own_seams_finds_the_same(degree: int) ->
     table = pushed(6e5, friction=quadratic_linear(1e6, 2e-6)).tables()
     table["domain"]["lower"]["cells"], table["domain"]["upper"]["cells"] = [32, 32], [48, 32]
     table["solver"] = {"tolerance": 1e-10, "degree": degree}
-    scene = Scene.model_validate(table)
+    scene = read_tables(table)
     levels, direct = solve(scene, thresholds=NESTED), solve(scene.with_solver(linear_solver="lu"))
     assert levels.solve_result is not None
     assert levels.solve_result.levels > 1
@@ -214,13 +214,13 @@ def test_a_measured_gap_closes_before_it_carries() -> None:
     }
     table = stacked(boundary, {"contact": {"gap": "measured"}}).tables()
     table["domain"]["upper"]["origin"] = [0.0, 0.5 + 2e-6]
-    found = solve(Scene.model_validate(table))
+    found = solve(read_tables(table))
     strain = 1e-6 / 0.9
     pressure = -seam(found).pressure * found.problem.scales.stress
     assert found.exit_code == 0
     assert pressure.min() > 0.8 * E * strain
     table["boundary"]["sink"]["displacement"] = [0.0, -1.9e-6]
-    apart = seam(solve(Scene.model_validate(table)))
+    apart = seam(solve(read_tables(table)))
     assert not apart.contact.any()
 
 
@@ -231,7 +231,7 @@ def test_three_blocks_in_a_row_pass_a_pressure_on() -> None:
         "top": rectangle([1.0, 0.3], [4, 2], [0.0, 0.6]),
     }
     found = solve(
-        Scene.model_validate(
+        read_tables(
             {
                 "domain": blocks,
                 "material": MATERIAL,
@@ -289,10 +289,10 @@ def changed(path: str, value: Any) -> Table:
 )
 def test_what_does_not_fit_is_refused_with_the_mend(path: str, value: Any, words: str) -> None:
     with pytest.raises((InputError, ValueError), match=words):
-        prepare(Scene.model_validate(changed(path, value)))
+        prepare(read_tables(changed(path, value)))
 
 
-def covering() -> Scene:
+def covering() -> Model:
     """Blocks that cover each other, pressed askew and pushed."""
     boundary = {
         "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},

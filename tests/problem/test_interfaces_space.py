@@ -13,7 +13,7 @@ from scenes import Table, quadratic_linear
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from hvi_fenicsx import InputError, Scene, Solution, prepare, solve
+from hvi_fenicsx import InputError, Model, Solution, prepare, read_tables, solve
 from hvi_fenicsx.certify import placed_forces
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.joined import PlacedBody, joined
@@ -33,14 +33,14 @@ Plan = tuple[tuple[float, float], tuple[float, float]]
 WHOLE: Plan = ((0.0, 0.0), (1.0, 1.0))
 
 
-def stacked(boundary: Table, between: Table, upper: Plan = WHOLE, **solver: Any) -> Scene:
+def stacked(boundary: Table, between: Table, upper: Plan = WHOLE, **solver: Any) -> Model:
     """A block on a block of 1 x 1 x 0.5, cut otherwise; upper: the corner of its base, and the base's size."""
     low = {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [4, 3, 2]}
     high = {"shape": "box", "size": [*upper[1], 0.4], "cells": [3, 4, 2], "origin": [*upper[0], 0.5]}
     return seam_scene(low, high, MATERIAL, boundary, between, **solver)
 
 
-def placed(scene: Scene, rotation: Array) -> Domain:
+def placed(scene: Model, rotation: Array) -> Domain:
     """The bodies of a scene, turned together about the origin."""
     bodies: Any = scene.domain
     found = []
@@ -50,7 +50,7 @@ def placed(scene: Scene, rotation: Array) -> Domain:
     return joined(MPI.COMM_WORLD, found)
 
 
-def solved(scene: Scene, rotation: Array = STRAIGHT) -> Solution:
+def solved(scene: Model, rotation: Array = STRAIGHT) -> Solution:
     return finish(prepare(scene, domain=placed(scene, rotation)), estimating=False)
 
 
@@ -116,7 +116,7 @@ def test_affine_fields_open_nothing_and_a_pressure_loads_both_sides_alike(plan: 
         assert moment == pytest.approx(np.cross(centre, total), abs=1e-13)
 
 
-def pushed(push: float, **between: Any) -> Scene:
+def pushed(push: float, **between: Any) -> Model:
     boundary = {
         "base": {"on": "lower.bottom", "displacement": [0.0, 0.0, 0.0]},
         "press": {"on": "upper.top", "traction": [0.0, 0.0, -1e6]},
@@ -141,7 +141,7 @@ def test_bodies_that_overlap_or_do_not_meet_are_refused() -> None:
         table = pushed(3e5).tables()
         table["domain"]["upper"]["origin"] = origin
         with pytest.raises(InputError, match=words):
-            prepare(Scene.model_validate(table))
+            prepare(read_tables(table))
 
 
 def triangulated(size: tuple[float, float], height: float, seed: int, up: float) -> Facets:
@@ -203,7 +203,7 @@ def test_three_blocks_in_a_row_pass_a_pressure_on() -> None:
     }
     domain = {n: {**box, "cells": c, "origin": [0.0, 0.0, 0.3 * i]} for i, (n, c) in enumerate(cells.items())}
     table = {"domain": domain, "material": MATERIAL, "boundary": boundary, "interface": interface}
-    found = solve(Scene.model_validate(table))
+    found = solve(read_tables(table))
     assert found.exit_code == 0
     assert found.examination is not None
     assert len(found.examination.states) == 2

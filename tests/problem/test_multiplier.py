@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +9,6 @@ import pytest
 from scenes import DELTA, STEEL, Table, block, model, quadratic_linear, two_blocks
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.model import dump_scene
 
 TENSILE: Table = {"law": "graph", "points": [[0, 0], [2e-6, 4e5], [9e-6, 1e5]]}
 LIFTED: Table = {"on": "top", "traction": [0.0, "1e6*(2*x - 0.9)"]}
@@ -22,7 +19,7 @@ KEYS = pytest.mark.parametrize("key", [TRACTIONS, LENGTHS])
 
 def solved(table: Table, **options: Any) -> hvi.Solution:
     """The solution without its estimate, which has converged."""
-    found = hvi.solve(hvi.Scene.model_validate(table), **{"estimate": False, **options})
+    found = hvi.solve(hvi.read_tables(table), **{"estimate": False, **options})
     assert found.converged
     return found
 
@@ -76,7 +73,7 @@ def test_a_step_is_two_pieces_with_their_own_laws(laws: Table, solver: Table, ke
 @KEYS
 def test_paths_and_all_equilibria_follow_the_multiplier(key: str) -> None:
     law = quadratic_linear(1e7, 4e-6)
-    scenes = [hvi.Scene.model_validate(table) for table in both(model(4, 6e6), {"friction": law}, key)]
+    scenes = [hvi.read_tables(table) for table in both(model(4, 6e6), {"friction": law}, key)]
     first, second = map(hvi.equilibria, scenes)
     assert first.complete
     assert len(first.solutions) == len(second.solutions) > 1
@@ -90,7 +87,7 @@ def test_paths_and_all_equilibria_follow_the_multiplier(key: str) -> None:
 def test_a_block_slides_when_the_load_is_the_integral_of_the_multiplier() -> None:
     """Tresca friction of yield traction p (1 + x) on a floor of unit length carries 3/2 p, and gives p (1 + x)."""
     law = {"law": "tresca", "yield_traction": 2e5, "multiplier": "1 + x"}
-    held = hvi.prepare(hvi.Scene.model_validate(block(5, 1e6, 1e6, law)))
+    held = hvi.prepare(hvi.read_tables(block(5, 1e6, 1e6, law)))
     assert held.load_factors("pull").peak == pytest.approx(1.5 * 2e5 / 1e6, rel=1e-9)
     grip = block(5, 0.0, 1e6, law)
     grip["boundary"]["pull"] = {"on": "right", "displacement": [1e-3, "free"]}
@@ -100,7 +97,7 @@ def test_a_block_slides_when_the_load_is_the_integral_of_the_multiplier() -> Non
 
 def test_a_rigid_block_is_torn_off_one_length_after_the_other() -> None:
     """Bonds of length l(x) that a rigid block stretches by d carry the sum of w t(d / l(x)), w being areas."""
-    law = {"law": "graph", "points": [[0, 0], ["1e-6*(1 + 3*x)", 2e5], ["4e-6*(1 + 3*x)", 0]]}
+    law = {"law": "graph", "points": [[0, 0], [1e-6, 2e5], [4e-6, 0]], "length_multiplier": "1 + 3*x"}
     table = block(8, 0.0, 0.0, law)
     table["material"] = STEEL | {"youngs_modulus": 2e17}
     for d in (0.5e-6, 3e-6, 7e-6):
@@ -155,31 +152,6 @@ def test_a_constant_factor_is_another_unit(name: str, key: str) -> None:
     assert two.certificate.second_order == one.certificate.second_order
 
 
-@pytest.mark.parametrize(
-    ("formulas", "keys"),
-    [
-        (
-            {"law": "quadratic_linear", "gamma1": "4e5*(1 + x)", "gamma2": "2e5*(1 + x)", "delta": "9e-6*(2 - x)"},
-            quadratic_linear(4e5) | {"multiplier": "1 + x", "length_multiplier": "2 - x"},
-        ),
-        (
-            {"law": "graph", "points": [[0, 0], ["1e-6*(1 + x)", 4e5], ["3e-6*(1 + x)", 1e5]]},
-            {"law": "graph", "points": [[0, 0], [1e-6, 4e5], [3e-6, 1e5]], "length_multiplier": "1 + x"},
-        ),
-        (
-            {"law": "tresca", "yield_traction": "2e5*x + 1", "multiplier": 2},
-            {"law": "tresca", "yield_traction": 1.0, "multiplier": "4e5*x + 2"},
-        ),
-    ],
-)
-def test_parameters_as_formulas_are_multipliers(formulas: Table, keys: Table) -> None:
-    scenes = [hvi.Scene.model_validate(model(6, 3e6, friction=law)) for law in (formulas, keys)]
-    one, two = (hvi.solve(scene, estimate=False) for scene in scenes)
-    assert one.energy == pytest.approx(two.energy, rel=1e-12)
-    again = hvi.solve(hvi.Scene.model_validate(scenes[0].tables()), estimate=False)
-    assert again.energy == pytest.approx(one.energy, rel=1e-12)
-
-
 @KEYS
 def test_models_from_python_give_functions(key: str) -> None:
     from own_mesh import steel_square
@@ -199,23 +171,10 @@ def test_models_from_python_give_functions(key: str) -> None:
         ({"multiplier": "x - 0.5"}, "must be positive at every vertex"),
         ({"length_multiplier": "x - 0.5"}, "length_multiplier = 'x - 0.5' is .* must be positive at every vertex"),
         ({"length_multiplier": -1.0}, "must be positive"),
-        ({"delta": "9e-6*(x - 0.5)"}, "must be positive at every vertex"),
-        ({"delta": "9e-6*q"}, "must be a number .*'q'"),
+        ({"delta": "9e-6*(1 + x)"}, "must be a number .* length_multiplier"),
         ({"delta": "9e-6"}, "without quotes"),
-        ({"gamma1": "1e6*(1 + x)"}, "gamma2 is 500000 at .* another shape"),
     ],
 )
 def test_what_is_refused(law: Table, said: str) -> None:
     with pytest.raises((hvi.InputError, ValueError), match=said):
-        hvi.prepare(hvi.Scene.model_validate(model(4, friction=quadratic_linear(1e6) | law)))
-
-
-def test_a_copied_or_written_scene_has_the_formulas_and_is_refused_alike(tmp_path: Path) -> None:
-    """Ranks get a copy of the scene, and the result's folder a file."""
-    bent = {"law": "graph", "points": [[0, 0], ["1e-6*(1 + x)", 1e5], ["1e-6*(2 + x)", 1e5]]}
-    scene = hvi.Scene.model_validate(model(4, friction=bent))
-    written = tmp_path / "scene.toml"
-    written.write_text(dump_scene(scene), encoding="utf-8")
-    for again in (pickle.loads(pickle.dumps(scene)), hvi.read_scene(written)):
-        with pytest.raises(hvi.InputError, match="another shape"):
-            hvi.prepare(again)
+        hvi.prepare(hvi.read_tables(model(4, friction=quadratic_linear(1e6) | law)))

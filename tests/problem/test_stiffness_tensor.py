@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import STEEL
 
-from hvi_fenicsx import Scene, prepare
+from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.problem.elastic_operator import stiffness_tensor
 from hvi_fenicsx.problem.problem import Problem
 
@@ -27,7 +27,7 @@ def composed(material: dict[str, Any]) -> Problem:
             "b": {"on": "right", "traction": [1e4, 0.0, 0.0][:d]},
         },
     }
-    return prepare(Scene.model_validate(scene)).problem
+    return prepare(read_tables(scene)).problem
 
 
 def hooke(trace: float, twice_shear: float, d: int) -> np.ndarray:

@@ -14,7 +14,7 @@ import ufl
 from dolfinx import fem
 from scenes import Table, solved
 
-from hvi_fenicsx import Scene, Solution, prepare
+from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.effects import Contribution
 from hvi_fenicsx.problem import elastic_operator, stress
 from hvi_fenicsx.problem.problem import PlacedContribution
@@ -106,7 +106,7 @@ def test_wood_in_plane_strain_is_held_across_by_its_own_compliance() -> None:
 
 def test_a_users_own_form_of_the_strain_belongs_to_the_stress() -> None:
     """Fibres along x beside the material; an elastic bed is no stress, and a force instead."""
-    problem = prepare(Scene.model_validate(pulled(body("plane_stress", youngs_modulus=E, poisson_ratio=0.0)))).problem
+    problem = prepare(read_tables(pulled(body("plane_stress", youngs_modulus=E, poisson_ratio=0.0)))).problem
     v, u = problem.bulk.form.arguments()
     fibres = Contribution(bilinear=(0.5 * ufl.grad(u)[0, 0] * ufl.grad(v)[0, 0] * ufl.dx,))
     bed = Contribution(bilinear=(2.0 * ufl.inner(u, v) * ufl.dx,))

@@ -19,7 +19,7 @@ from runs import summary, table
 from scenes import NESTED, STEEL, Table, model, quadratic_linear
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx import Scene, solve
+from hvi_fenicsx import read_tables, solve
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
 from hvi_fenicsx.workflow import Thresholds
@@ -146,7 +146,7 @@ def test_all_linear_solvers_find_the_same(name: str) -> None:
     scene["boundary"]["press"] = scene["boundary"]["press"] if name == "space" else LIFTING
 
     def found(linear: str, **more: Any) -> hvi.ModelSolution:
-        return hvi.solve(Scene.model_validate(scene), linear_solver=linear, estimate=False, **more)
+        return hvi.solve(read_tables(scene), linear_solver=linear, estimate=False, **more)
 
     direct, algebraic, nested = found("lu"), found("gamg"), found("auto", thresholds=NESTED)
     assert nested.solve_result is not None
@@ -160,7 +160,7 @@ def test_all_linear_solvers_find_the_same(name: str) -> None:
 @pytest.mark.parametrize("method", ["snes_vi", "condensed"])
 def test_the_other_methods_find_the_same(method: str) -> None:
     scene = model(4, 3e6, friction=TRESCA, epsilon=0.1, degree=2)
-    solutions = [hvi.solve(Scene.model_validate(scene), method=name, estimate=False) for name in ("auto", method)]
+    solutions = [hvi.solve(read_tables(scene), method=name, estimate=False) for name in ("auto", method)]
     assert all(solution.converged for solution in solutions)
     assert solutions[1].energy == pytest.approx(solutions[0].energy, rel=1e-9)
 
@@ -173,7 +173,7 @@ def test_nearly_incompressible_bodies_do_not_lock() -> None:
         for scene in scenes:
             scene["material"] = {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": nu}
             scene["boundary"]["press"] = LIFTING
-        return [hvi.solve(Scene.model_validate(scene), estimate=False).energy for scene in scenes]
+        return [hvi.solve(read_tables(scene), estimate=False).energy for scene in scenes]
 
     ratios = [coarse / fine - 1 for coarse, fine in map(energies, (0.3, 0.4999))]
     assert abs(ratios[1]) < 3 * abs(ratios[0]) + 1e-3
@@ -192,7 +192,7 @@ def test_nearly_incompressible_bodies_are_solved_by_multigrid(nu: float, largest
         scene = model(cells, 3e6, friction=quadratic_linear(1e6), degree=2)
         scene["material"] = {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": nu}
         nested, direct = (
-            solve(Scene.model_validate(scene).with_solver(linear_solver=kind), thresholds=small_nested)
+            solve(read_tables(scene).with_solver(linear_solver=kind), thresholds=small_nested)
             for kind in ("auto", "lu")
         )
         assert nested.solve_result is not None
@@ -210,7 +210,7 @@ def test_files_have_all_nodes(name: str, tmp_path: Path) -> None:
     """One row a node, in the plane in the order of the arc; ParaView's field has the values of the table."""
     scene = in_space(2) if name == "space" else model(4, 6e6, 1e6, quadratic_linear(3e6), degree=2)
     folder = tmp_path / "result"
-    hvi.solve(Scene.model_validate(scene)).write(folder, pictures=False)
+    hvi.solve(read_tables(scene)).write(folder, pictures=False)
     rows, record = table(folder / "contact.csv"), summary(folder)
     assert len(rows) == (25 if name == "space" else 9)
     assert record["contact"]["vertices"] == len(rows)
