@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.api.following import ModelPath
-from hvi_fenicsx.model.overrides import override
+from hvi_fenicsx.model.scene_file import override
 
 LIST = Path(__file__).with_suffix(".toml")
 PAGE = common.ROOT / "docs" / "benchmarks" / "paths.md"

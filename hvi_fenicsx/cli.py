@@ -95,11 +95,12 @@ def _run_on_ranks(options: argparse.Namespace) -> int:
         processes.start_petsc()
         from mpi4py import MPI
 
+        from .model import plugins
         from .runtime.mpi import ended_together
         from .system.petsc_options import refusals_told
 
         command = importlib.import_module(f".commands.{options.command}", __package__)
-    with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told(), processes.stop_unmasked():
+    with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told(), plugins.named(), processes.stop_unmasked():
         return int(command.execute(options))
 
 

@@ -4,4 +4,4 @@ from .body import Body
 from .model import Mistakes, Model, dump_scene, is_portable
 from .options import PathTable, SolverTable
 from .reader import read_tables
-from .source import read_scene, with_place
+from .scene_file import read_scene, with_place

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ..effects import Drive, Effect, Evaluate, Sizes
+from ..effects import Drive, Effect, Evaluate, Place, Sizes
 from ..errors import InputError
 from .thresholds import DEFAULT, CompositionThresholds
 
@@ -64,7 +64,8 @@ def place(placed: Placed) -> str:
         placed: the effect with where it acts.
     """
     where, effect = placed
-    return ".".join(filter(None, (effect.place.value, where, effect.key)))
+    name = where if effect.place is Place.BOUNDARY else effect.name
+    return ".".join(filter(None, (effect.place.value, name, effect.key)))
 
 
 def choose(

@@ -65,7 +65,7 @@ TABLE: dict[str, tuple[str, str]] = {
     ),
     "a table that there is not": ("solvr.tolerance=1e-3", 'hvi: --set solvr: unknown key "solvr"; did you mean'),
     "a table that lacks a key": ("boundary.more.contact={gap=0.0}", "hvi: --set boundary.more.on: is missing"),
-    "a value of two lines": ('title="a\nb"', "is not a TOML value\n"),
+    "a value of two lines": ('title="a\nb"', "must be KEY=VALUE, a dotted key and a TOML value"),
     "two widths": ("solver={epsilon=0.1, epsilon_absolute=0.1}", "leave one of them out"),
     "no such mesh": ("domain={shape='file', file='absent.msh'}", "does not exist"),
     "more memory than there is": ("domain.cells=[32000, 32000]", "use fewer cells"),

@@ -93,10 +93,6 @@ def test_an_error_of_any_kind_on_import_is_told(error: str, tmp_path: Path) -> N
         ({"traction": "return 1 / 0"}, r":12: Mine\.traction raises ZeroDivisionError"),
         ({"traction": "raise SystemExit(1)"}, r":12: Mine\.traction raises SystemExit"),
         ({"traction": "raise BaseException('no')"}, r":12: Mine\.traction raises BaseException: no"),
-        ({"traction": "return None"}, r":11: Mine\.traction returns None; it must return numbers"),
-        ({"traction": "return x[:1]"}, r":11: Mine\.traction returns an array of shape \(1,\)"),
-        ({"traction": "return 'stiff'"}, r":11: Mine\.traction returns str 'stiff'"),
-        ({"ends": "return 1e-6"}, r":14: Mine\.ends returns float 1e-06"),
         ({"ends": "raise InputError('my own words')"}, "my own words"),
     ],
 )
