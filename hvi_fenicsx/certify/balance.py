@@ -24,7 +24,6 @@ from ..system.free_motions import SupportedBody
 from ..system.net_forces import ActingForces, Holder
 from ..typing import Array, Mask
 from .contact_state import ContactState, Forces
-from .thresholds import DEFAULT, CertificateThresholds
 
 
 def unbalanced(problem: Problem, reaction: Array, parts: Sequence[ContactState]) -> Array:
@@ -67,7 +66,6 @@ def net_forces(
     forces: Forces,
     states: Sequence[ContactState],
     u: fem.Function,
-    thresholds: CertificateThresholds = DEFAULT,
 ) -> Array:
     """The largest net force or moment along a rigid motion that nothing carries, by body. Collective.
 
@@ -79,15 +77,12 @@ def net_forces(
         forces: at u.
         states: of the parts of Γc at u.
         u: nondimensional, ghosts updated.
-        thresholds: what rounding is.
     """
-    acting = _acting(references, forces, [holder for state in states for holder in _holders(state)], u, thresholds)
-    return _along_motions(acting, references, [(state.surface, state.contact) for state in states], thresholds)
+    acting = _acting(references, forces, [holder for state in states for holder in _holders(state)], u)
+    return _along_motions(acting, references, [(state.surface, state.contact) for state in states])
 
 
-def net_forces_carried(
-    references: References, forces: Forces, carried: Array, u: fem.Function, thresholds: CertificateThresholds = DEFAULT
-) -> Array:
+def net_forces_carried(references: References, forces: Forces, carried: Array, u: fem.Function) -> Array:
     """As :func:`net_forces`, where what contact and laws carry is known: they could carry nothing else. Collective.
 
     Args:
@@ -95,23 +90,21 @@ def net_forces_carried(
         forces: at u.
         carried: by contact and laws, nodal forces at this rank's vertices, (vertices, d).
         u: nondimensional, ghosts updated.
-        thresholds: what rounding is.
     """
-    acting = _acting(references, forces, [], u, thresholds)
+    acting = _acting(references, forces, [], u)
     acting = replace(acting, left=acting.left + carried, carried=[*acting.carried, NodalForces.of(carried)])
-    return _along_motions(acting, references, [], thresholds)
+    return _along_motions(acting, references, [])
 
 
 def _along_motions(
     acting: ActingForces,
     references: References,
     closed: Sequence[tuple[Surface, Mask]],
-    thresholds: CertificateThresholds,
 ) -> Array:
     problem = references.problem
     motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
     nets = [rigid_balance.along(references, one, acting) for one in motions]
-    return np.array([net.beyond_rounding(thresholds.near) for net in nets])
+    return np.array([net.beyond_rounding for net in nets])
 
 
 def _acting(
@@ -119,7 +112,6 @@ def _acting(
     forces: Forces,
     holders: Sequence[Holder],
     u: fem.Function,
-    thresholds: CertificateThresholds,
 ) -> ActingForces:
     """What acts on the bodies at u; what contact and laws give follows from the holders. Collective."""
     problem = references.problem
@@ -133,9 +125,6 @@ def _acting(
         carried=[NodalForces.of(foundation)],
         holders=holders,
         capable=rigid_balance.capable(problem),
-        noise=np.zeros(references.count),
-        summation=thresholds.summation,
-        tiny=thresholds.along,
     )
 
 

@@ -126,7 +126,7 @@ def examine(
     forces = contact_state.forces(problem, u)
     known = references.of(problem, forces.load)
     states = contact_state.states(known, u, forces.reaction, thresholds)
-    net = {"net_force": balance.net_forces(known, forces, states, u, thresholds)}
+    net = {"net_force": balance.net_forces(known, forces, states, u)}
     entries = measured(known, u, forces, states)
     passed, rounding = _within(entries, tolerance), None
     if not passed and _within(entries, thresholds.largest_rounding):

@@ -17,7 +17,7 @@ from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
-from ..problem.rigid_part import strained
+from ..problem.rigid_part import elastic_forces
 from ..problem.vectors import nodal_values
 from ..typing import Array, Integers, Mask
 from . import force_attribution, law_state
@@ -119,20 +119,12 @@ def forces(problem: Problem, u: fem.Function) -> Forces:
         problem: what is solved.
         u: nondimensional, ghosts updated.
     """
-    internal = _internal(problem, u)
+    internal = elastic_forces(problem, u)
     pushing, strains = np.zeros_like(internal), np.zeros_like(internal)
     for name, form in problem.loads.items():
         (strains if name in problem.bulk.strains else pushing)[:] += nodal_values(form)
     load = pushing + strains
     return Forces(*(problem.combined(force) for force in (internal - load, load, pushing)))
-
-
-def _internal(problem: Problem, u: fem.Function) -> Array:
-    """a(u, v) of the test functions, (blocks, d): strains first, since travel would leave them its rounding."""
-    bulk, strains = problem.bulk, strained(problem, u)
-    travel = fem.Function(problem.space)
-    travel.x.array[:] = u.x.array - strains.x.array
-    return bulk.force(strains) + bulk.foundation_force(travel)
 
 
 def states(

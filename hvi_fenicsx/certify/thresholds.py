@@ -10,14 +10,10 @@ class CertificateThresholds:
     """When a vertex is on a kink or a bound, and what is rounding.
 
     Attributes:
-        near: distance (of u0) from a kink or a bound that counts as being on it; net forces along a rigid motion that
-            are this small beside the sum of all forces are none.
+        near: distance (of u0) from a kink or a bound that counts as being on it.
         no_jump: jump of a traction, relative to the law's scale, that is rounding.
         largest_rounding: a certificate's entry above this is no rounding.
         rounding_safety: factor within which the sample of the rounding error is trusted.
-        correction: relative residual of the step that takes the rounding of the matrix out.
-        along: part of a rigid motion along a direction, per radian or unit length, that is rounding.
-        summation: rounding error of a sum of nodal forces, relative to the sum of their sizes.
         shared_steps: Newton steps on what is asked of the carriers of a shared force, at most.
     """
 
@@ -25,9 +21,6 @@ class CertificateThresholds:
     no_jump: float = 1e-12
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
-    correction: float = 1e-6
-    along: float = 1e-9
-    summation: float = 1e-14
     shared_steps: int = 60
 
 

@@ -1,4 +1,4 @@
-"""The rigid part of a displacement, which strains nothing.
+"""Elastic forces by cell, and the rigid part of a displacement, which strains nothing.
 
 A body may travel 1e6 times as far as it deforms. The rounding of its stresses then is that of its travel, and its
 elastic forces no longer balance each other. Those of the rest do, however far the body is from its place. Of a body
@@ -7,12 +7,10 @@ that travels less nothing is taken off, since to take it off rounds too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 
 from ..typing import Array, Integers
 from .problem import Problem
@@ -20,13 +18,13 @@ from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodyMotions:
-    """Motions of one body.
+class _BodyMotions:
+    """The rigid motions of one body.
 
     Attributes:
         places: of its values among all local ones, those that this rank owns first, (n,).
         owned: how many these are.
-        values: of the motions, (m, n).
+        values: of the motions, orthonormal over all ranks, (m, n).
     """
 
     places: Integers
@@ -34,59 +32,19 @@ class BodyMotions:
     values: Array
 
 
-class RigidPart:
-    """What motions of bodies make up of some values. Creation is collective.
+def elastic_forces(problem: Problem, u: fem.Function) -> Array:
+    """a(u, v) of the test functions by cells, (blocks, d): strains first, travel leaves them its rounding. Collective.
 
     Args:
-        comm: the ranks.
-        bodies: the motions of each body, independent of each other; the same bodies on all ranks.
+        problem: the bodies.
+        u: nondimensional, ghosts updated.
     """
-
-    def __init__(self, comm: MPI.Comm, bodies: Sequence[BodyMotions]) -> None:
-        self._comm = comm
-        self._bodies = [_orthonormal(comm, body) for body in bodies]
-        self._owned = [_slice(body.places[: body.owned]) for body in bodies]
-
-    def without(self, values: Array, travel: float = DEFAULT.travel) -> Array:
-        """Values without the travel of bodies that travel far, (n,); where none does, the same array. Collective.
-
-        Args:
-            values: local ones, (n,).
-            travel: of a body, relative to its deformation, beyond which it is taken off.
-        """
-        own = [values[places] for places in self._owned]
-        parts = [b.values[:, : b.owned] @ v for b, v in zip(self._bodies, own, strict=True)]
-        squares = np.array([v @ v for v in own])
-        ends = np.cumsum([len(part) for part in parts])
-        *shares, squares = np.split(self._comm.allreduce(np.concatenate([*parts, squares])), ends)
-        moved = np.array([share @ share for share in shares])
-        if not np.any(moved > 0.5 * travel**2 * (squares - moved)):  # by Pythagoras none is far, rounding included
-            return values
-        return self._rests(values, shares, travel)
-
-    def _rests(self, values: Array, shares: Sequence[Array], travel: float) -> Array:
-        """Values without the travel of bodies that travel far, (n,); shares are the parts of motions. Collective."""
-        rests = [values[b.places] - share @ b.values for b, share in zip(self._bodies, shares, strict=True)]
-        owned = [rest[: b.owned] for b, rest in zip(self._bodies, rests, strict=True)]
-        strained = self._comm.allreduce(np.array([rest @ rest for rest in owned]))
-        found = values.copy()
-        for body, share, rest, left in zip(self._bodies, shares, rests, strained, strict=True):
-            if share @ share > travel**2 * left:
-                found[body.places] = rest
-        return found
-
-
-def _slice(places: Integers) -> slice | Integers:
-    """Places as a slice where they are consecutive, so that nothing is copied."""
-    consecutive = len(places) > 0 and bool(np.all(np.diff(places) == 1))
-    return slice(int(places[0]), int(places[-1]) + 1) if consecutive else places
-
-
-def _orthonormal(comm: MPI.Comm, body: BodyMotions) -> BodyMotions:
-    """Motions that span the same and are orthonormal (Euclidean). Collective."""
-    own = body.values[:, : body.owned]
-    factor = np.linalg.cholesky(comm.allreduce(own @ own.T))
-    return replace(body, values=np.asarray(np.linalg.solve(factor, body.values)))
+    bulk, strains = problem.bulk, strained(problem, u)
+    if strains is u or bulk.foundation is None:
+        return bulk.force(strains)
+    travel = fem.Function(problem.space)
+    travel.x.array[:] = u.x.array - strains.x.array
+    return bulk.force(strains) + bulk.foundation_force(travel)
 
 
 def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) -> fem.Function:
@@ -96,21 +54,30 @@ def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) 
         problem: the bodies.
         u: nondimensional, ghosts updated.
         travel: of a body, relative to its deformation, beyond which it is far.
+
+    Returns:
+        u itself where none is.
     """
-    found = fem.Function(problem.space)
-    rigid = problem.once("rigid part of displacements", None, lambda: _of_displacements(problem))
-    found.x.array[:] = rigid.without(u.x.array, travel)
+    comm, found = problem.domain.mesh.comm, u
+    for body in problem.once("rigid motions of displacements", None, lambda: _motions(problem)):
+        values = u.x.array[body.places]
+        share = comm.allreduce(body.values[:, : body.owned] @ values[: body.owned])
+        rest = values - share @ body.values
+        if share @ share > travel**2 * comm.allreduce(rest[: body.owned] @ rest[: body.owned]):
+            found = u.copy() if found is u else found
+            found.x.array[body.places] = rest
     return found
 
 
-def _of_displacements(problem: Problem) -> RigidPart:
+def _motions(problem: Problem) -> list[_BodyMotions]:
     """All rigid motions of all bodies. Collective."""
-    points, d = np.asarray(problem.points / problem.scales.length), problem.scales.dimension
-    here, every = problem.space.dofmap.index_map.size_local, list[BodyMotions]()
+    points, d, comm = np.asarray(problem.points / problem.scales.length), problem.scales.dimension, problem.domain.mesh.comm
+    here, every = problem.space.dofmap.index_map.size_local, list[_BodyMotions]()
     for body in problem.bodies:
         blocks = np.flatnonzero(problem.bodies.labels == body.index)
         fields = problem.bodies.fields(points[blocks], blocks, body).transpose(1, 0, 2)
         places = (blocks[:, None] * d + np.arange(d)).ravel()
-        owned = d * int(np.count_nonzero(blocks < here))
-        every.append(BodyMotions(places=places, owned=owned, values=fields.reshape(len(fields), -1)))
-    return RigidPart(problem.domain.mesh.comm, every)
+        values, owned = fields.reshape(len(fields), -1), d * int(np.count_nonzero(blocks < here))
+        factor = np.linalg.cholesky(comm.allreduce(values[:, :owned] @ values[:, :owned].T))
+        every.append(_BodyMotions(places=places, owned=owned, values=np.asarray(np.linalg.solve(factor, values))))
+    return every

@@ -160,20 +160,36 @@ class ActiveSetSolver:
             steady: whether x's active set is expected to be the final one; the first linear solve is then exact.
             foundation: as in :meth:`.Equations.tangents`; the residual has none, so the solution is the same.
         """
+        bounds = lower, upper
+
+        def once() -> Outcome:
+            return self._once(x, _SnesRun(self, models, tolerance, bounds, steady=steady, foundation=foundation), *how)
+
+        how = line_search, max_iterations
         with self.timer("solve"):
-            run = _SnesRun(self, models, tolerance, lower, upper, steady=steady, foundation=foundation)
-            snes = run.create(line_search, max_iterations)
-            try:
-                snes.solve(None, x)
-            except PETSc.Error as error:
-                raise_python_error(error)
-                run.failure = f"PETSc error {error.ierr}"
-            finally:
-                run.finish(snes)
-            found = run.outcome()
-            if found.converged or found.interrupted or run.failure:
-                return found
-            return self.convergence.accept_rounding(found, run.sizes, x)
+            self.system.evaluate_by_cells(x)
+            found, left = once(), np.inf
+            while not found.interrupted and found.measure <= self.thresholds.largest_rounding:
+                self.system.evaluate_by_cells(x)
+                self.system.equations.residual(x, self._residual, models)
+                sizes = self.convergence.sizes(x, self._residual, *bounds)
+                found = replace(found, converged=sizes.worst <= tolerance, measure=sizes.worst)
+                if found.converged or sizes.worst > 0.5 * left:
+                    return self.convergence.accept_rounding(found, sizes, x, tolerance)
+                left, found = sizes.worst, found.followed_by(once())
+            return found
+
+    def _once(self, x: PETSc.Vec, run: _SnesRun, line_search: str, max_iterations: int) -> Outcome:
+        """One run of SNES from and into x. Collective."""
+        snes = run.create(line_search, max_iterations)
+        try:
+            snes.solve(None, x)
+        except PETSc.Error as error:
+            raise_python_error(error)
+            run.failure = f"PETSc error {error.ierr}"
+        finally:
+            run.finish(snes)
+        return run.outcome()
 
     def check_step(self, step: Outcome, x: PETSc.Vec, models: Sequence[LawModel], tolerance: float) -> Outcome:
         """The outcome of a step without bounds: converged if the residual at x is small enough. Collective.
@@ -184,10 +200,11 @@ class ActiveSetSolver:
             models: what takes the place of the laws, by term.
             tolerance: of :meth:`measure`.
         """
+        self.system.evaluate_by_cells(x)
         self.system.equations.residual(x, self._residual, models)
         sizes = self.convergence.sizes_without_bounds(x, self._residual)
         found = replace(step, converged=sizes.worst <= tolerance, measure=sizes.worst)
-        return found if found.converged else self.convergence.accept_rounding(found, sizes, x)
+        return self.convergence.accept_rounding(found, sizes, x, tolerance)
 
 
 class _SnesRun:
@@ -202,15 +219,14 @@ class _SnesRun:
         owner: ActiveSetSolver,
         models: Sequence[LawModel],
         tolerance: float,
-        lower: PETSc.Vec,
-        upper: PETSc.Vec,
+        bounds: tuple[PETSc.Vec, PETSc.Vec],
         *,
         steady: bool,
         foundation: float,
     ) -> None:
         self.owner, self.models, self.tolerance = owner, models, tolerance
         self.thresholds, self.steady, self.foundation = owner.thresholds, steady, foundation
-        self.lower, self.upper = lower, upper
+        self.lower, self.upper = bounds
         self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
         self.sizes, self.failure = NOT_MEASURED, ""
         self.stopped = self.far = False
@@ -224,7 +240,7 @@ class _SnesRun:
         snes.setFunction(self._function, system.load.duplicate())
         snes.setJacobian(self._jacobian, unextracted(self.owner.held))
         snes.setVariableBounds(self.lower, self.upper)
-        snes.setObjective(lambda _, x: system.equations.energy(x, self.models))
+        snes.setObjective(lambda _, x: system.equations.energy_from_base(x, self.models))
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=max_iterations)
         near = self.thresholds.near * float(np.min(system.references.scale))
@@ -262,8 +278,8 @@ class _SnesRun:
 
     def outcome(self) -> Outcome:
         """How it ended."""
-        converged = self.last <= self.tolerance and not self.failure
-        return Outcome(converged, self.iterations, self.linear, self.last, self._reason(), self.stopped)
+        left = np.inf if self.failure or not np.isfinite(self.last) else self.last
+        return Outcome(left <= self.tolerance, self.iterations, self.linear, left, self._reason(), self.stopped)
 
     def _reason(self) -> str:
         """Why it ended, in our words, and PETSc's."""

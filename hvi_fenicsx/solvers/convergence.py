@@ -12,7 +12,7 @@ from ..problem.vectors import NodalForces
 from ..system import net_forces
 from ..system.free_motions import Motions, SupportedBody
 from ..system.held_solver import Reached
-from ..system.net_forces import ActingForces, Holder, NetForces
+from ..system.net_forces import ActingForces, Holder
 from ..system.system import System
 from ..typing import Array, Mask
 from .thresholds import Thresholds
@@ -26,14 +26,12 @@ class Sizes:
         norm: its Euclidean norm, over the forces there (:class:`.References`).
         traction: the largest nodal traction on Γc, over what is allowed there.
         net: the largest net force along a rigid motion (:mod:`.net_forces`).
-        noise: what ``net`` grows by with a unit of noise in all unknowns.
         forces: what ``norm`` is relative to.
     """
 
     norm: Array
     traction: Array
     net: Array
-    noise: Array
     forces: Array
 
     @property
@@ -42,7 +40,7 @@ class Sizes:
         return float(np.max([self.norm, self.traction, self.net]))
 
 
-NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(5)))
+NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(4)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +64,10 @@ class Outcome:
     reason: str
     interrupted: bool = False
     rounding: float = 0.0
+
+    def followed_by(self, other: Outcome) -> Outcome:
+        """The outcome of another solve from there, with the iterations of both."""
+        return replace(other, newton=self.newton + other.newton, linear=self.linear + other.linear)
 
 
 class ConvergenceTest:
@@ -112,8 +114,7 @@ class ConvergenceTest:
     def _measured(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Sizes:
         """As :meth:`.NetForceTest.sizes`. Collective."""
         norm, traction, forces = self._forces(projected, x)
-        net, noise = self._net.sizes(x, residual, projected, on)
-        return Sizes(norm, traction, net, noise, forces)
+        return Sizes(norm, traction, self._net.sizes(x, residual, projected, on), forces)
 
     def reaches(self, wanted: float, forces: Array) -> Reached:
         """Whether the residual (n,) of a linear solve is small enough, net forces aside; collective.
@@ -142,22 +143,17 @@ class ConvergenceTest:
         nodal = np.abs(residual[self._system.jacobian.rows.dofs]) / self._limits
         return self._system.references.largest(self._blocks, nodal)
 
-    def rounding(self, x: PETSc.Vec, sizes: Sizes) -> Sizes:
-        """What rounding makes of the residual at x. Collective.
+    def rounding(self, x: PETSc.Vec) -> tuple[Array, Array]:
+        """What rounding makes of the norm and the largest traction of the residual at x, by body. Collective.
 
         Args:
             x: the displacement.
-            sizes: of its residual.
         """
-        system, safety = self._system, self._thresholds.rounding_safety
-        sample = system.load.duplicate()
-        system.equations.rounding_sample(x, sample)
+        sample = self._system.load.duplicate()
+        self._system.equations.rounding_sample(x, sample)
         norm, traction, _ = self._forces(sample.array_r, x)
-        system.equations.rounding_sample(system.jacobian.strained(x), sample)
-        unknowns = system.references.vertices * system.problem.scales.dimension
-        noise = safety * system.references.norms(sample.array_r) / np.sqrt(unknowns)
         sample.destroy()
-        return Sizes(safety * norm, safety * traction, noise * sizes.noise, sizes.noise, sizes.forces)
+        return self._thresholds.rounding_safety * norm, self._thresholds.rounding_safety * traction
 
     def in_contact(self, x: PETSc.Vec) -> int:
         """Vertices on a bound of the problem. Collective."""
@@ -166,25 +162,25 @@ class ConvergenceTest:
         u, lower, upper = x.array_r[at], system.lower.array_r[at], system.upper.array_r[at]
         return int(system.comm.allreduce(int(np.count_nonzero((u <= lower) | (u >= upper)))))
 
-    def accept_rounding(self, found: Outcome, sizes: Sizes, x: PETSc.Vec) -> Outcome:
+    def accept_rounding(self, found: Outcome, sizes: Sizes, x: PETSc.Vec, tolerance: float) -> Outcome:
         """Accept a residual at the rounding floor as converged. Collective.
 
-        The norm, the nodal tractions and the net forces of each body have a floor each: rounding of the forces inside
-        of a body does not excuse a wrong traction on Γc, nor another body.
+        The norm and the nodal tractions of each body have a floor each: rounding of the forces inside of a body does
+        not excuse a wrong traction on Γc, nor another body. A net force has no such excuse.
 
         Args:
             found: how the solve ended.
             sizes: of its residual.
             x: the displacement that it ended at.
+            tolerance: of the net forces.
         """
-        thresholds = self._thresholds
-        if not np.isfinite(found.measure) or not np.isfinite(x.norm()) or found.measure > thresholds.largest_rounding:
+        if found.converged or not (np.isfinite(x.norm()) and sizes.worst <= self._thresholds.largest_rounding):
             return found
-        floors = self.rounding(x, sizes)
-        pairs = [(sizes.norm, floors.norm), (sizes.traction, floors.traction), (sizes.net, floors.net)]
-        if any(np.any(size > floor) for size, floor in pairs):
+        norm, traction = self.rounding(x)
+        if np.any(sizes.norm > norm) or np.any(sizes.traction > traction) or np.any(sizes.net > tolerance):
             return found
-        return replace(found, converged=True, rounding=floors.worst, reason="as small as rounding allows")
+        floor = float(np.max([norm, traction]))
+        return replace(found, converged=True, rounding=floor, reason="as small as rounding allows")
 
 
 def projected(residual: Array, on_lower: Mask, on_upper: Mask) -> Array:
@@ -232,8 +228,8 @@ class NetForceTest:
         self._masks: list[Mask] | None = None
         self._motions: list[Motions] = []
 
-    def sizes(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> tuple[Array, Array]:
-        """The largest net force of each body, relative, and what it grows by with a unit of noise. Collective.
+    def sizes(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Array:
+        """The largest net force of each body, relative. Collective.
 
         Args:
             x: the displacement.
@@ -244,19 +240,16 @@ class NetForceTest:
         system = self._system
         self._find_motions(x)
         at = system.jacobian.rows.dofs
-        laws = residual[at] - system.jacobian.elastic_at_contact(x) + system.load.array_r[at]
+        laws = residual[at] - system.equations.at_contact(x)
         acting = ActingForces(
             left=-self._blocks(projected),
             loads=self._loads,
             carried=[NodalForces(self._contact, -self._blocks(laws))],
             holders=self._holders(residual[at] - projected[at], *on),
             capable=self._capable,
-            noise=np.ones(system.references.count),
-            summation=0.0,
-            tiny=self._thresholds.nothing,
         )
-        found = [self._relative(net_forces.along(system.references, y, acting)) for y in self._motions]
-        return np.array([left for left, _ in found]), np.array([noise for _, noise in found])
+        nets = [net_forces.along(system.references, y, acting) for y in self._motions]
+        return np.array([net.relative for net in nets])
 
     def _holders(self, reactions: Array, on_lower: Mask, on_upper: Mask) -> list[Holder]:
         """The bounds that are reached: each pushes along the axis of its unknown."""
@@ -264,12 +257,6 @@ class NetForceTest:
         columns = [self._blocks(values) for values in (reactions, least, most)]
         axes = (np.broadcast_to(axis, columns[0].shape) for axis in np.eye(self._d))
         return [Holder(self._contact, axis, *(c[:, k] for c in columns)) for k, axis in enumerate(axes)]
-
-    def _relative(self, net: NetForces) -> tuple[float, float]:
-        """The largest net force and its rounding, along motions in which anything acts at all."""
-        acts = net.acts(self._thresholds.nothing)
-        scale = np.where(acts, net.scale, np.inf)
-        return float(np.max(net.left / scale, initial=0.0)), float(np.max(net.rounding / scale, initial=0.0))
 
     def _find_motions(self, x: PETSc.Vec) -> None:
         """The motions that supports leave, and those that closed contact does not see, where that has changed."""

@@ -10,7 +10,7 @@ from ..system.thresholds import Thresholds as LinearThresholds
 FULL_STEPS = "basic"
 """PETSc's name of the line search that shortens no step."""
 EXACT = "exact"
-"""The line search of :mod:`.projected_newton`, beside PETSc's."""
+"""The line search of :mod:`.attempts`, beside PETSc's."""
 ENERGY = "bt"
 """PETSc's name of the one that backtracks by the energy."""
 
@@ -26,7 +26,6 @@ class Thresholds:
         following: how paths are followed.
         near: distance from a bound or a kink that counts as being on it.
         touching: the same for a rigid position, relative to a kink further away.
-        nothing: part of a rigid motion, or net force along one beside the sum of all forces, that is rounding.
         rounding_safety: the sample of the rounding error is trusted within this factor.
         largest_rounding: a residual larger than this is no rounding.
         energy_rounding: change of an energy, or of a merit function or step of ``condensed``, relative to it, that is
@@ -65,7 +64,6 @@ class Thresholds:
     following: FollowingThresholds = field(default_factory=FollowingThresholds)
     near: float = 1e-11
     touching: float = 1e-7
-    nothing: float = 1e-10
     rounding_safety: float = 4.0
     largest_rounding: float = 1e-4
     energy_rounding: float = 1e-10

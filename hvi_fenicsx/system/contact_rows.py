@@ -117,17 +117,16 @@ class HoldingForces:
         self._rows = stiffness.createSubMatrix(rows, None)
         self._product = self._rows.createVecLeft()
 
-    def at(self, x: PETSc.Vec, rotation: PETSc.Mat | None, rows: ContactRows, lift: Array) -> Array:
-        """The forces by owned unknown, zero where nothing holds the body, (n,). Collective.
+    def at(self, x: PETSc.Vec, rotation: PETSc.Mat | None, rows: ContactRows) -> Array:
+        """The elastic forces at these unknowns and those of Γc, else zero, (n,). Collective.
 
         Args:
-            x: the unknowns, perhaps without their rigid part.
+            x: the unknowns, zero where they are prescribed.
             rotation: Q with u = Q x; None where both are the same.
             rows: those of the vertices of Γc, with the prescribed columns left out.
-            lift: what these columns add there.
         """
         found = np.zeros(x.local_size)
-        found[rows.dofs] = rows.elastic(x) + lift
+        found[rows.dofs] = rows.elastic(x)
         found[self._fixed] = self.at_prescribed(x, rotation)
         return found
 

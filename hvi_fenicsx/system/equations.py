@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -13,37 +13,64 @@ from petsc4py import PETSc
 
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
-from ..problem.rigid_part import RigidPart
 from ..typing import Array, Entities
 from .contact_rows import ContactRows
 from .thresholds import DEFAULT, Thresholds
 
 
+@dataclass(frozen=True)
+class Base:
+    """A displacement at which elastic forces are known, this rank's unknowns (n).
+
+    Attributes:
+        x: the unknowns u.
+        elastic: its elastic forces in all rows, those of prescribed unknowns too, (n,).
+        residual: these forces less the loads; what u lacks of its values at prescribed unknowns, (n,).
+        energy: ½ a(u, u) - <g, u>, up to a constant.
+    """
+
+    x: PETSc.Vec
+    elastic: Array
+    residual: Array
+    energy: float = 0.0
+
+
 class Equations:
     """A u - b + W τ(u) = 0, and the energy that belongs to it. Creation is collective.
+
+    The rows of A round each on their own. On a mesh of equal cells they all round alike, and the elastic forces of a
+    body that turns far then have a net force, which contact and laws would have to carry. Forces of cells have none. So
+    elastic forces are those of cells at one displacement, the base, and A gives their change from there.
 
     Residuals are computed from the rows of A itself at the vertices of Γc, not from those that a step holds.
 
     Args:
         jacobian: the stiffness A.
         terms: the laws, in the unknowns' components.
-        load: b, lifted; the owner frees it.
+        base: the first base.
     """
 
-    def __init__(self, jacobian: Jacobian, terms: Sequence[LawTerm], load: PETSc.Vec) -> None:
-        self._jacobian, self._terms, self._load = jacobian, tuple(terms), load
-        self._comm = load.comm.tompi4py()
-        self._work = load.duplicate()
+    def __init__(self, jacobian: Jacobian, terms: Sequence[LawTerm], base: Base) -> None:
+        self._jacobian, self._terms, self.base = jacobian, tuple(terms), base
+        self._comm = base.x.comm.tompi4py()
+        self._change, self._work = base.x.duplicate(), base.x.duplicate()
 
-    def with_load(self, load: PETSc.Vec) -> Equations:
-        """The equations with another load; all else is shared.
+    def begin_at(self, x: PETSc.Vec, elastic: Array, residual: Array) -> None:
+        """Take another base. Collective.
 
         Args:
-            load: b.
+            x: the unknowns u there.
+            elastic: its forces, as :attr:`.Base.elastic`.
+            residual: likewise.
         """
-        found = copy.copy(self)
-        found._load = load
-        return found
+        energy = self.base.energy + self._elastic_change(x)
+        self.base.x.destroy()
+        self.base = Base(x.copy(), elastic, residual, energy)
+
+    def from_base(self, x: PETSc.Vec) -> PETSc.Vec:
+        """Unknowns less those of the base; overwritten by the next call."""
+        self._change.array[:] = x.array_r - self.base.x.array_r
+        return self._change
 
     def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[LawModel]) -> None:
         """The residual A u - b + W τ(u). Collective.
@@ -53,14 +80,23 @@ class Equations:
             out: where it is written; must have ghosts.
             models: what takes the place of the laws, by term.
         """
-        self._jacobian.elastic_product(x, out)
-        out.axpy(-1.0, self._load)
+        self._jacobian.elastic_product(self.from_base(x), out)
+        out.array[:] += self.base.residual
         with out.localForm() as local:
             local.array_w[out.local_size :] = 0.0
         for term, model in zip(self._terms, models, strict=True):
             u = x.array_r
             term.add_force(out, u, model.derivative(term.argument(u)))
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def at_contact(self, x: PETSc.Vec) -> Array:
+        """The rows of A u - b at the vertices of Γc, (m d,). Collective.
+
+        Args:
+            x: the unknowns u.
+        """
+        rows = self._jacobian.rows
+        return self.base.residual[rows.dofs] + rows.elastic(self.from_base(x))
 
     def tangents(self, x: PETSc.Vec, models: Sequence[LawModel], foundation: float = 0.0) -> list[Array]:
         """The tangent stiffness K of the laws, (m, d, d) by term.
@@ -85,12 +121,21 @@ class Equations:
             x: the unknowns u.
             models: what takes the place of the laws j, by term.
         """
-        self._jacobian.elastic_product(x, self._work)
-        u = x.array_r
-        local = 0.0
+        return self.base.energy + self.energy_from_base(x, models)
+
+    def energy_from_base(self, x: PETSc.Vec, models: Sequence[LawModel]) -> float:
+        """The same less what elasticity and loads make of it at the base: small changes keep their digits."""
+        u, local = x.array_r, 0.0
         for term, model in zip(self._terms, models, strict=True):
             local += float(np.sum(term.energy_weights * model.value(term.argument(u))))
-        return 0.5 * float(x.dot(self._work)) - float(self._load.dot(x)) + float(self._comm.allreduce(local))
+        return self._elastic_change(x) + float(self._comm.allreduce(local))
+
+    def _elastic_change(self, x: PETSc.Vec) -> float:
+        """½ a(u, u) - <g, u> less its value at the base. Collective."""
+        change = self.from_base(x)
+        self._jacobian.elastic_product(change, self._work)
+        self._work.array[:] = 0.5 * self._work.array_r + self.base.residual
+        return float(change.dot(self._work))
 
     @cached_property
     def _stiffness_norm(self) -> float:
@@ -116,8 +161,9 @@ class Equations:
         shuffled.destroy()
 
     def free(self) -> None:
-        """Free the PETSc objects, which those with another load share. Collective."""
-        self._work.destroy()
+        """Free the PETSc objects. Collective."""
+        for vector in (self.base.x, self._change, self._work):
+            vector.destroy()
 
 
 class LawModel(Protocol):
@@ -141,7 +187,6 @@ class Jacobian:
         terms: the laws.
         bounds: the contact bounds.
         thresholds: how unknowns are held.
-        rigid: what of the unknowns A does not see; None: nothing.
 
     Attributes:
         matrix: J; Dirichlet rows and columns are those of the identity; block size d.
@@ -155,15 +200,13 @@ class Jacobian:
         terms: Sequence[LawTerm],
         bounds: Sequence[Bounds],
         thresholds: Thresholds = DEFAULT,
-        rigid: RigidPart | None = None,
     ) -> None:
-        self.matrix, self._terms, self._rigid = stiffness, tuple(terms), rigid
+        self.matrix, self._terms = stiffness, tuple(terms)
         surfaces = [*(t.surface for t in terms), *(b.surface for b in bounds)]
         self.rows = ContactRows(stiffness, surfaces, thresholds.held_stiffness)
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
         self.held: Entities = np.empty(0, np.int32)
         self._comm = stiffness.comm.tompi4py()
-        self._strained = stiffness.createVecRight()
 
     @property
     def rates(self) -> list[Array]:
@@ -217,33 +260,10 @@ class Jacobian:
             x: the vector.
             out: where the product is written.
         """
-        strained = self.strained(x)
-        self.matrix.mult(strained, out)
-        self.rows.overwrite(strained, out)
-
-    def elastic_at_contact(self, x: PETSc.Vec) -> Array:
-        """The rows of A x at the vertices of Γc, (m d,). Collective.
-
-        Args:
-            x: the vector.
-        """
-        return self.rows.elastic(self.strained(x))
-
-    def strained(self, x: PETSc.Vec) -> PETSc.Vec:
-        """X without what A does not see of it: x itself, or a vector that the next call overwrites. Collective.
-
-        Args:
-            x: the vector.
-        """
-        values = x.array_r
-        rest = values if self._rigid is None else self._rigid.without(values)
-        if rest is values:
-            return x
-        self._strained.array[:] = rest
-        return self._strained
+        self.matrix.mult(x, out)
+        self.rows.overwrite(x, out)
 
     def free(self) -> None:
         """Free the PETSc objects. Collective."""
         self.matrix.destroy()
-        self._strained.destroy()
         self.rows.free()

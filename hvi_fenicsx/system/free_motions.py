@@ -21,7 +21,6 @@ from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
-from ..problem.rigid_part import BodyMotions, RigidPart
 from ..problem.vectors import null_space
 from ..rigid import AnyBody, FixedDirections, Mode, MotionFields, kernel
 from ..runtime import forms
@@ -70,39 +69,6 @@ def fields(problem: Problem, modes: Sequence[Mode]) -> list[fem.Function]:
         field.x.array[:] = problem.bodies.motion(points, mode).ravel()
         found.append(field)
     return found
-
-
-def rigid_part(problem: Problem, unknowns: Callable[[fem.Function], PETSc.Vec], *, cartesian: bool) -> RigidPart | None:
-    """That of the motions which conditions leave and the elastic operator does not see; None for none. Collective.
-
-    Across an interface they leave no strain only up to the rounding of its integrals, so they are not taken there.
-
-    Args:
-        problem: the problem.
-        unknowns: makes the unknowns of a displacement field.
-        cartesian: whether these are Cartesian components at all vertices.
-    """
-    if problem.bulk.foundation is not None or problem.interfaces:
-        return None
-    if not cartesian:
-        return _rigid_part(problem, unknowns)
-    return problem.once("rigid part of unknowns", problem.fixed.tobytes(), lambda: _rigid_part(problem, unknowns))
-
-
-def _rigid_part(problem: Problem, unknowns: Callable[[fem.Function], PETSc.Vec]) -> RigidPart | None:
-    modes = existence.motions(problem, contact_closed=False)
-    motions = [unknowns(field) for field in fields(problem, modes)]
-    if not motions:
-        return None
-    for motion in motions:
-        motion.array[problem.fixed_here] = 0.0
-    values, moving = np.array([motion.array_r for motion in motions]), np.array([mode.body for mode in modes])
-    labels, every = problem.bodies.labels[np.arange(values.shape[1]) // problem.scales.dimension], []
-    for body in np.unique(moving):
-        places = np.flatnonzero(labels == body)
-        own = values[moving == body][:, places]
-        every.append(BodyMotions(places=places, owned=len(places), values=own))
-    return RigidPart(problem.domain.mesh.comm, every)
 
 
 def remove_free_motions(problem: Problem, modes: Sequence[Mode], u: fem.Function) -> None:

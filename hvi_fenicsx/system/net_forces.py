@@ -19,6 +19,12 @@ from ..typing import Array, Entities, Mask
 from .free_motions import Motions
 
 
+NOTHING = 1e-10
+"""Part of a rigid motion along a direction, and net force beside the sum of the sizes of all forces, that is none."""
+SUMMATION = 1e-14
+"""Rounding error of a sum of nodal forces, relative to the sum of their sizes."""
+
+
 @dataclass(frozen=True)
 class Holder:
     """A contact or a law that acts along one direction at some of this rank's vertices, in the components of motions.
@@ -42,17 +48,12 @@ class Holder:
         """The forces as vectors."""
         return NodalForces(self.blocks, self.direction * self.force[:, None])
 
-    def spare(self, motions: Motions, tiny: float) -> tuple[Array, Array]:
-        """By how much its work in motions may fall and rise, (j,) each.
-
-        Args:
-            motions: of a body.
-            tiny: the part of a motion along the direction that counts as none.
-        """
+    def spare(self, motions: Motions) -> tuple[Array, Array]:
+        """By how much its work in motions of a body may fall and rise, (j,) each."""
         along = np.einsum("md,jmd->jm", self.direction, motions.at(self.blocks))
         ends = np.zeros((2, *along.shape))
         for end, limit in zip(ends, (self.least, self.most), strict=True):
-            np.multiply(along, limit - self.force, out=end, where=np.abs(along) > tiny)
+            np.multiply(along, limit - self.force, out=end, where=np.abs(along) > NOTHING)
         return -np.sum(np.min(ends, axis=0), axis=1), np.sum(np.max(ends, axis=0), axis=1)
 
 
@@ -66,9 +67,6 @@ class ActingForces:
         carried: forces that follow from the displacement.
         holders: contact and laws whose forces do not.
         capable: forces of the laws' own size, along their directions.
-        noise: rounding error of a single force, the root of the mean square, by body.
-        summation: rounding error of the loads and of what is carried, relative to their size.
-        tiny: the part of a motion along a direction that counts as none.
     """
 
     left: Array
@@ -76,9 +74,6 @@ class ActingForces:
     carried: Sequence[NodalForces]
     holders: Sequence[Holder]
     capable: Sequence[NodalForces]
-    noise: Array
-    summation: float
-    tiny: float
 
 
 @dataclass(frozen=True)
@@ -98,21 +93,25 @@ class NetForces:
     scale: Array
     sizes: Array
 
-    def acts(self, smallest: float) -> Mask:
-        """Along which motions anything acts at all, (j,): a body in neutral balance has none but digits of its mesh.
+    @property
+    def _beyond(self) -> Array:
+        """What is left without rounding, (j,)."""
+        return np.maximum(self.left - self.rounding, 0.0)
 
-        Args:
-            smallest: of what acts, beside the sum of the sizes of all forces.
-        """
-        return np.asarray(self.scale > smallest * self.sizes)
+    @property
+    def _acts(self) -> Mask:
+        """Along which motions anything acts at all, (j,): a body in neutral balance has none but digits of its mesh."""
+        return np.asarray(self.scale > NOTHING * self.sizes)
 
-    def beyond_rounding(self, smallest: float) -> float:
-        """The largest relative one, without rounding; infinite where there is nothing that it could be relative to.
+    @property
+    def relative(self) -> float:
+        """The largest relative one along motions in which anything acts."""
+        return float(np.max(self._beyond / np.where(self._acts, self.scale, np.inf), initial=0.0))
 
-        Args:
-            smallest: what acts less than this, beside the sum of the sizes of all forces, does not act.
-        """
-        left = np.maximum(self.left - self.rounding, 0.0) * (self.acts(smallest) | (self.left > smallest * self.sizes))
+    @property
+    def beyond_rounding(self) -> float:
+        """The same, infinite where there is one and nothing that it could be relative to."""
+        left = self._beyond * (self._acts | (self.left > NOTHING * self.sizes))
         found = np.divide(left, self.scale, out=np.where(left > 0, np.inf, 0.0), where=self.scale > 0)
         return float(np.max(found, initial=0.0))
 
@@ -137,7 +136,7 @@ def along(references: References, motions: Motions, acting: ActingForces) -> Net
     carried = [*acting.carried, *(holder.forces for holder in acting.holders)]
     spare = np.zeros((2, motions.combined.shape[1]))
     for holder in acting.holders:
-        spare += holder.spare(motions, acting.tiny)
+        spare += holder.spare(motions)
     loads, carry, could = (_works(motions, forces) for forces in ([acting.loads], carried, acting.capable))
     left = motions.works(acting.left)
     sums = np.array([left, loads[0], carry[1], could[1], loads[2] + carry[2], motions.squares, *spare])
@@ -145,8 +144,8 @@ def along(references: References, motions: Motions, acting: ActingForces) -> Net
     left, push, held, able, sizes, squares, fall, rise = sums
     index, lengths = motions.of.body.index, np.sqrt(squares)
     scale = np.max([np.abs(push), held, able], axis=0) * lengths * references.surface[index]
-    rounding = acting.summation * sizes + acting.noise[index] * lengths
-    return NetForces(np.maximum(np.abs(left) - np.where(left > 0, fall, rise), 0.0), rounding, scale, sizes)
+    free = np.maximum(np.abs(left) - np.where(left > 0, fall, rise), 0.0)
+    return NetForces(free, SUMMATION * sizes, scale, sizes)
 
 
 def _works(motions: Motions, forces: Sequence[NodalForces]) -> Array:

@@ -23,13 +23,14 @@ from ..problem import references, scaling
 from ..problem.compose import Formulation, compose
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
+from ..problem.rigid_part import elastic_forces
 from ..problem.vectors import assembled, new_vector, product, turn
 from ..rigid import Mode
 from ..runtime.timing import Timer
 from ..typing import Array, Entities
 from . import existence, free_motions, local_frames
 from .contact_rows import HoldingForces
-from .equations import Equations, Jacobian
+from .equations import Base, Equations, Jacobian
 from .free_motions import FreeMotions
 from .thresholds import DEFAULT, Thresholds
 
@@ -67,14 +68,13 @@ class System:
         self.free_motions: FreeMotions | None = None
         with timer("assembly"):
             self.forces = {name: assembled(form) for name, form in problem.loads.items()}
-            stiffness, self.load = self._constrained()
+            self._loads = self._sum_of(self.forces)
+            stiffness, self.load, pull = self._constrained()
             stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
-            rigid = free_motions.rigid_part(problem, self.unknowns, cartesian=self.frames is None)
-            self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds, rigid)
-            self.references = references.of(problem, self._sum_of(self.forces))
+            self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds)
+            self.references = references.of(problem, self._loads)
             self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))
-            self._lift = self._lifted_by()
-        self.equations = Equations(self.jacobian, self.terms, self.load)
+        self.equations = Equations(self.jacobian, self.terms, self._first_base(pull))
         self.lower, self.upper = self._box()
 
     @property
@@ -100,7 +100,12 @@ class System:
         vectors = [self.unknowns(field) for field in free_motions.fields(self.problem, modes)]
         self.free_motions = free_motions.create(vectors, modes)
         self.jacobian.matrix.setNullSpace(self.free_motions.null_space)
-        self.free_motions.null_space.remove(self.load)
+        residual = self.load.duplicate()
+        residual.array[:] = self.equations.base.residual
+        for vector in (self.load, residual):
+            self.free_motions.null_space.remove(vector)
+        self.equations.base.residual[:] = residual.array_r
+        residual.destroy()
 
     @property
     def pins(self) -> Entities:
@@ -146,28 +151,42 @@ class System:
         found = copy.copy(self)
         found.problem = problem
         found.bounds = problem.bounds if self.frames is None else tuple(map(self.frames.bounds, problem.bounds))
-        found.references = references.of(found.problem, self._sum_of(self.forces))
+        found.references = references.of(found.problem, self._loads)
         found.lower, found.upper = found._box()
         return found
 
-    def with_elastic_residual(self, x: PETSc.Vec, residual: Array) -> System:
-        """The system in which A u - b is a given one at some u: the load is moved; all matrices are shared. Collective.
+    def evaluate_by_cells(self, x: PETSc.Vec) -> None:
+        """Evaluate elastic forces by cells at some unknowns; from there on the matrix gives their changes. Collective.
 
         Args:
-            x: the unknowns u.
-            residual: as bounds and laws balance it, Cartesian, (vertices, d); not read at prescribed unknowns.
+            x: the unknowns.
         """
-        found, given = copy.copy(self), new_vector(self.problem.space)
-        given.array[:] = residual.ravel()
-        turn(given, self.rotation)
-        found.load, fixed = self.load.duplicate(), self.problem.fixed_here
-        self.jacobian.elastic_product(x, found.load)
-        found.load.axpy(-1.0, given)
-        found.load.array[fixed] = self.load.array_r[fixed]
+        if self.comm.allreduce(np.array_equal(x.array_r, self.equations.base.x.array_r), op=MPI.LAND):
+            return
+        internal = self.problem.combined(elastic_forces(self.problem, self.displacement(x)))
+        elastic, residual = (self._turned(forces) for forces in (internal, internal - self._loads))
+        fixed = self.problem.fixed_here
+        residual.array[fixed] = x.array_r[fixed] - self.load.array_r[fixed]
         if self.free_motions is not None:
-            self.free_motions.null_space.remove(found.load)
-        given.destroy()
-        found.equations = self.equations.with_load(found.load)
+            self.free_motions.null_space.remove(residual)
+        self.equations.begin_at(x, np.array(elastic.array_r), np.array(residual.array_r))
+        for vector in (elastic, residual):
+            vector.destroy()
+
+    def _first_base(self, pull: PETSc.Vec) -> Base:
+        """The body that is undisplaced but for prescribed values, which pull with these forces. Collective."""
+        x, residual = self.undisplaced(), -self.load.array_r
+        residual[self.problem.fixed_here] = 0.0
+        turn(pull, self.rotation)
+        elastic = np.array(pull.array_r)
+        pull.destroy()
+        return Base(x, elastic, residual)
+
+    def _turned(self, forces: Array) -> PETSc.Vec:
+        """Cartesian forces (vertices, d) in the components of the unknowns. Collective."""
+        found = new_vector(self.problem.space)
+        found.array[:] = forces.ravel()
+        turn(found, self.rotation)
         return found
 
     def displacement(self, x: PETSc.Vec) -> fem.Function:
@@ -202,23 +221,12 @@ class System:
         total = sum((force.array_r for force in forces.values()), np.zeros(self._owned))
         return self.problem.combined(np.array(total).reshape(-1, d))
 
-    def _unlifted(self) -> PETSc.Vec:
-        """The sum of the loads as bounds and laws balance it, in Cartesian components. Collective."""
-        load = new_vector(self.problem.space)
-        load.array[:] = self._sum_of(self.forces).ravel()
-        return load
-
-    def _lifted_by(self) -> Array:
-        """What the prescribed values took off the load at the vertices of Γc. Collective."""
-        load, at = self._unlifted(), self.jacobian.rows.dofs
-        turn(load, self.rotation)
-        found = np.asarray(load.array_r[at] - self.load.array_r[at])
-        load.destroy()
-        return found
-
     def holding_forces(self, x: PETSc.Vec) -> Array:
         """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
-        return self.holding.at(self.jacobian.strained(x), self.rotation, self.jacobian.rows, self._lift)
+        at = np.union1d(self.jacobian.rows.dofs, self.problem.fixed_here)
+        found = self.holding.at(self.equations.from_base(x), self.rotation, self.jacobian.rows)
+        found[at] += self.equations.base.elastic[at]
+        return found
 
     def _coupled(self, stiffness: PETSc.Mat) -> PETSc.Mat:
         """The stiffness of the unknowns, Cartesian: Tᵀ A T where bodies meet. Collective."""
@@ -230,18 +238,23 @@ class System:
         stiffness.destroy()
         return coupled
 
-    def _constrained(self) -> tuple[PETSc.Mat, PETSc.Vec]:
-        """Stiffness and load with the prescribed values: rows and columns of the identity, the load lifted."""
+    def _constrained(self) -> tuple[PETSc.Mat, PETSc.Vec, PETSc.Vec]:
+        """The stiffness, prescribed rows and columns those of the identity; the load, lifted; what lifts it. Collective.
+
+        The load is as bounds and laws balance it, Cartesian.
+        """
         matrix = self._coupled(self.problem.bulk.matrix())
-        load, prescribed = self._unlifted(), new_vector(self.problem.space)
-        self.holding = HoldingForces(self.problem, matrix)
+        load, prescribed = new_vector(self.problem.space), new_vector(self.problem.space)
+        self.holding, fixed = HoldingForces(self.problem, matrix), self.problem.fixed_here
         set_bc(prescribed, list(self.problem.conditions))
-        rows = (self.problem.fixed_here + load.owner_range[0]).astype(PETSc.IntType)
-        matrix.zeroRowsColumns(rows, 1.0, prescribed, load)
+        pull = self.holding.pull(prescribed)
+        load.array[:] = self._loads.ravel() - pull.array_r
+        load.array[fixed] = prescribed.array_r[fixed]
+        matrix.zeroRowsColumns((fixed + load.owner_range[0]).astype(PETSc.IntType), 1.0)
         prescribed.destroy()
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
-        return matrix, load
+        return matrix, load, pull
 
     def _box(self) -> tuple[PETSc.Vec, PETSc.Vec]:
         """Lower and upper bounds of the unknowns. Collective."""
