@@ -23,7 +23,7 @@ from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.workflow import Preparation, finish
-from hvi_fenicsx.workflow.solving import judged
+from hvi_fenicsx.workflow.solving import examine
 
 COMM = MPI.COMM_WORLD
 UNDECIDED = ("metastable", "borderline")
@@ -105,7 +105,8 @@ def _judged(
         assert solution.examination is not None
         return solution.solve_result, solution.examination
     control = RunControl(timer=prepared.timer, interrupted=late)
-    return judged(prepared, _solved(case, data, prepared, control), control=control)
+    found = _solved(case, data, prepared, control)
+    return found, examine(prepared, found.u)
 
 
 def _unsolved(state: str, found: SolveResult) -> str:

@@ -63,6 +63,12 @@ class Certificate:
     mixity: float | None = None
     rounding: float | None = None
 
+    @property
+    def is_near(self) -> bool:
+        """Whether it is missed by no more than rounding may be."""
+        names = ("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion")
+        return not self.passed and max(getattr(self, name) for name in names) <= DEFAULT.largest_rounding
+
     def as_dict(self) -> dict[str, float | str | bool | None]:
         """For ``summary.json``."""
         return asdict(self)

@@ -17,6 +17,7 @@ from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..system import local_frames
+from ..system.net_forces import SUMMATION
 from ..typing import Array, Integers, Mask
 from .thresholds import DEFAULT, CertificateThresholds
 
@@ -425,7 +426,7 @@ def _newton(
     """One Newton step at each vertex where it leaves less; whether there was any."""
     d = wanted.shape[1]
     slopes = [c.nearest(a)[1] for c, a in zip(carriers, asked, strict=True)]
-    matrix = np.tile(thresholds.summation * np.eye(d), (len(wanted), 1, 1))
+    matrix = np.tile(SUMMATION * np.eye(d), (len(wanted), 1, 1))
     for carrier, slope in zip(carriers, slopes, strict=True):
         matrix[carrier.rows] += slope @ slope
     step = np.linalg.solve(matrix, left[:, :, None])

@@ -6,9 +6,8 @@ where bonds remember, what was judged on Γc must be what these forces leave the
 what moves the body are nothing beside those of the whole programme, as where an obstacle just touches it, or where no
 force acts: there is nothing else by which to measure what is left of forces.
 
-Where rounding alone may speak against a state, its displacement is corrected as that of a single run
-(:mod:`.certify.correction`) or, with what bonds remember, along the graphs (:mod:`.refinement`); the corrected one is
-then the state's.
+Where rounding alone may speak against a state, its displacement is corrected by Newton steps along the graphs, with
+forces by cell; the corrected one is then the state's.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from ..certify import balance, certificate, contact_state
 from ..certify.certificate import Examination
 from ..certify.contact_state import Forces
 from ..certify.thresholds import DEFAULT as THRESHOLDS
-from ..estimate import correction
 from ..paths.distances import Distances, StateOnGraphs
 from ..paths.state import Event, PathState
 from ..problem import references
@@ -100,7 +98,7 @@ class Certifier:
         found = self._examination(state, u)
         if self._passes(state, u, found):
             return Verdict(certified=True, whole=True)
-        corrected = self._corrected(state, u, found) is not None
+        corrected = self._refined(state, found) is not None
         return Verdict(certified=corrected, whole=True, corrected=corrected)
 
     def displacement(self, state: PathState, verdict: Verdict) -> fem.Function:
@@ -111,7 +109,7 @@ class Certifier:
             verdict: what was found of it.
         """
         u = self._expanded(state)
-        found = self._corrected(state, u, self._examination(state, u)) if verdict.corrected else None
+        found = self._refined(state, self._examination(state, u)) if verdict.corrected else None
         return u if found is None else found
 
     def _examination(self, state: PathState, u: fem.Function) -> Examination | None:
@@ -132,25 +130,16 @@ class Certifier:
 
     # -- where rounding speaks against a state
 
-    def _corrected(self, state: PathState, u: fem.Function, found: Examination | None) -> fem.Function | None:
-        """The displacement that is certified once rounding is taken out of u; None: none is. Collective."""
-        if found is not None and not correction.may_help(found.certificate):
+    def _refined(self, state: PathState, found: Examination | None) -> fem.Function | None:
+        """What Newton steps along the graphs, with what bonds remember, leave of rounding; None: it does not help."""
+        if found is not None and not found.certificate.is_near:
             return None
-        refined = self._refined(state)
-        if refined is not None or found is None:
-            return refined
-        u = correction.corrected(self._system.with_obstacles_of(self._factored.at(state.factor)), (), u, found)
-        again = self._examination(state, u)
-        return u if again is not None and again.certificate.passed else None
-
-    def _refined(self, state: PathState) -> fem.Function | None:
-        """That of Newton steps along the graphs, with what bonds remember; None: they do not help. Collective."""
         problem, factor = self._factored.at(state.factor), state.factor
         try:
-            found = refined(self._system, self._condensation, problem, self._graphs(state), factor)
+            other = refined(self._system, self._condensation, problem, self._graphs(state), factor)
         except np.linalg.LinAlgError:
             return None
-        return found.u if self._is_near(state, found) and self._is_certified(state, found) else None
+        return other.u if self._is_near(state, other) and self._is_certified(state, other) else None
 
     def _is_near(self, state: PathState, found: Refined) -> bool:
         """Whether the steps took out no more than rounding."""

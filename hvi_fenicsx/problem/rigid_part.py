@@ -71,13 +71,17 @@ def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) 
 
 def _motions(problem: Problem) -> list[_BodyMotions]:
     """All rigid motions of all bodies. Collective."""
-    points, d, comm = np.asarray(problem.points / problem.scales.length), problem.scales.dimension, problem.domain.mesh.comm
+    points, d, comm = (
+        np.asarray(problem.points / problem.scales.length),
+        problem.scales.dimension,
+        problem.domain.mesh.comm,
+    )
     here, every = problem.space.dofmap.index_map.size_local, list[_BodyMotions]()
     for body in problem.bodies:
         blocks = np.flatnonzero(problem.bodies.labels == body.index)
         fields = problem.bodies.fields(points[blocks], blocks, body).transpose(1, 0, 2)
         places = (blocks[:, None] * d + np.arange(d)).ravel()
         values, owned = fields.reshape(len(fields), -1), d * int(np.count_nonzero(blocks < here))
-        factor = np.linalg.cholesky(comm.allreduce(values[:, :owned] @ values[:, :owned].T))
+        factor = np.linalg.cholesky(problem.domain.mesh.comm.allreduce(values[:, :owned] @ values[:, :owned].T))
         every.append(_BodyMotions(places=places, owned=owned, values=np.asarray(np.linalg.solve(factor, values))))
     return every

@@ -244,7 +244,9 @@ class _SnesRun:
         snes.setConvergenceTest(self._converged)
         snes.setTolerances(max_it=max_iterations)
         near = self.thresholds.near * float(np.min(system.references.scale))
-        with default_options({"snes_linesearch_type": line_search, "snes_vi_zero_tolerance": near}):
+        with default_options(
+            {"snes_linesearch_type": line_search, "snes_linesearch_max_it": 40, "snes_vi_zero_tolerance": near}
+        ):
             snes.setOptionsPrefix(prefix())
             snes.getKSP().setOptionsPrefix(f"{prefix()}inactive_")
             snes.setFromOptions()
@@ -304,7 +306,8 @@ class _SnesRun:
         self.last = self.sizes.worst
         if self.owner.progress:
             self.owner.progress(iteration, self.last, self.owner.in_contact(x))
-        self.far = x.norm(PETSc.NormType.INFINITY) > self.thresholds.runaway
+        moved = self.owner.system.equations.from_base(x).norm(PETSc.NormType.INFINITY)
+        self.far = moved > self.thresholds.runaway
         if self.last <= self.tolerance and not self.far:
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         self.stopped = self.owner.interrupted()

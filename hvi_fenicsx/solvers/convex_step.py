@@ -19,12 +19,12 @@ from ..laws import Superpotential
 from ..system import boundedness
 from ..typing import Array
 from . import kink_bounds
+from .attempts import Attempt, first_success
 from .context import SolveContext
 from .convergence import Outcome
 from .law_models import Cells, VertexModel
 from .method import Counts
-from .attempts import Attempt, first_success
-from .thresholds import ENERGY, FULL_STEPS
+from .thresholds import ENERGY, EXACT, FULL_STEPS
 
 UNBOUNDED = "the body slides away on what is left of its bonds"
 
@@ -244,7 +244,7 @@ class ConvexStep:
             self._check_bounded = True
             if self._is_unbounded([m.xi for m in models if m.xi is not None]):
                 yield UNBOUNDED
-        yield Attempt(models=models, line_search=ENERGY)
+        yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.foundation)
         secants = [replace(m, secant_from=m.law.length_scale) for m in models]
         yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
         yield Attempt(models=models, line_search=FULL_STEPS)

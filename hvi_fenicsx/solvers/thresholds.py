@@ -9,8 +9,8 @@ from ..system.thresholds import Thresholds as LinearThresholds
 
 FULL_STEPS = "basic"
 """PETSc's name of the line search that shortens no step."""
-EXACT = "exact"
-"""The line search of :mod:`.attempts`, beside PETSc's."""
+EXACT = "cp"
+"""PETSc's name of the one that looks for where the slope of the energy along a step is zero."""
 ENERGY = "bt"
 """PETSc's name of the one that backtracks by the energy."""
 
@@ -42,7 +42,6 @@ class Thresholds:
         most_changes: convex steps at most, and changes of the cells between kinks in one of them.
         runaway: a displacement of so many times p0 L / E0 is a body that slides away; a slip of so many times that at
             rest is beyond every kink.
-        flat: slope, relative to that at the start of a step, at which a line search ends.
         foundation: stiffness that keeps a matrix regular where laws have none.
         first_ramp: slip up to which the traction of a law of |u_t| grows from zero at first, relative to the largest
             slip: a free vertex may turn its direction there.
@@ -76,7 +75,6 @@ class Thresholds:
     search_steps: int = 1_000
     most_changes: int = 200
     runaway: float = 1e8
-    flat: float = 1e-2
     foundation: float = 1e-8
     first_ramp: float = 1e-2
     least_slip: float = 1e-6

@@ -18,7 +18,6 @@ from ..problem.vectors import NodalForces
 from ..typing import Array, Entities, Mask
 from .free_motions import Motions
 
-
 NOTHING = 1e-10
 """Part of a rigid motion along a direction, and net force beside the sum of the sizes of all forces, that is none."""
 SUMMATION = 1e-14

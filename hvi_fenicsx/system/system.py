@@ -239,9 +239,9 @@ class System:
         return coupled
 
     def _constrained(self) -> tuple[PETSc.Mat, PETSc.Vec, PETSc.Vec]:
-        """The stiffness, prescribed rows and columns those of the identity; the load, lifted; what lifts it. Collective.
+        """The stiffness, prescribed rows and columns those of the identity; the load, lifted, and what lifts it.
 
-        The load is as bounds and laws balance it, Cartesian.
+        The load is as bounds and laws balance it, Cartesian. Collective.
         """
         matrix = self._coupled(self.problem.bulk.matrix())
         load, prescribed = new_vector(self.problem.space), new_vector(self.problem.space)

@@ -12,12 +12,12 @@ from ..certify import certificate
 from ..certify.certificate import Examination
 from ..certify.uniqueness import Uniqueness, uniqueness
 from ..errors import SolverError
-from ..estimate import correction, plausibility
+from ..estimate import plausibility
 from ..estimate.estimator import estimate
 from ..model import Model
 from ..runtime.log import logger, newton_step, warn
 from ..runtime.timing import Timer
-from ..solvers import frozen_mixity, nested_iteration, obstacle_force, refinement
+from ..solvers import frozen_mixity, nested_iteration, obstacle_force
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.method import SolveResult
 from ..solvers.nested_iteration import CoarseStart, LevelSolution
@@ -141,7 +141,8 @@ def find_solution(
     with prepared.timer("solve"):
         solved, balance = _solved(prepared, control, start)
     prepared = replace(prepared, system=solved.system)
-    result, examination, warnings = _examined(prepared, solved.result, solved.levels, control)
+    result = solved.result
+    examination, warnings = _examined(prepared, result)
     only = _uniqueness(prepared, result, examination)
     found = _solution(prepared, result, examination, prepared.warnings + warnings, only, balance)
     return FoundSolution(prepared=prepared, solution=found, levels=solved.levels)
@@ -154,8 +155,8 @@ def certified(prepared: Preparation, found: SolveResult) -> Solution:
         prepared: the scene.
         found: the displacement.
     """
-    result, examination, warnings = _examined(prepared, found)
-    return _solution(prepared, result, examination, prepared.warnings + warnings)
+    examination, warnings = _examined(prepared, found)
+    return _solution(prepared, found, examination, prepared.warnings + warnings)
 
 
 def _uniqueness(prepared: Preparation, found: SolveResult, examination: Examination) -> Uniqueness | None:
@@ -166,60 +167,26 @@ def _uniqueness(prepared: Preparation, found: SolveResult, examination: Examinat
         return uniqueness(prepared.system, found.u, examination)
 
 
-def _examined(
-    prepared: Preparation, found: SolveResult, levels: Levels = (), control: RunControl | None = None
-) -> tuple[SolveResult, Examination, tuple[str, ...]]:
-    """The result, its certificate, and warnings about the solution. Collective."""
+def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, tuple[str, ...]]:
+    """The certificate of a result, and warnings about the solution. Collective."""
     with prepared.timer("certificate"):
-        result, examination = judged(prepared, found, levels, control)
-        warnings = plausibility.of_solution(prepared.problem, examination, result.u)
+        examination = examine(prepared, found.u)
+        warnings = plausibility.of_solution(prepared.problem, examination, found.u)
     warn(_LOG, warnings)
     _log_certificate(examination.certificate)
-    return result, examination, warnings
+    return examination, warnings
 
 
-def judged(
-    prepared: Preparation, found: SolveResult, levels: Levels = (), control: RunControl | None = None
-) -> tuple[SolveResult, Examination]:
-    """A result and what the certificate says of it; corrected where rounding alone may speak against it. Collective.
+def examine(prepared: Preparation, u: fem.Function) -> Examination:
+    """What the certificate says of a displacement. Collective.
 
     Args:
         prepared: the scene.
-        found: the result.
-        levels: the coarser levels of the system.
-        control: of a solve that may follow, if the correction moves what touches; None: none may.
+        u: nondimensional, ghosts updated.
     """
-    first = _examine(prepared, found.u)
-    if not (found.converged and correction.may_help(first.certificate)):
-        return found, first
-    result, examined = _corrected(prepared, found, levels, first)
-    if examined.certificate.passed or control is None or obstacle_force.pressed(prepared.problem) is not None:
-        return result, examined
-    again = refinement.refined(
-        prepared.system, levels, found, first.forces.reaction, prepared.solvability, prepared.options, control
-    )
-    if again is None:
-        return found, first
-    result, examined = _corrected(prepared, again, levels, _examine(prepared, again.u))
-    return (result, examined) if examined.certificate.passed else (found, first)
-
-
-def _examine(prepared: Preparation, u: fem.Function) -> Examination:
-    """What the certificate says of a displacement. Collective."""
     options = prepared.options
     inertia = options.decides_stability(prepared.system)
     return certificate.examine(prepared.problem, u, options.tolerance, inertia=inertia)
-
-
-def _corrected(
-    prepared: Preparation, found: SolveResult, levels: Levels, examination: Examination
-) -> tuple[SolveResult, Examination]:
-    """A result with the step that takes the rounding of the matrix out, where that certifies it. Collective."""
-    if not correction.may_help(examination.certificate):
-        return found, examination
-    u = correction.corrected(prepared.system, levels, found.u, examination)
-    again = _examine(prepared, u)
-    return (replace(found, u=u), again) if again.certificate.passed else (found, examination)
 
 
 def unsolved(prepared: Preparation) -> Solution:
