@@ -26,12 +26,14 @@ class Sizes:
         norm: its Euclidean norm, over the forces there (:class:`.References`).
         traction: the largest nodal traction on Γc, over what is allowed there.
         net: the largest net force along a rigid motion (:mod:`.net_forces`).
+        net_rounding: of that.
         forces: what ``norm`` is relative to.
     """
 
     norm: Array
     traction: Array
     net: Array
+    net_rounding: Array
     forces: Array
 
     @property
@@ -40,7 +42,7 @@ class Sizes:
         return float(np.max([self.norm, self.traction, self.net]))
 
 
-NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(4)))
+NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(5)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +116,7 @@ class ConvergenceTest:
     def _measured(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Sizes:
         """As :meth:`.NetForceTest.sizes`. Collective."""
         norm, traction, forces = self._forces(projected, x)
-        return Sizes(norm, traction, self._net.sizes(x, residual, projected, on), forces)
+        return Sizes(norm, traction, *self._net.sizes(x, residual, projected, on), forces)
 
     def reaches(self, wanted: float, forces: Array) -> Reached:
         """Whether the residual (n,) of a linear solve is small enough, net forces aside; collective.
@@ -166,7 +168,7 @@ class ConvergenceTest:
         """Accept a residual at the rounding floor as converged. Collective.
 
         The norm and the nodal tractions of each body have a floor each: rounding of the forces inside of a body does
-        not excuse a wrong traction on Γc, nor another body. A net force has no such excuse.
+        not excuse a wrong traction on Γc, nor another body. Of a net force only rounding of its sum is excused.
 
         Args:
             found: how the solve ended.
@@ -177,7 +179,11 @@ class ConvergenceTest:
         if found.converged or not (np.isfinite(x.norm()) and sizes.worst <= self._thresholds.largest_rounding):
             return found
         norm, traction = self.rounding(x)
-        if np.any(sizes.norm > norm) or np.any(sizes.traction > traction) or np.any(sizes.net > tolerance):
+        if (
+            np.any(sizes.norm > norm)
+            or np.any(sizes.traction > traction)
+            or np.any(sizes.net > np.maximum(sizes.net_rounding, tolerance))
+        ):
             return found
         floor = float(np.max([norm, traction]))
         return replace(found, converged=True, rounding=floor, reason="as small as rounding allows")
@@ -229,7 +235,7 @@ class NetForceTest:
         self._motions: list[Motions] = []
 
     def sizes(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Array:
-        """The largest net force of each body, relative. Collective.
+        """The largest net force of each body, relative, and its rounding, (2, bodies). Collective.
 
         Args:
             x: the displacement.
@@ -249,7 +255,7 @@ class NetForceTest:
             capable=self._capable,
         )
         nets = [net_forces.along(system.references, y, acting) for y in self._motions]
-        return np.array([net.relative for net in nets])
+        return np.array([net.relative for net in nets]).T
 
     def _holders(self, reactions: Array, on_lower: Mask, on_upper: Mask) -> list[Holder]:
         """The bounds that are reached: each pushes along the axis of its unknown."""

@@ -93,24 +93,20 @@ class NetForces:
     sizes: Array
 
     @property
-    def _beyond(self) -> Array:
-        """What is left without rounding, (j,)."""
-        return np.maximum(self.left - self.rounding, 0.0)
-
-    @property
     def _acts(self) -> Mask:
         """Along which motions anything acts at all, (j,): a body in neutral balance has none but digits of its mesh."""
         return np.asarray(self.scale > NOTHING * self.sizes)
 
     @property
-    def relative(self) -> float:
-        """The largest relative one along motions in which anything acts."""
-        return float(np.max(self._beyond / np.where(self._acts, self.scale, np.inf), initial=0.0))
+    def relative(self) -> tuple[float, float]:
+        """The largest relative one, and its rounding, along motions in which anything acts."""
+        scale = np.where(self._acts, self.scale, np.inf)
+        return float(np.max(self.left / scale, initial=0.0)), float(np.max(self.rounding / scale, initial=0.0))
 
     @property
     def beyond_rounding(self) -> float:
-        """The same, infinite where there is one and nothing that it could be relative to."""
-        left = self._beyond * (self._acts | (self.left > NOTHING * self.sizes))
+        """The largest relative one without rounding; infinite where there is nothing that it could be relative to."""
+        left = np.maximum(self.left - self.rounding, 0.0) * (self._acts | (self.left > NOTHING * self.sizes))
         found = np.divide(left, self.scale, out=np.where(left > 0, np.inf, 0.0), where=self.scale > 0)
         return float(np.max(found, initial=0.0))
 

@@ -95,10 +95,10 @@ def test_rounding_of_the_bodys_forces_is_no_excuse_for_a_wrong_traction() -> Non
     solver = ActiveSetSolver(system, (), DIRECT, Timer())
     x = system.load.duplicate()
     x.array[:] = np.random.default_rng(2).standard_normal(x.local_size)
-    floor = solver.convergence.rounding(x, Sizes(*np.zeros((5, 1))))
-    between, none = np.sqrt(floor.norm * floor.traction), np.zeros(1)
+    norm, traction = solver.convergence.rounding(x)
+    between, none = np.sqrt(norm * traction), np.zeros(1)
     of_norm, of_traction = (Sizes(*sizes, none, none, none) for sizes in ((between, none), (none, between)))
-    wrong, right = (of_norm, of_traction) if floor.norm < floor.traction else (of_traction, of_norm)
+    wrong, right = (of_norm, of_traction) if norm < traction else (of_traction, of_norm)
     outcome = Outcome(False, 1, 1, float(between[0]), "stalled")
-    assert not solver.convergence.accept_rounding(outcome, wrong, x).converged
-    assert solver.convergence.accept_rounding(outcome, right, x).converged
+    assert not solver.convergence.accept_rounding(outcome, wrong, x, 1e-8).converged
+    assert solver.convergence.accept_rounding(outcome, right, x, 1e-8).converged
