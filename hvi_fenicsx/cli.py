@@ -20,25 +20,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code by the contract. Collective under mpirun."""
     terminal.prepare()
     processes.ensure_home()
+    words = _with_petsc_joined(sys.argv[1:] if arguments is None else arguments)
     try:
-        return int(_run_command(_with_petsc_joined(sys.argv[1:] if arguments is None else arguments)))
-    finally:
-        terminal.finish()
-        processes.forget_interrupt()
-
-
-def _run_command(words: Sequence[str]) -> int:
-    processes.raise_on_stop()
-    try:
-        return processes.stoppable(lambda: _run_stoppable(words))
+        processes.raise_on_stop()
+        with log.handled(log.WarningDisplay()):
+            return int(_told(lambda: _dispatch(_parsed(words), words)))
     except KeyboardInterrupt:
         _print_error("hvi: interrupted; nothing was written")
         return ExitCode.INTERRUPTED
-
-
-def _run_stoppable(words: Sequence[str]) -> int:
-    with log.Handlers(log.WarningDisplay()), processes.stop_unmasked():
-        return _told(lambda: _dispatch(_parsed(words), words))
+    finally:
+        terminal.finish()
+        processes.forget_signals()
 
 
 def _told(command: Callable[[], int]) -> int:
@@ -100,7 +92,7 @@ def _run_on_ranks(options: argparse.Namespace) -> int:
         from .system.petsc_options import refusals_told
 
         command = importlib.import_module(f".commands.{options.command}", __package__)
-    with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told(), plugins.named(), processes.stop_unmasked():
+    with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told(), plugins.named():
         return int(command.execute(options))
 
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from ..certify.certificate import Examination
 from ..errors import InputError
+from ..model.argument_checks import require_kind, require_path
 from ..problem import spaces
 from ..problem.scaling import Scales
 from ..problem.stress import cell_stress, space_of_stress
@@ -22,7 +23,6 @@ from ..results.contact_parts import contact_parts
 from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
 from ..runtime import log, terminal
-from ..runtime.argument_checks import require_kind, require_path
 from ..runtime.terminal import percent
 from ..solvers.method import SolveResult
 from ..typing import Array

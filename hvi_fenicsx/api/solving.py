@@ -16,7 +16,6 @@ from ..mesh.domain import Domain
 from ..model import Model, is_portable
 from ..paths.load_path import LoadPath
 from ..problem import spaces
-from ..runtime.argument_checks import require_kind, require_switch
 from ..runtime.log import newton_step
 from ..runtime.timing import Timer
 from ..solvers.context import Progress

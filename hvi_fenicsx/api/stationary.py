@@ -11,8 +11,8 @@ from mpi4py import MPI
 from ..equilibrium_search import bodies
 from ..equilibrium_search.found import Clock, Found, certified_in_words
 from ..model import Model
+from ..model.argument_checks import require_between, require_switch
 from ..runtime import log
-from ..runtime.argument_checks import require_between, require_switch
 from ..runtime.mpi import time_over
 from ..workflow import Solution
 from .solution import ModelSolution

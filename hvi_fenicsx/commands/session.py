@@ -114,8 +114,8 @@ def execute(
         interrupt = Interrupt(COMM)
         interrupt.watch()
         run_logs = on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
-        with log.Handlers(*on_first_rank(log.TerminalDisplay)):
-            with log.Handlers(*run_logs):
+        with log.handled(*on_first_rank(log.TerminalDisplay)):
+            with log.handled(*run_logs):
                 session = Session(
                     options=options, scene=scene, folder=folder, timer=timer, interrupted=interrupt.requested
                 )

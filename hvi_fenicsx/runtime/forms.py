@@ -14,8 +14,6 @@ import os
 import shutil
 import sysconfig
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -45,32 +43,6 @@ class CompilationError(HviError):
     """A form cannot be compiled."""
 
 
-@dataclass(frozen=True)
-class _Entry:
-    """A form and its place in a cache.
-
-    Attributes:
-        form: UFL.
-        comm: the ranks of its mesh.
-        cache: the folder of all forms.
-        name: the form's own.
-    """
-
-    form: Any
-    comm: MPI.Comm
-    cache: Path
-    name: str
-
-    @property
-    def folder(self) -> Path:
-        """Where the form is kept; it is complete if it is there."""
-        return self.cache / self.name
-
-    def is_there(self) -> bool:
-        """Whether all ranks see it. Collective."""
-        return all(agree(self.comm, self.folder.is_dir()))
-
-
 class FormCache:
     """Compiles forms and keeps them; where the cache cannot be written, in a folder that goes with this process.
 
@@ -80,7 +52,7 @@ class FormCache:
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
-        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+        self._checked: tempfile.TemporaryDirectory[str] | Path | None = None
 
     def compiled(self, form: Any) -> fem.Form:
         """The compiled form. Collective.
@@ -92,91 +64,63 @@ class FormCache:
             CompilationError: it cannot be compiled, on all ranks alike.
         """
         form, comm = _renumbered(form), compat.comm_of(form)
-        entry = _Entry(form, comm, on_root(comm, self._current), _name(form))
-        try:
-            return self._found(entry)
-        except HviError as error:
-            return self._in_temporary_folder(entry, error)
-
-    def _current(self) -> Path:
-        return self._folder or _cache_folder() / "hvi_fenicsx"
-
-    def _found(self, entry: _Entry) -> fem.Form:
-        """The form as it is kept, or compiled now. Collective."""
-        if entry.is_there():
+        kept = on_root(comm, self.folder) / _name(form)
+        if all(agree(comm, kept.is_dir())):
             with contextlib.suppress(CompilationError):
-                return self._made(entry, entry.folder)
-            on_root(entry.comm, lambda: shutil.rmtree(entry.folder, ignore_errors=True))  # damaged
-        on_root(entry.comm, lambda: entry.cache.mkdir(parents=True, exist_ok=True))
-        with self._locked(entry):
-            if entry.is_there():  # compiled by the run that held the lock
-                return self._made(entry, entry.folder)
-            return self._built(entry)
-
-    def _built(self, entry: _Entry) -> fem.Form:
-        """Compile a form; its folder gets its name when it is complete. Collective; rank 0 holds the lock."""
-        folder = on_root(entry.comm, lambda: _new_folder(entry))
+                return _made(form, comm, kept)
+            on_root(comm, lambda: shutil.rmtree(kept, ignore_errors=True))  # damaged
+        lock = on_root(comm, lambda: _lock(kept.with_suffix(".lock")))
         try:
-            result = self._made(entry, folder)
-            with contextlib.suppress(OSError):  # another rank has done it
-                folder.rename(entry.folder)
-            return result
+            return _made(form, comm, kept) if all(agree(comm, kept.is_dir())) else _built(form, comm, kept)
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            if comm.rank == 0:
+                os.close(lock)
 
-    def _made(self, entry: _Entry, folder: Path) -> fem.Form:
-        """What dolfinx makes of the form in a folder. Collective.
+    def folder(self) -> Path:
+        """The folder of the cache, which can be written. Rank 0 only."""
+        if self._checked is None:
+            wanted = self._folder or _cache_folder() / "hvi_fenicsx"
+            try:
+                wanted.mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=wanted):
+                    self._checked = wanted
+            except OSError as error:
+                self._checked = tempfile.TemporaryDirectory(prefix="hvi-forms-", ignore_cleanup_errors=True)
+                text = "they are compiled again at each start: make room there, or set XDG_CACHE_HOME to another folder"
+                _LOG.warning("compiled forms cannot be kept in %s (%s); %s", wanted, error.strerror, text)
+        return self._checked if isinstance(self._checked, Path) else Path(self._checked.name)
 
-        Raises:
-            CompilationError: on all ranks alike.
-        """
-        result, fault = None, ""
-        asked = {**options(), "cache_dir": folder, "timeout": _COMPILATION}
-        try:
-            result = fem.form(entry.form, jit_options=asked)
-        except Exception as error:  # dolfinx, ffcx, cffi, setuptools and the file system have errors of their own
-            fault = f"{type(error).__name__}: {error}"
-        faults = [text for text in agree(entry.comm, fault) if text]
-        if faults:
-            raise CompilationError(
-                f"a form cannot be compiled: {faults[0]}; it needs a C compiler and Python's headers"
-            )
+
+def _built(form: Any, comm: MPI.Comm, kept: Path) -> fem.Form:
+    """Compile a form; its folder gets its name when it is complete. Collective; rank 0 holds the lock."""
+    folder = on_root(comm, lambda: _new_folder(kept))
+    try:
+        result = _made(form, comm, folder)
+        on_root(comm, lambda: folder.rename(kept))
         return result
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
-    @contextlib.contextmanager
-    def _locked(self, entry: _Entry) -> Iterator[None]:
-        """Hold the lock of a form on rank 0. Collective."""
-        descriptor = on_root(entry.comm, lambda: os.open(entry.folder.with_suffix(".lock"), os.O_RDWR | os.O_CREAT))
-        try:
-            on_root(entry.comm, lambda: _lock(descriptor))
-            yield
-        finally:
-            if entry.comm.rank == 0:
-                os.close(descriptor)
 
-    def _in_temporary_folder(self, entry: _Entry, reason: HviError) -> fem.Form:
-        """Compile where the cache did not allow it, and no signal that ended the compiler. Collective."""
-        if any(agree(entry.comm, processes.stop_asked())):
-            raise KeyboardInterrupt
-        temporary = _Entry(entry.form, entry.comm, on_root(entry.comm, self._temporary_folder), entry.name)
-        if temporary.cache == entry.cache:
-            raise reason
-        result = self._found(temporary)
-        if entry.comm.rank == 0:
-            self._folder = temporary.cache
-        _LOG.warning(
-            "compiled forms cannot be kept in %s (%s); they are compiled again at each start: make room there, or set "
-            "XDG_CACHE_HOME to a folder that can be written",
-            entry.cache,
-            str(reason).splitlines()[0],
-        )
+def _made(form: Any, comm: MPI.Comm, folder: Path) -> fem.Form:
+    """What dolfinx makes of the form in a folder. Collective.
+
+    Raises:
+        CompilationError: on all ranks alike.
+        KeyboardInterrupt: on all ranks alike, after a signal, which ends the compiler too.
+    """
+    result, fault = None, ""
+    asked = {**options(), "cache_dir": folder, "timeout": _COMPILATION}
+    try:
+        result = fem.form(form, jit_options=asked)
+    except Exception as error:  # dolfinx, ffcx, cffi, setuptools and the file system have errors of their own
+        fault = f"{type(error).__name__}: {error}"
+    faults = [text for text in agree(comm, fault) if text]
+    if not faults:
         return result
-
-    def _temporary_folder(self) -> Path:
-        self._temporary = self._temporary or tempfile.TemporaryDirectory(
-            prefix="hvi-forms-", ignore_cleanup_errors=True
-        )
-        return Path(self._temporary.name)
+    if any(agree(comm, processes.stop_asked())):
+        raise KeyboardInterrupt
+    raise CompilationError(f"a form cannot be compiled: {faults[0]}; it needs a C compiler and Python's headers")
 
 
 _CACHE = FormCache()
@@ -229,17 +173,19 @@ def _surroundings() -> list[Any]:
     return [ffcx.__version__, compat.VERSION, system, sorted(free.items()), compiler]
 
 
-def _new_folder(entry: _Entry) -> Path:
+def _new_folder(kept: Path) -> Path:
     """An empty folder to compile in; what killed runs have left of the same form goes. Rank 0 only, with the lock."""
-    for left in entry.cache.glob(f"{entry.name}.building-*"):
+    for left in kept.parent.glob(f"{kept.name}.building-*"):
         shutil.rmtree(left, ignore_errors=True)
-    return Path(tempfile.mkdtemp(prefix=f"{entry.name}.building-", dir=entry.cache))
+    return Path(tempfile.mkdtemp(prefix=f"{kept.name}.building-", dir=kept.parent))
 
 
-def _lock(descriptor: int) -> None:
-    """Wait for the lock of a form, which ends with its process; nothing where the file system has no locks."""
+def _lock(file: Path) -> int:
+    """The lock of a form, waited for, which ends with its process; none where the file system has no locks."""
+    descriptor = os.open(file, os.O_RDWR | os.O_CREAT)
     with contextlib.suppress(OSError):
         fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return descriptor
 
 
 def _renumbered(form: Any) -> Any:

@@ -10,15 +10,12 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
-import signal
 import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
-from typing import Any
+import time
+from collections.abc import Sequence
 
 from ..errors import Interrupted
 from . import processes
@@ -50,7 +47,7 @@ def run(module: str, words: Sequence[str], seconds: float) -> subprocess.Complet
         TimeoutExpired: it took longer.
         Interrupted: a signal came.
     """
-    command = [*processes.PYTHON, "-m", module, *words]
+    command, end = [*processes.PYTHON, "-m", module, *words], time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as folder:
         child = subprocess.Popen(
             command,
@@ -60,38 +57,23 @@ def run(module: str, words: Sequence[str], seconds: float) -> subprocess.Complet
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
         )
-        with child, _ended_by_signals(child) as signalled:
+        with child:
             try:
-                out, err = child.communicate(timeout=seconds)
+                return _completed(child, end)
             finally:
                 child.kill()
-    if signalled:
-        raise Interrupted
-    return subprocess.CompletedProcess(command, child.returncode, out, err)
 
 
-@contextmanager
-def _ended_by_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
-    """Have signals that are handled, or would end us, end the child; the signals that came."""
-    came: list[int] = []
-    ours = processes.replaceable(processes.SIGNALS)
-    for number, handler in ours.items():
-        signal.signal(number, _ending(child, handler, came))
-    try:
-        yield came
-    finally:
-        for number, handler in ours.items():
-            signal.signal(number, handler)
-
-
-def _ending(child: subprocess.Popen[bytes], handler: Any, came: list[int]) -> Callable[..., Any]:
-    def end(number: int, frame: FrameType | None) -> None:
-        came.append(number)
-        child.kill()  # nothing where it has ended just now
-        if callable(handler):
-            handler(number, frame)
-
-    return end
+def _completed(child: subprocess.Popen[bytes], end: float) -> subprocess.CompletedProcess[bytes]:
+    """The child at its end; until then it is seen whether a signal came."""
+    while not processes.stop_asked():
+        try:
+            out, err = child.communicate(timeout=0.1)
+            return subprocess.CompletedProcess(child.args, child.returncode, out, err)
+        except subprocess.TimeoutExpired:
+            if time.monotonic() > end:
+                raise
+    raise Interrupted
 
 
 def confine(memory: float) -> bool:

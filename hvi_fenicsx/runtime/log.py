@@ -11,15 +11,13 @@ import contextlib
 import logging
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from ..errors import InputError
 from . import terminal, writing
-from .argument_checks import require_kind
 
 PACKAGE = __name__.partition(".")[0]
 COMMANDS = f"{PACKAGE}.commands"
@@ -79,12 +77,12 @@ def set_log_level(level: int | str = logging.INFO) -> None:
     Raises:
         InputError: there is no such level.
     """
-    require_kind("log level", level, (int, str), 'a name such as "INFO", or a whole number')
-    known = logging.getLevelNamesMapping()
-    if isinstance(level, str) and level not in known:
-        raise InputError(f"log level: there is no {level!r}; there are: {', '.join(known)}")
     package = logging.getLogger(PACKAGE)
-    package.setLevel(level)
+    try:
+        package.setLevel(level)
+    except (TypeError, ValueError) as error:
+        known = ", ".join(logging.getLevelNamesMapping())
+        raise InputError(f"log level: {error}; there are: {known}") from None
     if not any(type(handler) is logging.StreamHandler for handler in package.handlers):
         handler = logging.StreamHandler()
         handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
@@ -217,28 +215,22 @@ def _moving_line() -> tuple[Any, Any]:
     return Live(spinner, console=console, refresh_per_second=12.5, transient=True, redirect_stdout=shared), spinner
 
 
-class Handlers:
-    """Sends the package's records to handlers while its block runs; closes them at its end.
+@contextlib.contextmanager
+def handled(*handlers: logging.Handler) -> Iterator[None]:
+    """Send the package's records to handlers in a block, and close them at its end.
 
     Args:
         *handlers: where to; none on the ranks that show nothing.
     """
-
-    def __init__(self, *handlers: logging.Handler) -> None:
-        self._handlers = handlers
-        self._package = logging.getLogger(PACKAGE)
-
-    def __enter__(self) -> Self:
-        self._level = self._package.level
-        self._package.setLevel(logging.DEBUG)
-        for handler in self._handlers:
-            self._package.addHandler(handler)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        for handler in self._handlers:
-            self._package.removeHandler(handler)
+    package = logging.getLogger(PACKAGE)
+    level = package.level
+    package.setLevel(logging.DEBUG)
+    for handler in handlers:
+        package.addHandler(handler)
+    try:
+        yield
+    finally:
+        for handler in handlers:
+            package.removeHandler(handler)
             handler.close()
-        self._package.setLevel(self._level)
+        package.setLevel(level)

@@ -13,8 +13,6 @@ from mpi4py import MPI
 from .mpi import on_this_machine, total
 
 _CGROUPS = Path("/sys/fs/cgroup")
-_LIMIT_FILES = ("memory.max", "memory.limit_in_bytes")
-"""Files that hold the limit of a cgroup: version 2, version 1."""
 _PLANE, _ADAPTIVE = 1.3, 3.0
 """KB that an unknown of a plane body takes, by multigrid on a mesh refined uniformly or not; in space twice."""
 
@@ -51,12 +49,9 @@ def limit() -> float:
     return min(_of_machine(), _of_process())
 
 
-def free(table: Path = Path("/proc/meminfo")) -> float:
-    """What of :func:`limit` no process of this machine uses now, MB, as far as the machine tells.
-
-    Args:
-        table: where it tells.
-    """
+def free() -> float:
+    """What of :func:`limit` no process of this machine uses now, MB, as far as the machine tells."""
+    table = Path("/proc/meminfo")
     lines = table.read_text(encoding="ascii").splitlines() if table.is_file() else []
     found = [int(line.split()[1]) / 2**10 for line in lines if line.startswith("MemAvailable:")]
     return min([limit(), *found])
@@ -82,22 +77,14 @@ def _of_process() -> float:
 
 
 def cgroup_limits(table: Path, mounted: Path) -> list[float]:
-    """The limits of the cgroups that a process is in, and of those around them, MB.
+    """The limits of the cgroup (version 2) that a process is in, and of those around it, MB.
 
     Args:
-        table: which cgroups these are, as in ``/proc/self/cgroup``.
+        table: which one this is, as in ``/proc/self/cgroup``.
         mounted: where cgroups are mounted.
     """
     lines = table.read_text(encoding="ascii").splitlines() if table.is_file() else []
-    found = []
-    for _, controllers, name in (line.split(":", 2) for line in lines):
-        if not controllers or "memory" in controllers.split(","):
-            top = mounted / "memory" if controllers else mounted
-            folders = [top, *(top.joinpath(*parts) for parts in _ways(Path(name.lstrip("/")).parts))]
-            found += [folder / file for folder in folders for file in _LIMIT_FILES]
-    texts = [file.read_text(encoding="ascii").strip() for file in found if file.is_file()]
+    inner = [mounted / line.removeprefix("0::/") for line in lines if line.startswith("0::/")]
+    files = [folder / "memory.max" for one in inner for folder in (one, *one.parents) if folder.is_relative_to(mounted)]
+    texts = [file.read_text(encoding="ascii").strip() for file in files if file.is_file()]
     return [int(text) / 2**20 for text in texts if text.isdigit()]
-
-
-def _ways(parts: tuple[str, ...]) -> list[tuple[str, ...]]:
-    return [parts[: i + 1] for i in range(len(parts))]

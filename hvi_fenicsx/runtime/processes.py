@@ -17,11 +17,9 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import Any, TypeVar
 
 from ..errors import InputError
 
-T = TypeVar("T")
 PYTHON = (sys.executable, "-P")
 """Python as our children run it: the current folder is not on its path."""
 STOP = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -47,12 +45,8 @@ _USER_SETTINGS = (
     "PRTE_MCA_rmaps_default_mapping_policy",
 )
 """Variables by which users (and `./hvi`) set up every mpirun; the others with these beginnings belong to one run."""
-_SESSION = "PRTE_MCA_prte_local_tmpdir_base"
-"""The folder in which Open MPI's mpirun makes its own; other implementations pass it over."""
 _CAUGHT: list[int] = []
 """The signals that were caught since the command began."""
-_RAISED: list[int] = []
-"""Those of them that have raised KeyboardInterrupt."""
 
 
 def is_under_mpirun() -> bool:
@@ -85,37 +79,6 @@ def environment() -> dict[str, str]:
     return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}  # an empty one would be the current folder
 
 
-@contextlib.contextmanager
-def temporary_folder(option: str) -> Iterator[Path]:
-    """An empty folder for one mpirun, which goes in every case.
-
-    Args:
-        option: of the command line, which needs it.
-
-    Raises:
-        InputError: there is no room for it.
-    """
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
-    except OSError as error:
-        words = f"{option}: no temporary file can be made ({error}); set TMPDIR to a folder with room"
-        raise InputError(words) from None
-    with folder:
-        yield Path(folder.name)
-
-
-def session(folder: Path) -> dict[str, str]:
-    """Variables that have Open MPI's mpirun keep its own files in a folder; none where the user has chosen a place.
-
-    Elsewhere it names them by its process number, and does not start where a killed one of the same number left some.
-
-    Args:
-        folder: an empty one, for one mpirun.
-    """
-    chosen = any(name.endswith("tmpdir_base") for name in os.environ)
-    return {} if chosen else {_SESSION: str(folder)}
-
-
 def ensure_home() -> None:
     """Set HOME where it is missing: Open MPI does not start without it."""
     if not os.environ.get("HOME"):
@@ -127,9 +90,6 @@ def ensure_home() -> None:
 def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType | None], None]) -> None:
     """Install a handler of signals; SIGHUP stays ignored where the caller has us ignore it, as nohup does.
 
-    A KeyboardInterrupt that it raises where nobody catches it, outside of :func:`stoppable`, ends the process by the
-    signal itself: Python would end it by SIGINT, with a traceback.
-
     Args:
         numbers: of the signals.
         handler: called for each.
@@ -137,14 +97,7 @@ def catch(numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType |
 
     def caught(number: int, frame: FrameType | None) -> None:
         _CAUGHT.append(number)
-        try:
-            handler(number, frame)
-        except KeyboardInterrupt:
-            if not _is_stoppable(frame):
-                signal.signal(number, signal.SIG_DFL)
-                signal.raise_signal(number)
-            _RAISED.append(number)
-            raise
+        handler(number, frame)
 
     for number in numbers:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
@@ -160,54 +113,29 @@ def held(numbers: Iterable[signal.Signals]) -> Iterator[None]:
     Args:
         numbers: of the signals; those that are ignored stay so.
     """
+    main = threading.current_thread() is threading.main_thread()  # Python takes handlers from it only
+    known = {number: signal.getsignal(number) for number in numbers if main}
+    ours = {number: now for number, now in known.items() if callable(now) or now == signal.SIG_DFL}
     came: list[int] = []
-    with contextlib.ExitStack() as after:
-        after.callback(_raise_signals, came)
-        for number, handler in replaceable(numbers).items():
-            after.callback(signal.signal, number, handler)
-            signal.signal(number, lambda number, _: came.append(number))
+    for number in ours:
+        signal.signal(number, lambda number, _: came.append(number))
+    try:
         yield
+    finally:
+        for number, handler in ours.items():
+            signal.signal(number, handler)
+        for one in came:
+            signal.raise_signal(one)
 
 
-def _raise_signals(numbers: Iterable[int]) -> None:
-    for number in numbers:
-        signal.raise_signal(number)
+def forget_signals() -> None:
+    """A command has ended, whatever interrupted it: the process ends with its exit code.
 
-
-def replaceable(numbers: Iterable[signal.Signals]) -> dict[signal.Signals, Any]:
-    """The handlers of signals that are handled, or would end us; none in another thread than Python's main one.
-
-    Args:
-        numbers: of the signals.
+    Python remembers a KeyboardInterrupt that has passed an ``exec`` of text, as in the making of a dataclass, and ends
+    a program that ``-m`` has started by SIGINT, whoever caught it. The next such ``exec`` forgets it (CPython,
+    ``run_eval_code_obj``).
     """
-    if threading.current_thread() is not threading.main_thread():
-        return {}  # Python takes handlers from its main thread only
-    handlers = {number: signal.getsignal(number) for number in numbers}
-    return {number: now for number, now in handlers.items() if callable(now) or now == signal.SIG_DFL}
-
-
-def stoppable(action: Callable[[], T]) -> T:
-    """Call an action; signals that are caught may raise KeyboardInterrupt from it, which the caller must catch.
-
-    Raises:
-        KeyboardInterrupt: a signal came.
-    """
-    return action()
-
-
-def _is_stoppable(frame: FrameType | None) -> bool:
-    """Whether a KeyboardInterrupt raised in a frame passes :func:`stoppable`, so that somebody catches it."""
-    while frame is not None and frame.f_code is not stoppable.__code__:
-        frame = frame.f_back
-    return frame is not None
-
-
-def forget_interrupt() -> None:
-    """Have the process end with its exit code after a KeyboardInterrupt that was caught.
-
-    Python remembers one that has passed an ``exec`` of text, as in the making of a dataclass, and ends a program that
-    ``-m`` has started by SIGINT, whoever caught it. The next such ``exec`` forgets it (CPython, ``run_eval_code_obj``).
-    """
+    _CAUGHT.clear()
     exec("")
 
 
@@ -216,37 +144,13 @@ def stop_asked() -> bool:
     return bool(_CAUGHT)
 
 
-def forget_signals() -> None:
-    """A new command begins: the signals that were caught before do not concern it."""
-    _CAUGHT.clear()
-    _RAISED.clear()
-
-
 def raise_on_stop() -> None:
     """Have the signals of a stop raise KeyboardInterrupt, until a command catches them itself."""
-    forget_signals()
 
     def stop(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
     catch(STOP, stop)
-
-
-@contextlib.contextmanager
-def stop_unmasked() -> Iterator[None]:
-    """Raise the KeyboardInterrupt of a signal again where a library that it passed through made another error of it.
-
-    An import in C does so. What fails after such a signal has failed by it.
-
-    Raises:
-        KeyboardInterrupt: instead of any other error, once a handler of a signal has raised it.
-    """
-    try:
-        yield
-    except Exception:
-        if _RAISED:
-            raise KeyboardInterrupt from None
-        raise
 
 
 def launcher(ranks: int) -> list[str]:
@@ -273,15 +177,12 @@ def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:
 def stand_back() -> None:
     """Have this process take what processors the ranks leave: any of the machine's, and after them.
 
-    An mpirun may bind each rank to a processor of its own, to which its children would be bound as well. Between
-    sessions it is the niceness of the session that counts where Linux groups processes so (sched(7), "autogroup").
+    An mpirun may bind each rank to a processor of its own, to which its children would be bound as well.
     """
     os.nice(_NICENESS)
     if sys.platform == "linux":
         with contextlib.suppress(OSError):
             os.sched_setaffinity(0, range(os.cpu_count() or 1))
-        with contextlib.suppress(OSError):
-            Path("/proc/self/autogroup").write_text(str(_NICENESS), encoding="ascii")
 
 
 def end(child: subprocess.Popen[str], patience: float) -> None:

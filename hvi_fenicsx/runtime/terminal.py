@@ -53,13 +53,7 @@ def finish() -> None:
 
 def printable(text: str) -> str:
     r"""Text with every character that is not printable as ``\uXXXX``, new lines excepted."""
-    return "".join(c if c.isprintable() or c == "\n" else _escaped(c) for c in text)
-
-
-def _escaped(character: str) -> str:
-    """UTF-16 code units, as JSON writes them."""
-    units = character.encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{units[i : i + 2].hex()}" for i in range(0, len(units), 2))
+    return "".join(c if c.isprintable() or c == "\n" else f"\\u{ord(c):04x}" for c in text)
 
 
 def _write(stream: TextIO, text: str, end: str = "\n") -> None:

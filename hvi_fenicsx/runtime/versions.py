@@ -44,26 +44,13 @@ def with_revision(root: Path = _ROOT) -> str:
 
 
 def _checked_out(folder: Path) -> str | None:
-    """The commit that is checked out, by git's own files: git may be absent; None where there is no repository."""
+    """The commit that is checked out, by git's own log: git may be absent; None where there is no repository."""
     try:
         if folder.is_file():  # a further working tree
             folder = folder.parent / folder.read_text(encoding="utf-8").removeprefix("gitdir:").strip()
-        head = (folder / "HEAD").read_text(encoding="utf-8").strip()
-        if not head.startswith("ref: "):
-            return head
-        shared = folder / "commondir"
-        common = folder / shared.read_text(encoding="utf-8").strip() if shared.exists() else folder
-        return _commit_of(common, head.removeprefix("ref: "))
-    except (OSError, UnicodeDecodeError):
+        return (folder / "logs" / "HEAD").read_text(encoding="utf-8").splitlines()[-1].split()[1]
+    except (OSError, UnicodeDecodeError, IndexError):
         return None
-
-
-def _commit_of(repository: Path, name: str) -> str | None:
-    """The commit of a branch."""
-    if (repository / name).exists():
-        return (repository / name).read_text(encoding="utf-8").strip()
-    packed = (repository / "packed-refs").read_text(encoding="utf-8").splitlines()
-    return next((line.split()[0] for line in packed if line.endswith(f" {name}")), None)
 
 
 @functools.cache

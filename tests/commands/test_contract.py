@@ -5,7 +5,6 @@ Every file is read again by a reader of another make: VTK, NumPy, tomllib, json.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import resource
@@ -19,15 +18,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from runs import command, contact, hvi, process, summary, write_scene
 from scenes import block, model, quadratic_linear
 
-from hvi_fenicsx import cli, read_scene
-from hvi_fenicsx.commands import run
-from hvi_fenicsx.runtime import processes
-from hvi_fenicsx.runtime.mpi import Interrupt
-from hvi_fenicsx.runtime.processes import SIGNALS
+from hvi_fenicsx import read_scene
 
 LAW = quadratic_linear(1.0e3)
 COLUMNS = "part,s,x,y,z,u_n,u_t1,u_t2,gap,sigma_n,friction_t1,friction_t2,contact,branch_t,branch_n"
@@ -284,39 +278,6 @@ def test_an_interrupted_run_writes_what_it_has_and_says_so(
     assert (record["converged"], record["exit_code"]) == (False, 130)
     assert "interrupted" in record["reason"]
     assert len(contact(tmp_path / "r")) == 201
-
-
-def library(number: int) -> None:
-    """An import in C that a signal meets."""
-    try:
-        signal.raise_signal(number)
-    except KeyboardInterrupt:
-        raise ImportError("No module named that is there") from None
-
-
-def second_signal(options: argparse.Namespace) -> int:
-    """A command that has been asked to stop, and is now told to end at once."""
-    Interrupt(MPI.COMM_SELF).watch()
-    signal.raise_signal(signal.SIGTERM)
-    library(signal.SIGTERM)
-    return 0
-
-
-@pytest.mark.parametrize("times", [1, 2])
-def test_a_stop_that_a_library_turns_into_an_error_of_its_own_is_an_interruption(
-    times: int, scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    before = {number: signal.getsignal(number) for number in SIGNALS}
-    if times == 1:
-        monkeypatch.setattr(processes, "start_petsc", lambda: library(signal.SIGTERM))
-    else:
-        monkeypatch.setattr(run, "execute", second_signal)
-    try:
-        assert cli.main(["run", str(scene)]) == 130
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    assert "interrupted; nothing was written" in capsys.readouterr().err
 
 
 def test_values_are_overridden_in_order_and_wrong_ones_are_named(scene: Path, tmp_path: Path) -> None:

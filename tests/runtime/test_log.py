@@ -68,7 +68,7 @@ def test_the_log_has_the_lines_of_the_terminal_and_every_newton_step(scene: Path
 
 def test_a_record_that_cannot_be_written_is_told_when_the_log_is_finished() -> None:
     full = log.RunLog(Path("/dev/full"))
-    with log.Handlers(full):
+    with log.handled(full):
         log.logger("commands").info("a line")
         log.logger("commands").info("another")
     with pytest.raises(NotWrittenError, match="No space left"):
@@ -78,7 +78,7 @@ def test_a_record_that_cannot_be_written_is_told_when_the_log_is_finished() -> N
 def test_handlers_leave_the_package_as_they_found_it(tmp_path: Path) -> None:
     package = logging.getLogger("hvi_fenicsx")
     before = package.level, list(package.handlers)
-    with log.Handlers(log.RunLog(tmp_path / "run.log")):
+    with log.handled(log.RunLog(tmp_path / "run.log")):
         assert package.level == logging.DEBUG
     assert (package.level, package.handlers) == before
 
