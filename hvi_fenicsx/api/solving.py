@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..load_paths import last_borne
 from ..mesh.domain import Domain
 from ..model import Model, is_portable
+from ..model.argument_checks import require_kind, require_switch
 from ..paths.load_path import LoadPath
 from ..problem import spaces
 from ..runtime.log import newton_step

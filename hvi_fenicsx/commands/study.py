@@ -33,7 +33,7 @@ def execute(options: argparse.Namespace) -> int:
     interrupt.watch()
     default = Path("results") / f"{options.scene.stem}-study"
     folder = on_root(COMM, lambda: results.resolved(options.out or default))
-    with log.Handlers(*on_first_rank(log.TerminalDisplay)):
+    with log.handled(*on_first_rank(log.TerminalDisplay)):
         study, warnings = conduct(
             planned,
             COMM,
