@@ -123,12 +123,6 @@ def test_the_papers_smoothing_is_told_to_be_a_quarter_of_gamma1_off() -> None:
     assert found.examination.certificate.inclusion_true == pytest.approx(error / (1e-3 * P), rel=1e-6)
 
 
-def test_an_exact_run_is_off_by_nothing(found: Solution) -> None:
-    assert found.examination is not None
-    assert found.examination.certificate.inclusion_true == found.examination.certificate.inclusion
-    assert found.examination.smoothing_error < 1e-12
-
-
 def test_smoothed_solutions_approach_the_exact_one(found: Solution) -> None:
     """Far from the kink the default smoothing is exact, near it the difference falls with ε."""
     differences = []
@@ -169,7 +163,7 @@ def _floor_and_back(friction: float) -> Table:
     }
 
 
-@pytest.mark.parametrize("friction", [2e2, 2e3, 2e4])
+@pytest.mark.parametrize("friction", [2e2, 2e3])
 def test_two_frictions_share_the_force_at_their_edge(friction: float) -> None:
     """Each may carry a part of the force along the edge; their sum, not each, must be what is needed."""
     assert solved(_floor_and_back(friction)).converged
@@ -195,16 +189,6 @@ def test_an_edge_whose_force_exceeds_both_frictions_is_not_certified() -> None:
     u = found.solve_result.u
     u.x.array[:] *= 0.99
     assert examine(found.problem, u, 1e-8).certificate.inclusion > 1e-3
-
-
-def test_a_law_whose_slip_is_partly_prescribed_shares_an_edge() -> None:
-    """The left end of the edge is displaced along x; what friction gives along z tells all of it."""
-    table = _floor_and_back(2e3)
-    table["boundary"]["held"] = {"on": "top", "displacement": ["free", 0.0, 0.0]}
-    table["boundary"]["moved"] = {"on": "left", "displacement": [1e-6, "free", "free"]}
-    table["boundary"]["floor"] = {"on": "bottom", "adhesion": quadratic_linear(1e6)}
-    found = solved(table)
-    assert found.exit_code == 0, str(found.examination)
 
 
 def test_the_last_digits_of_a_displacement_excuse_a_steep_law_and_no_more_do() -> None:

@@ -7,20 +7,17 @@ each part to what it claims to measure: the mesh, the smoothing, the solver.
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-import ufl
 from dolfinx import fem
 from runs import hvi, summary, write_scene
 from scenes import Table, block, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.certify.certificate import examine
-from hvi_fenicsx.estimate.bubbles import BubbleStiffness, diagonal, space
 from hvi_fenicsx.estimate.contact_errors import estimate_contact_errors
 from hvi_fenicsx.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.problem.problem import Problem
@@ -29,8 +26,6 @@ from hvi_fenicsx.workflow import finish
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 from effectivity import glued_plate, l_shape, rows, rubber, waves
-
-Array = npt.NDArray[np.float64]
 
 
 def energy_norm(problem: Problem, u: fem.Function) -> float:
@@ -48,47 +43,10 @@ def estimated(solution: Solution) -> Estimate:
 # --- the mesh
 
 
-@pytest.mark.parametrize("multiplier", [1e-6, 1e9])
-def test_lengths_of_a_law_without_any_do_not_matter(multiplier: float) -> None:
-    """Tresca's law in space, whose slips are free.
-
-    What stands in its place in the tangent was weaker across a slip, by the multiplier; and what counts as no slip
-    between the nodes was longer by it.
-    """
-    tresca = {"law": "tresca", "yield_traction": 1e6}
-    body = {
-        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
-        "material": {"model": "three_dimensional", "youngs_modulus": 2e11, "poisson_ratio": 0.3},
-    }
-    loads = {
-        "press": {"on": "top", "traction": [0.0, 0.0, -2e6]},
-        "push": {"on": "right", "traction": [-8e5, 2e5, 0.0]},
-    }
-    plain, multiplied = (
-        solved(body | {"boundary": loads | {"floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law}}})
-        for law in (tresca, tresca | {"length_multiplier": multiplier})
-    )
-    assert estimated(multiplied).relative == pytest.approx(estimated(plain).relative, rel=1e-9)
-
-
 def test_a_solution_that_p1_holds_has_no_error() -> None:
     found = estimated(solved(model(5)))
     assert found.total < 1e-12 * found.energy_norm
     assert found.smoothing == 0.0
-
-
-def test_no_load_no_error() -> None:
-    found = estimated(solved(model(4, pull=0.0, press=0.0, friction=quadratic_linear(1e6))))
-    assert (found.total, found.relative) == (0.0, 0.0)
-
-
-@pytest.mark.parametrize("gap", [-1e-6, "-1e-6*x"])
-def test_a_rigid_motion_meets_no_force_and_has_no_error(gap: float | str) -> None:
-    """The floor lifts a body that no load holds: what is left is rounding, of which there is no share."""
-    table = model(4, gap=gap)
-    table["boundary"] = {"floor": table["boundary"]["floor"]}
-    found = estimated(solved(table))
-    assert (found.total, found.relative) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(("cells", "kind"), [(8, "held"), (16, "held"), (16, "pressed")])
@@ -158,7 +116,10 @@ CASES: dict[str, Table] = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+FAST = ("lift-off", "free block", "l-shape", "hardly compressible", "block in space")
+
+
+@pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.long) for n in CASES])
 def test_against_a_mesh_four_times_finer(name: str) -> None:
     (row,) = rows(read_tables(CASES[name]), levels=1)
     assert 0.75 < row.index < 1.3
@@ -188,10 +149,7 @@ def test_data_that_the_mesh_does_not_see(name: str) -> None:
 # --- its parts
 
 
-QUICK = ("strong law", "lift-off")
-
-
-@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in CASES])
+@pytest.mark.parametrize("name", ["strong law", pytest.param("half-disk", marks=pytest.mark.long)])
 def test_degree_two_against_a_mesh_four_times_finer(name: str) -> None:
     scene = read_tables(CASES[name]).with_solver(degree=2)
     (row,) = rows(scene, levels=1, extra=2 if scene.dimension == 2 else 1)
@@ -216,45 +174,21 @@ def held_by_a_bond(cells: list[int], stiffness: float, poisson_ratio: float = 0.
     }
 
 
-@pytest.mark.parametrize("stiffness", [1e11, 1e13])
-@pytest.mark.parametrize("cells", [[4, 2], pytest.param([3, 3, 2], marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("cells", "stiffness"), [([4, 2], 1e13), pytest.param([3, 3, 2], 1e11, marks=pytest.mark.long)]
+)
 def test_bonds_that_are_stiff_beside_the_cells_at_degree_two(cells: list[int], stiffness: float) -> None:
     scene = read_tables(held_by_a_bond(cells, stiffness)).with_solver(degree=2)
     (row,) = rows(scene, levels=1, extra=5 - len(cells))
     assert 0.75 < row.index < 1.3
 
 
-@pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("cells", [[4, 2], pytest.param([3, 3, 2], marks=pytest.mark.long)])
+@pytest.mark.parametrize(("cells", "degree"), [([4, 2], 1), pytest.param([3, 3, 2], 2, marks=pytest.mark.long)])
 def test_stiff_bonds_of_a_nearly_incompressible_slab(cells: list[int], degree: int) -> None:
     """The bond is nearly a clamp, of which the index is 1.06 in the plane against a mesh four times finer."""
     scene = read_tables(held_by_a_bond(cells, 1e13, 0.49)).with_solver(degree=degree)
     (row,) = rows(scene, levels=1, extra=4 - len(cells))
     assert 0.9 < row.index < 1.15
-
-
-@pytest.mark.parametrize(("name", "degree"), [*((n, 1) for n in CASES), ("l-shape", 2), ("block in space", 2)])
-def test_the_bubbles_stiffness_is_dolfinx_own_matrix(name: str, degree: int) -> None:
-    problem = prepare(read_tables(CASES[name]).with_solver(degree=degree)).problem
-    bubbles = space(problem.domain.mesh, degree)
-    form = problem.bulk.between(ufl.TrialFunction(bubbles), ufl.TestFunction(bubbles))
-    matrix = fem.assemble_matrix(fem.form(form)).to_scipy()
-    found = diagonal(problem, bubbles)
-    assert found.ravel() == pytest.approx(matrix.diagonal(), rel=1e-12)
-    e = np.random.default_rng(1).standard_normal(found.shape)
-    assert BubbleStiffness(problem, bubbles).times(e).ravel() == pytest.approx(matrix @ e.ravel(), rel=1e-9, abs=1e-12)
-
-
-@pytest.mark.parametrize(("name", "degree"), [("l-shape", 1), ("l-shape", 2), ("block in space", 2)])
-def test_the_bubbles_diagonal_is_their_own_on_an_elastic_bed(name: str, degree: int) -> None:
-    problem = prepare(read_tables(CASES[name]).with_solver(degree=degree)).problem
-    bulk, (v, u) = problem.bulk, problem.bulk.form.arguments()
-    bed = 20.0 * ufl.inner(u, v) * ufl.dx
-    problem = replace(problem, bulk=replace(bulk, form=bulk.form + bed, foundation=bed))
-    bubbles = space(problem.domain.mesh, degree)
-    form = problem.bulk.between(ufl.TrialFunction(bubbles), ufl.TestFunction(bubbles))
-    matrix = fem.assemble_matrix(fem.form(form)).to_scipy()
-    assert diagonal(problem, bubbles).ravel() == pytest.approx(matrix.diagonal(), rel=1e-9)
 
 
 @pytest.mark.parametrize("strong", [False, True])
@@ -273,10 +207,9 @@ def test_smoothing_is_what_it_changes_of_the_solution(strong: bool) -> None:
     assert estimated(exact).smoothing == 0.0
 
 
-@pytest.mark.parametrize("degree", [1, 2])
-def test_what_smoothing_changes_is_counted_once(degree: int) -> None:
+def test_what_smoothing_changes_is_counted_once() -> None:
     """Nodes that are found with the bubbles, as at degree 2, would answer the unsmoothed law."""
-    table = model(8, friction=quadratic_linear(1e3), smoothing="paper", epsilon=20.0, degree=degree)
+    table = model(8, friction=quadratic_linear(1e3), smoothing="paper", epsilon=20.0, degree=2)
     (row,) = rows(read_tables(table), levels=1)
     assert row.estimate.smoothing > 0.5 * row.true
     assert 0.8 < row.index < 1.1
@@ -293,7 +226,7 @@ def test_algebraic_is_the_distance_from_the_discrete_solution() -> None:
     assert estimate(system, (), moved, examine(problem, moved, 1e-8)).algebraic == pytest.approx(true, rel=1e-6)
 
 
-@pytest.mark.parametrize("cells", [4, 8, 16])
+@pytest.mark.parametrize("cells", [4, 16])
 @pytest.mark.parametrize("name", ["strong", "weak"])
 def test_slip_and_friction_against_a_mesh_far_finer(name: str, cells: int) -> None:
     """With a drop the slip's error comes from where the drop lies between two vertices, and feeds on itself."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import STEEL, Table, two_blocks
+from scenes import STEEL, Table
 
-from hvi_fenicsx import Model, Solution, read_tables, solve
+from hvi_fenicsx import Model, read_tables, solve
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
@@ -68,41 +67,3 @@ def test_the_estimate_is_near_the_error_of_demos(name: str, degree: int) -> None
     for row in rows(scenes()[name].with_solver(degree=degree), 2):
         assert row.certified
         assert row.index == pytest.approx(1.0, abs=0.2)
-
-
-PLANE = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress", tolerance=1e-10, degree=1)
-SPACE = two_blocks("box", [1.0, 0.8], [[4, 3, 2], [3, 4, 2]], "three_dimensional", degree=1)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("blocks", "requested", "reference"), [(PLANE, 0.15, 0.04), (SPACE, 0.3, 0.12)])
-def test_an_accuracy_is_reached_by_refining_both_bodies(blocks: Table, requested: float, reference: float) -> None:
-    """The distance of two energies is half the square of the error, but for what the finer one still lacks."""
-    coarse, fine = (refined(blocks, accuracy) for accuracy in (requested, reference))
-    assert coarse.examination is not None
-    assert fine.examination is not None
-    assert coarse.estimate is not None
-    assert fine.estimate is not None
-    apart = math.sqrt(2 * (coarse.examination.energy - fine.examination.energy))
-    away = math.hypot(apart, fine.estimate.total)
-    assert away < requested * coarse.estimate.energy_norm
-    assert away == pytest.approx(coarse.estimate.total, rel=0.2)
-    for name in ("lower", "upper"):
-        assert len(fine.problem.domain.regions[name]) > 2 * len(coarse.problem.domain.regions[name])
-    (before,), (after,) = coarse.problem.interfaces, fine.problem.interfaces
-    assert len(after.first.nodes) > 1.5 * len(before.first.nodes)
-    assert len(after.second.nodes) > 1.5 * len(before.second.nodes)
-
-
-def refined(blocks: Table, accuracy: float) -> Solution:
-    from mpi4py import MPI
-
-    from hvi_fenicsx.accuracy.adaptive import AdaptiveSolver
-    from hvi_fenicsx.accuracy.control import solve_to_goal
-    from hvi_fenicsx.accuracy.goal import Goal
-    from hvi_fenicsx.runtime.timing import Timer
-
-    scene, lines = read_tables(blocks), list[str]()
-    found = solve_to_goal(scene, MPI.COMM_WORLD, Goal(accuracy=accuracy), AdaptiveSolver(timer=Timer()), lines.append)
-    assert found.why is None
-    return found.solution

@@ -47,7 +47,7 @@ def work(found: ModelSolution, degree: int) -> float:
     return -LOAD * done
 
 
-@pytest.mark.parametrize(("cells", "degree"), [(4, 1), (8, 1), (4, 2), (8, 2)])
+@pytest.mark.parametrize(("cells", "degree"), [(4, 1), (8, 2)])
 def test_the_estimate_is_near_the_error(cells: int, degree: int) -> None:
     """|||u - u_h|||² = a(u, u) + a(u_h, u_h) - 2 <g, u_h> with the scene's own load g, from a mesh that it fits."""
     exact, found = solved(square(40, 2)), solved(square(cells, degree))
@@ -55,13 +55,6 @@ def test_the_estimate_is_near_the_error(cells: int, degree: int) -> None:
     assert found.estimate is not None
     estimated = found.estimate.total * np.sqrt(found.problem.scales.energy)
     assert 0.8 < estimated / error < 1.2
-
-
-def test_a_pressure_counts_as_the_traction_that_it_is() -> None:
-    estimates = [solved(square(4, 2, **load)).estimate for load in ({}, {"pressure": LOAD})]
-    assert estimates[0] is not None
-    assert estimates[1] is not None
-    assert estimates[1].total == pytest.approx(estimates[0].total, rel=1e-6)
 
 
 LEFT: Table = {"on": "left", "displacement": [0.0, "free"]}
@@ -110,61 +103,10 @@ def index(coarse: Table, fine: Table) -> float:
     return found.estimate.total * float(np.sqrt(found.problem.scales.energy)) / difference(found, solved(fine))
 
 
-@pytest.mark.parametrize("end", [0.3, pytest.param(0.35, marks=pytest.mark.long)])
 @pytest.mark.parametrize("kind", PARTS)
-def test_the_estimate_is_near_the_error_of_any_part(kind: str, end: float) -> None:
-    """On 8 x 8 cells the part ends at 0.25 or at 0.375."""
-    assert 0.7 < index(piece(kind, end, 8, 2), piece(kind, end, 40, 2)) < 1.4
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("end", [7 / 24, 10 / 24])
-@pytest.mark.parametrize("kind", ["clamped", "touching", "loaded"])
-def test_the_estimate_is_near_the_error_in_space(kind: str, end: float) -> None:
-    part: Table = {
-        "clamped": {"on": "bottom", "displacement": [0.0, 0.0, 0.0]},
-        "touching": {"on": "bottom", "contact": {"gap": 0.0}},
-        "loaded": {"on": "top", "force": [0.0, 0.0, -LOAD]},
-    }[kind]
-    others: Table = {
-        "clamped": {"press": {"on": "top", "traction": [3e5, 0.0, -LOAD]}},
-        "touching": {
-            "press": {"on": "top", "traction": [0.0, 0.0, -LOAD]},
-            "left": {"on": "left", "displacement": [0.0, "free", "free"]},
-            "front": {"on": "front", "displacement": ["free", 0.0, "free"]},
-        },
-        "loaded": {"base": {"on": "bottom", "displacement": [0.0, 0.0, 0.0]}},
-    }[kind]
-
-    def bar(cells: int) -> Table:
-        return {
-            "domain": {"shape": "box", "size": [1.0, 0.25, 0.5], "cells": [cells, cells // 4, cells // 2]},
-            "material": {"model": "three_dimensional", "youngs_modulus": 1e9, "poisson_ratio": 0.3},
-            "boundary": {**others, "part": {**part, "where": f"x < {end}"}},
-            "solver": {"degree": 2},
-        }
-
-    assert 0.65 < index(bar(8), bar(24)) < 1.4
-
-
-@pytest.mark.parametrize("kind", PARTS)
-def test_a_part_that_ends_at_a_vertex_costs_nothing(kind: str) -> None:
-    """Of 8 x 8 cells the same ones are in both parts."""
-    fitting, cutting = (solved(piece(kind, end, 8, 2)).estimate for end in (0.25, 0.23))
-    assert fitting is not None
-    assert cutting is not None
-    assert fitting.total < cutting.total * (1.0 - 1e-6)
-
-
-@pytest.mark.long
-def test_the_accuracy_of_a_contact_is_that_of_the_scene(tmp_path: Path) -> None:
-    """It ended with an error of 5.9 %."""
-    coarse, fine = (solved(piece("contact", END, cells, 2)).energy for cells in (80, 160))
-    table = piece("contact", END, 4, 2)
-    del table["solver"]
-    done = hvi("run", write_scene(tmp_path / "scene.toml", table), "--accuracy", "0.05", "--out", tmp_path / "r")
-    assert done.returncode == 0
-    assert summary(tmp_path / "r")["energy"] == pytest.approx(2.0 * fine - coarse, rel=0.05**2)
+def test_the_estimate_is_near_the_error_of_any_part(kind: str) -> None:
+    """On 8 x 8 cells the part ends at 0.25."""
+    assert 0.7 < index(piece(kind, END, 8, 2), piece(kind, END, 40, 2)) < 1.4
 
 
 @pytest.mark.long

@@ -11,10 +11,6 @@ from runs import ROOT, hvi, summary, write_scene
 from scenes import block, model, quadratic_linear
 
 from hvi_fenicsx import console, prepare, read_scene, read_tables, solve
-from hvi_fenicsx.certify.thresholds import PlausibilityThresholds
-from hvi_fenicsx.estimate import plausibility
-from hvi_fenicsx.mesh.shapes import MeshFile
-from hvi_fenicsx.workflow import finish
 
 LAW = quadratic_linear(1.0e6)
 COARSE = ("domain.cells=[8, 8]",)
@@ -59,14 +55,6 @@ MISTAKEN = {
 HUNG = {"on": "top", "displacement": ["free", 0.0]}
 
 
-def test_a_long_body_of_a_file_without_a_scale_is_told() -> None:
-    file = ROOT / "demos" / "thermal_bar.geo"
-    (said,) = MeshFile(file=file).implausible(80.0)
-    assert "80 m long" in said
-    assert "scale = 1e-3" in said
-    assert MeshFile(file=file).implausible(0.08) == MeshFile(file=file, scale=1.0).implausible(80.0) == ()
-
-
 @pytest.mark.parametrize("case", MISTAKEN)
 def test_a_unit_taken_for_another_is_told(case: str) -> None:
     make_table, words = MISTAKEN[case]
@@ -90,11 +78,6 @@ def test_a_strain_is_told_by_its_size(strain: float) -> None:
     assert all(f"{strain:.3g}" in s for s in said)
 
 
-@pytest.mark.parametrize("demo", ["strong_law", "lift_off", "pushed_block", "tipping_tower", "slot"])
-def test_sane_demos_are_left_in_peace(demo: str) -> None:
-    assert finish(prepare(read_scene(ROOT / "demos" / f"{demo}.toml", COARSE)), estimating=False).warnings == ()
-
-
 def test_a_coarse_mesh_is_told_with_its_error() -> None:
     scene = read_scene(ROOT / "demos" / "tipping_tower.toml", COARSE)
     solution = solve(scene)
@@ -104,10 +87,6 @@ def test_a_coarse_mesh_is_told_with_its_error() -> None:
     assert f"error is {100 * solution.estimate.discretisation / solution.estimate.energy_norm:.2g} %" in warning
     assert warning.endswith("refine the mesh")  # a program from Python has no --accuracy
     assert [line for line in console.outcome(solution) if "`hvi run SCENE --accuracy 0.05`" in line]
-
-
-def test_a_fine_mesh_is_left_in_peace() -> None:
-    assert not [line for line in console.outcome(solve(read_tables(model(16)))) if "--accuracy" in line]
 
 
 @pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.toml")), ids=lambda d: d.stem)
@@ -123,14 +102,6 @@ def test_before_solving_only_the_implausible_demos_are_warned_of(demo: Path) -> 
         assert any(expected[demo.stem] in sentence for sentence in found)
     else:
         assert found == ()
-
-
-def test_the_limits_can_be_chosen() -> None:
-    prepared = prepare(read_tables(model(8)))
-    problem, forces = prepared.problem, prepared.system.forces
-    assert plausibility.before_solving(problem, forces) == prepared.warnings == ()
-    (warning,) = plausibility.before_solving(problem, forces, PlausibilityThresholds(stiffest=1e11))
-    assert "Young's modulus is 2.15e+11" in warning
 
 
 def test_the_papers_own_data_are_warned_of_twice() -> None:

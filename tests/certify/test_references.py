@@ -8,9 +8,9 @@ from typing import Any
 import meshes
 import numpy as np
 import pytest
-from scenes import Q, Table, block, displacement, model, points, quadratic_linear, solved
+from scenes import Table, block, displacement, model, points, quadratic_linear, solved
 
-from hvi_fenicsx import console, read_tables, solve
+from hvi_fenicsx import read_tables, solve
 
 BALANCED = 1.0e9
 PEAK = 0.5
@@ -37,7 +37,7 @@ def test_a_body_that_is_moved_is_certified_on_fine_meshes(floor: str, solver: st
 
 def squeezed(net: float, law: Table, balanced: float = BALANCED, **solver: Any) -> Table:
     """A free block between two pulls that leave a small net push to the floor's friction."""
-    table = block(8, -balanced, 10.0, law, **solver)
+    table = block(4, -balanced, 10.0, law, **solver)
     table["boundary"]["push"] = {"on": "left", "traction": [balanced + net, 0.0]}
     return table
 
@@ -46,8 +46,7 @@ def squeezed(net: float, law: Table, balanced: float = BALANCED, **solver: Any) 
     ("balanced", "push", "solver"),
     [
         (1e9, 2.0, "auto"),
-        (1e8, 2.0, "gamg"),
-        *(pytest.param(1e8, 1.2, solver, marks=pytest.mark.long) for solver in ("gamg", "lu")),
+        pytest.param(1e8, 1.2, "gamg", marks=pytest.mark.long),
     ],
 )
 def test_a_small_net_push_beside_large_balanced_loads_is_never_lost(balanced: float, push: float, solver: str) -> None:
@@ -102,34 +101,6 @@ def test_another_bodys_stress_hides_no_tension(two_squares: Path) -> None:
         assert 0 < np.count_nonzero(state.contact) < len(state.contact)
 
 
-@pytest.mark.parametrize("pull", [1.0, 1e8])
-def test_a_drop_just_ahead_of_a_slip_is_none_that_is_reached(two_squares: Path, pull: float) -> None:
-    """What counts as being on a kink belongs to the body: half a percent of its slip is far away."""
-    table = lifting(two_squares, pull)
-    free = solve(read_tables(table))
-    bottom = (points(free)[:, 0] > 1.5) & (points(free)[:, 1] < 1e-9)
-    drop = 1.005 * float(np.max(np.abs(displacement(free)[bottom, 0])))
-    law = {"law": "graph", "points": [[0.0, 0.0], [drop, 1e-6], [drop, 0.5e-6]]}
-    table["boundary"]["floor"]["friction"] = law
-    table["solver"]["second_order"] = True
-    found = solve(read_tables(table))
-    assert found.examination is not None
-    assert found.examination.certificate.second_order == "local minimiser"
-
-
-def test_a_tiny_load_beside_a_large_displacement_spoils_no_scale() -> None:
-    table = model(4)
-    table["boundary"] = {
-        "top": {"on": "top", "displacement": [0.0, -1e-3]},
-        "left": {"on": "left", "traction": [10.0, 0.0]},
-        "floor": {"on": "bottom", "contact": {"obstacle": {"point": [0.0, 0.0], "normal": [0.3, 1.0]}}},
-    }
-    found = solved(table)
-    assert found.exit_code == 0
-    assert found.examination is not None
-    assert found.examination.certificate.rounding is None
-
-
 def test_a_body_that_has_come_off_meets_no_force_at_all() -> None:
     """A broken bond and a prescribed displacement: the body moves as a whole."""
     table = model(24, start="broken")
@@ -140,15 +111,6 @@ def test_a_body_that_has_come_off_meets_no_force_at_all() -> None:
     found = solved(table)
     assert found.exit_code == 0
     np.testing.assert_allclose(displacement(found)[:, 1], 1e-3, rtol=1e-12)
-
-
-def test_a_tolerance_beyond_rounding_is_said() -> None:
-    table = model(4, 3e6, Q, quadratic_linear(1e6), tolerance=1e-300)
-    found = solved(table)
-    assert found.exit_code == 0
-    assert any(line.startswith("tolerance 1e-300 is below the rounding errors") for line in console.outcome(found))
-    table["solver"]["tolerance"] = 1e-8
-    assert not any(line.startswith("tolerance") for line in console.outcome(solved(table)))
 
 
 @pytest.mark.parametrize("law", [None, {"law": "linear_spring", "stiffness": 5.7e6}])

@@ -47,36 +47,6 @@ def test_the_least_curvature_is_that_of_samples(name: str) -> None:
         assert fall == pytest.approx(wanted, rel=1e-4, abs=1e-9 * np.abs(law.right(y)).max())
 
 
-def test_on_a_convex_kink_every_traction_between_is_supported_and_on_a_drop_none() -> None:
-    solution = found(model(2, 1e6, 1e6, {"law": "graph", "points": [[0, 5e5], [9e-6, 3e6], [9e-6, 1.5e6]]}))
-    assert solution.examination is not None
-    state = solution.examination.states[0].laws[0]
-    peak = float(state.term.law.right(np.zeros(1))[0])
-    drop = float(state.term.law.breaks.max())
-    for x, share, supported in ((0.0, 0.0, True), (0.0, 0.99, True), (drop, 3.0, False)):
-        here = replace(
-            state,
-            argument=np.full_like(state.argument, x),
-            traction=np.full_like(state.argument, share * peak),
-            hidden=np.zeros(len(state.argument), bool),
-        )
-        falls = needed_falls(here)
-        assert falls is not None
-        assert np.all(np.isfinite(falls)) == supported
-
-
-def test_a_convex_law_is_nowhere_below_its_tangents_whatever_rounding_makes_of_tractions() -> None:
-    solution = found(model(64, 1e6, 1e6, {"law": "tresca", "yield_traction": 3e5}))
-    assert solution.examination is not None
-    state = solution.examination.states[0].laws[0]
-    random = np.random.default_rng(1)
-    x = random.normal(size=len(state.argument)) * 10.0 ** random.uniform(-6.0, 2.0, len(state.argument))
-    traction = state.term.law.right(x) * (1.0 + random.choice([-2e-16, 0.0, 2e-16], len(x)))
-    falls = needed_falls(replace(state, argument=x, traction=traction, hidden=np.zeros(len(x), bool)))
-    assert falls is not None
-    assert not np.any(falls)
-
-
 @pytest.mark.parametrize("name", GRAPHS)
 def test_what_is_called_lowest_is_so_by_enumeration(name: str) -> None:
     seen = set()

@@ -15,7 +15,6 @@ from scenes import DELTA, NU, E, Table, block, model, quadratic_linear
 
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.paths.vertex_laws import is_straight
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.system.system import System
 
@@ -131,32 +130,6 @@ def test_forces_are_those_of_the_whole_body(name: str) -> None:
         assert np.max(np.abs(np.sort(whole[np.abs(whole) > 1e-9 * size]) - np.sort(reduced[reduced != 0.0]))) < (
             1e-9 * size
         )
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_only_what_carries_a_bound_or_a_law_is_kept(name: str) -> None:
-    _, condensation = condensed(name)
-    problem = condensation.problem
-    carrying = np.isfinite(problem.lower) | np.isfinite(problem.upper)
-    for bonds in problem.bonds:
-        carrying[bonds.unknowns] = True
-    assert np.all(carrying)
-    assert np.array_equal([bool(p) for p in problem.parts], np.isfinite(problem.lower) | np.isfinite(problem.upper))
-
-
-def test_a_spring_on_a_length_is_springs_on_its_components() -> None:
-    assert any(bonds.radial for bonds in condensed("in_space")[1].problem.bonds)
-    assert is_straight(condensed("on_springs")[1].problem)
-
-
-def test_a_slide_that_nothing_resists_needs_no_unknown_whether_or_not_a_load_works_on_it() -> None:
-    """Contact alone, and a load along the floor: the slide is pinned, and contact feels all other motions."""
-    for push in (0.0, 1e5):
-        problem = Condensation(prepare(read_tables(block(4, push=push)), MPI.COMM_SELF).system).problem
-        bounded = np.isfinite(problem.lower) | np.isfinite(problem.upper)
-        assert np.all(bounded)
-        values = np.linalg.eigvalsh(problem.stiffness)
-        assert np.count_nonzero(np.abs(values) < 1e-12 * values[-1]) == 2  # up, and a turn
 
 
 @pytest.mark.parametrize("name", ["pulled", "wall"])

@@ -10,7 +10,7 @@ import pytest
 from factorisation_ranks import compared
 from mpi4py import MPI
 from runs import on_ranks
-from scenes import quadratic_linear, solved, two_blocks
+from scenes import quadratic_linear, two_blocks
 
 RUBBER = {"youngs_modulus": 1e6, "poisson_ratio": 0.4999}
 LAW = quadratic_linear(1e3)
@@ -48,7 +48,7 @@ def disk() -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("table", [cube(), blocks(), disk()], ids=["cube", "blocks", "disk"])
+@pytest.mark.parametrize("table", [cube(), blocks()], ids=["cube", "blocks"])
 def test_solutions_and_negative_eigenvalues_are_those_of_the_matrix_itself(table: dict[str, Any]) -> None:
     told = compared(table, MPI.COMM_SELF)
     assert told["pressures"][0] > 0
@@ -62,9 +62,3 @@ def test_on_several_ranks_too() -> None:
     assert min(told["pressures"]) > 0
     assert told["difference"] < 1e-7
     assert told["negative"][0] == told["negative"][1] > 0
-
-
-def test_a_run_with_a_direct_solver_ends_where_one_with_multigrid_does() -> None:
-    one, other = (solved(cube(4) | {"solver": {"degree": 2, "linear_solver": kind}}) for kind in ("lu", "gamg"))
-    assert one.converged
-    assert one.energy == pytest.approx(other.energy, rel=1e-8)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from runs import ROOT
 from scenes import model
-from unformed import path_run
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import Model, prepare, read_tables
@@ -57,17 +56,6 @@ def cell(n: int, seed: int, driver: int | None) -> CellColumns:
     return CellColumns(slope=slope, rise=rise, driver=driver, factor=rng.standard_normal(n))
 
 
-def test_raised_stiffness_is_that_of_the_matrix_at_first() -> None:
-    system = prepare(plane()).system
-    unformed = Condensation(system, None, 0).problem.elastic
-    formed, right = DenseStiffness(unformed.array), np.random.default_rng(0).standard_normal(len(unformed.diagonal))
-    system.jacobian.matrix.scale(2.0)
-    columns = cell(len(right), 0, None)
-    expected = formed.raised(0.5).inverse(columns).solve(right)
-    found = unformed.raised(0.3).raised(0.2).inverse(columns).solve(right)
-    assert found == pytest.approx(expected, abs=1e-10 * float(np.max(np.abs(expected))))
-
-
 @pytest.mark.parametrize("driver", [None, 0, 3, 4])
 def test_cells_are_inverted_and_their_columns_exchanged(driver: int | None) -> None:
     formed, unformed = both(plane())
@@ -101,28 +89,3 @@ def test_negative_directions_are_those_of_the_eigenvalues(seed: int) -> None:
     for stiffness in (formed, unformed):
         assert stiffness.negative_directions(moving, slope, 1e-12) == np.count_nonzero(values < 0.0)
         assert stiffness.negative_directions(moving, slope, 1e-12) > 0
-
-
-def test_a_body_that_only_its_floor_holds_is_singular_without_it() -> None:
-    """Rigid motions meet no stiffness; with springs, or with two unknowns held, the body is held."""
-    table = model(4, friction=SPRING)
-    del table["boundary"]["wall"]
-    formed, unformed = both(read_tables(table))
-    n = len(formed.array)
-    everything, none = np.ones(n, dtype=bool), np.zeros(n)
-    for stiffness in (formed, unformed):
-        assert stiffness.is_singular(everything, none)
-        assert not stiffness.is_singular(everything, none + 0.1)
-        with pytest.raises(np.linalg.LinAlgError):
-            unformed.inverse(CellColumns(slope=none, rise=none, driver=None, factor=none))
-
-
-def test_unknowns_without_a_law_are_left_out() -> None:
-    """On a block that is clamped, and on one that may leave the floor, which is pinned there."""
-    glue = {"law": "graph", "points": [[0, 0], [2e-6, 3e6], [1.6e-5, 0]]}
-    table = model(4, friction=glue)
-    table["path"] = {"to": 1.0}
-    del table["boundary"]["floor"]["contact"]
-    for displacement in ([0.0, 0.0], [0.0, "free"]):
-        table["boundary"]["wall"]["displacement"] = displacement
-        assert path_run(table, formed=False).size == 4

@@ -172,16 +172,6 @@ def _mean(solution: Solution, component: int) -> float:
     return float(np.sum(np.abs(np.linalg.det(sides)) / 2 * u[cells].mean(axis=1)))
 
 
-def test_a_traction_in_balance_with_itself_is_no_load_on_rigid_motions() -> None:
-    """Its works are rounding however large it is: they are judged by the forces, not by themselves."""
-    table = body(2, 8)
-    table["boundary"]["right"] = {"on": ["right"], "traction": ["1e6*sin(2*pi*y)*(1 - 6*y*(1-y))", 0.0]}
-    table["boundary"]["left"] = {"on": ["left"], "traction": ["-1e6*sin(2*pi*y)*(1 - 6*y*(1-y))", 0.0]}
-    solution = solve(read_tables(table))
-    assert (solution.exit_code, solution.solvability.state) == (0, "borderline")
-    assert len(solution.solvability.free) == 3
-
-
 def test_what_stays_free_is_told(tmp_path: Path) -> None:
     scene = write_scene(tmp_path / "s.toml", slot(4))
     done = hvi("run", scene, "--out", tmp_path / "r", "--no-pictures")

@@ -13,12 +13,10 @@ import numpy.typing as npt
 import pytest
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 from petsc4py import PETSc
-from scenes import DELTA, NU, E, P, Q, Table, block, energy, model, quadratic_linear, solved
+from scenes import DELTA, NU, E, P, Q, Table, energy, model, quadratic_linear, solved
 
 from hvi_fenicsx import Superpotential, prepare, read_tables
-from hvi_fenicsx.mesh import blocks, nodes
 from hvi_fenicsx.workflow import Preparation
 
 Array = npt.NDArray[np.float64]
@@ -130,17 +128,6 @@ def test_the_boundary_term_is_the_sum_of_nodal_tractions() -> None:
     np.testing.assert_allclose(difference, wanted.ravel(), atol=1e-12)
 
 
-@pytest.mark.parametrize("side", ["bottom", "top", "left", "right"])
-def test_weights_add_up_to_the_length_of_the_side(side: str) -> None:
-    table = model(4)
-    table["domain"] |= {"size": [3.0, 0.7], "cells": [5, 4]}
-    table["boundary"] = {"floor": {"on": side, "friction": STRONG}}
-    (surface,) = ready(table).problem.surfaces
-    length = 3.0 if side in ("bottom", "top") else 0.7
-    assert np.sum(surface.weights) * 3.0 == pytest.approx(length, rel=1e-14)  # in units of L
-    assert np.all(surface.weights > 0)
-
-
 def test_weights_in_space_add_up_to_the_area() -> None:
     table: Table = {
         "domain": {"shape": "box", "size": [2.0, 1.0, 0.5], "cells": [4, 2, 2]},
@@ -157,13 +144,6 @@ def test_weights_in_space_add_up_to_the_area() -> None:
         np.testing.assert_array_equal(surface.tangents[:, 1], np.cross(surface.normals, surface.tangents[:, 0]))
 
 
-@pytest.mark.parametrize("degree", [1, 2])
-def test_nodes_are_where_dolfinx_tabulates_them(degree: int) -> None:
-    for size in ([3.0, 0.7], [1.0, 2.0, 3.0]):
-        space = fem.functionspace(blocks.block(MPI.COMM_SELF, size, [5, 4, 3][: len(size)]).mesh, ("Lagrange", degree))
-        np.testing.assert_allclose(nodes.points(space), space.tabulate_dof_coordinates(), rtol=0, atol=1e-15)
-
-
 LAWS: dict[str, Table] = {
     "quadratic_linear": STRONG,
     "stronger": quadratic_linear(1e7),
@@ -174,9 +154,9 @@ LAWS: dict[str, Table] = {
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(("pull", "press"), [(3e6, 1e6), (6e6, 1e6), (6e6, 1e5)])
+@pytest.mark.parametrize(("pull", "press"), [(3e6, 1e6), (6e6, 1e5)])
 def test_the_energy_falls_in_every_convex_step(law: str, pull: float, press: float) -> None:
-    found = solved(model(12, pull, press, LAWS[law]))
+    found = solved(model(8, pull, press, LAWS[law]))
     assert found.exit_code == 0
     assert found.solve_result is not None
     energies = np.array(found.solve_result.energies)
@@ -205,15 +185,3 @@ def test_the_certified_energy_is_that_of_the_papers_formulas(pull: float, gamma1
     u = fem.Function(found.problem.space)
     u.x.array[:] = found.solve_result.u.x.array * found.problem.scales.displacement
     assert energy(found) == pytest.approx(by_ufl(u, pull, gamma1), rel=1e-12)
-
-
-def test_a_free_block_has_all_rigid_motions_in_its_near_null_space() -> None:
-    """The stiffness of a body that nothing holds vanishes on them."""
-    table = block(4)
-    del table["boundary"]["floor"]
-    system = ready(table).system
-    vectors = system.near_null.getVecs()
-    assert len(vectors) == 3
-    for vector in vectors:
-        assert (system.jacobian.matrix * vector).norm() < 1e-12
-        assert vector.norm() == pytest.approx(1.0)
