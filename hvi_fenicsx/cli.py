@@ -9,7 +9,6 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
 from .commands.arguments import parser
 from .errors import ExitCode, HviError, InputError
@@ -104,18 +103,8 @@ def _placed(options: argparse.Namespace) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        text = with_place(str(error), options.scene, options.overrides)
-        error.args = (_in_one_line(text, options),)  # it stays what it is, on which ranks
+        error.args = (with_place(str(error), options.scene, options.overrides),)  # it stays what it is
         raise
-
-
-def _in_one_line(text: str, options: argparse.Namespace) -> str:
-    """A message in which the line ends of names are escapes, so that names are not cut."""
-    given: list[Path | None] = [options.scene, getattr(options, "out", None)]
-    for path in (path for path in given if path is not None):
-        for name in (part for part in path.parts if "\n" in part):
-            text = text.replace(name, name.replace("\n", "\\n"))
-    return text
 
 
 def _version() -> int:

@@ -164,6 +164,7 @@ _TEXTS = {
     "int_parsing_size": "must be a whole number of reasonable size",
     "int_from_float": "must be a whole number",
     "bool_type": "must be true or false",
+    "callable_type": "must be a function",
     "string_type": "must be a text in quotes",
     "tuple_type": "must be a list, as in [..., ...]",
     "list_type": "must be a list, as in [..., ...]",

@@ -4,4 +4,4 @@ from .following import ModelPath, follow
 from .solution import ModelSolution as Solution
 from .solving import check, solve
 from .stationary import Equilibria, equilibria
-from .studying import ModelStudy, study
+from .studying import study

@@ -11,6 +11,7 @@ from pathlib import Path
 from dolfinx import fem
 from matplotlib.figure import Figure
 
+from .. import console
 from ..certify.certificate import Examination
 from ..errors import InputError
 from ..model.argument_checks import require_kind, require_path
@@ -22,8 +23,7 @@ from ..results import ResultFolder
 from ..results.contact_parts import contact_parts
 from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
-from ..runtime import log, terminal
-from ..runtime.terminal import percent
+from ..runtime import log
 from ..solvers.method import SolveResult
 from ..typing import Array
 from ..workflow import Solution
@@ -185,21 +185,5 @@ class ModelSolution(Solution):
         way = self.solvability.direction
         return f"nothing was solved: {self.reason}" + (f" ({way.name})" if way else "")
 
-    def _rows(self) -> list[tuple[str, str]]:
-        """What is said of it at a glance."""
-        unit = "J/m" if self.problem.scales.dimension == 2 else "J"
-        rows = [("result", self.reason), ("existence", self.solvability.state), ("unknowns", f"{self.dofs:,}")]
-        if self.examination is not None:
-            rows += [("energy", f"{self.energy:.10g} {unit}"), ("certificate", str(self.certificate))]
-        if self.obstacle is not None:
-            rows.append((f"obstacle of {self.obstacle.part}", str(self.obstacle)))
-        if self.estimate is not None:
-            part = self.estimate.total / (self.estimate.energy_norm or 1.0)
-            rows.append(("estimated error", f"{percent(part)} in the energy norm"))
-        return rows + [("warning", warning) for warning in self.warnings]
-
     def __repr__(self) -> str:
-        return "\n".join(f"{name}: {text}" for name, text in self._rows())
-
-    def _repr_html_(self) -> str:
-        return terminal.html_table(self._rows())
+        return "\n".join([*console.outcome(self), *console.warnings(self.warnings)])

@@ -14,11 +14,10 @@ from ..errors import InputError
 from ..load_paths import last_borne
 from ..mesh.domain import Domain
 from ..model import Model, is_portable
-from ..model.argument_checks import require_kind, require_switch
+from ..model.argument_checks import require_switch
 from ..paths.load_path import LoadPath
 from ..problem import spaces
 from ..runtime.log import newton_step
-from ..runtime.timing import Timer
 from ..solvers.context import Progress
 from ..system import petsc_options
 from ..workflow import DEFAULT, Preparation, Solution, Thresholds
@@ -37,7 +36,6 @@ def solve(
     comm: MPI.Comm | None = None,
     *,
     progress: Progress = newton_step,
-    timer: Timer | None = None,
     thresholds: Thresholds = DEFAULT,
     start: ModelSolution | str | Sequence[Any] | None = None,
     estimate: bool = True,
@@ -51,7 +49,6 @@ def solve(
         model: what to solve.
         comm: the ranks, if the model is a scene file; by default all. A body from Python has its own.
         progress: called at each Newton step; by default it is logged.
-        timer: where time goes; by default a new one.
         thresholds: the numbers that tune the run.
         start: where to begin: the solution of another model of the same body, such as that of the last load; or what
             ``[solver]`` may have.
@@ -69,7 +66,7 @@ def solve(
     known = start if isinstance(start, ModelSolution) else None
     if known is None and start is not None:
         options["start"] = start
-    prepared = check(model, comm, timer=timer, thresholds=thresholds, **options)
+    prepared = check(model, comm, thresholds=thresholds, **options)
     first = None if known is None else _displacement(known, prepared)
     with petsc_options.chosen(petsc or {}, petsc_prefix):
         found = workflow.find_solution(prepared, progress, start=first)
@@ -84,7 +81,6 @@ def check(
     model: Model,
     comm: MPI.Comm | None = None,
     *,
-    timer: Timer | None = None,
     thresholds: Thresholds = DEFAULT,
     **options: Any,
 ) -> ModelPreparation:
@@ -93,23 +89,16 @@ def check(
     Args:
         model: what to check.
         comm: the ranks, if the model is a scene file; by default all. A body from Python has its own.
-        timer: where time goes; by default a new one.
         thresholds: the numbers that tune the run.
         **options: the keys of the scene's table ``[solver]``.
 
     Raises:
         InputError: on all ranks alike: an option is not allowed, or the model does not fit its mesh.
     """
-    require_kind("timer", timer, (Timer, type(None)), "a Timer of hvi_fenicsx.runtime.timing, or None")
     ranks = ranks_of(model, comm)
     domain = None if model.from_file else _domain(model)
     model = _with_options(model, options)
-    try:
-        prepared = workflow.prepare(model, ranks, timer, domain, thresholds=thresholds)
-    except InputError as error:
-        error.args = (model.in_words(str(error)),)  # it stays what it is, on which ranks
-        raise
-    return ModelPreparation(**fields_of(prepared))
+    return ModelPreparation(**fields_of(workflow.prepare(model, ranks, domain=domain, thresholds=thresholds)))
 
 
 def _check_arguments(progress: Any, estimate: Any) -> None:

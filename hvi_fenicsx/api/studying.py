@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from html import escape
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,40 +18,8 @@ from ..model.argument_checks import require_path
 from ..results.output_folder import existing
 from ..study import plan as study_plan
 from ..study.conduct import conduct
-from ..study.table import Row
+from ..study.table import Study
 from .solving import ranks_of
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class ModelStudy:
-    """What accuracy costs in time; the same on all ranks.
-
-    Attributes:
-        rows: the points, cheapest mesh first.
-        sentences: what they say.
-        uncertainty: how far the reference may be from the truth, relative, by quantity; None where it is not known.
-    """
-
-    rows: tuple[Row, ...]
-    sentences: tuple[str, ...]
-    uncertainty: Mapping[str, float | None]
-
-    def __repr__(self) -> str:
-        return "\n".join(self.sentences)
-
-    def _repr_html_(self) -> str:
-        head = "".join(f"<th>{name}</th>" for name in ("point", "unknowns", "s", "error, energy norm"))
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _cells(row)) + "</tr>" for row in self.rows
-        )
-        return f"<p>{escape(' '.join(self.sentences))}</p><table><tr>{head}</tr>{rows}</table>"
-
-
-def _cells(row: Row) -> Iterator[str]:
-    yield row.text
-    yield "" if row.dofs is None else f"{row.dofs:,}"
-    yield "" if row.seconds is None else f"{row.seconds:.3g}"
-    yield f"{error:.2g}" if (error := row.error("energy_norm")) is not None else row.reason
 
 
 def study(
@@ -64,7 +30,7 @@ def study(
     repeats: int = 3,
     force: bool = False,
     **axes: Sequence[Any],
-) -> ModelStudy:
+) -> Study:
     """Solve a model along several axes, and compare each solution with a reference. Collective.
 
     The points are solved in this program, one after the other.
@@ -88,36 +54,19 @@ def study(
     if folder is not None:
         require_path("folder", folder)
     ranks = ranks_of(model, comm)
-    _check_repeats(repeats)
-    with _in_python_words():
-        plan = study_plan.make(_on_its_mesh(model), [_axis(name, values) for name, values in axes.items()])
+    if isinstance(repeats, bool) or not isinstance(repeats, int | np.integer) or repeats < 1:
+        raise InputError(f"study: repeats must be a whole number, 1 or more (is {repeats!r})")
+    plan = study_plan.make(_on_its_mesh(model), [_axis(name, values) for name, values in axes.items()])
     found, _ = conduct(
         plan, ranks, None if folder is None else Path(folder), repeats=repeats, existing=existing(force=force)
     )
-    return ModelStudy(
-        rows=found.rows,
-        sentences=tuple(found.sentences()),
-        uncertainty={name: known.error for name, known in found.certain.items()},
-    )
-
-
-def _check_repeats(given: Any) -> None:
-    if isinstance(given, bool) or not isinstance(given, int | np.integer) or given < 1:
-        raise InputError(f"study: repeats must be a whole number, 1 or more (is {given!r}); 1 solves each point once")
+    return found
 
 
 def _axis(name: str, values: Any) -> tuple[str, tuple[str, ...]]:
     if isinstance(values, str) or not isinstance(values, Sequence):
         raise InputError(f"study: {name} is {values!r}; give a list of values")
     return study_plan.read_axis(f"{name}={','.join(map(str, values))}")
-
-
-@contextmanager
-def _in_python_words() -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise InputError(str(error).replace("--axis ", "study: ")) from None
 
 
 def _on_its_mesh(model: Model) -> Model:

@@ -16,7 +16,6 @@ from mpi4py import MPI
 from ..problem import references
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
-from ..runtime import terminal
 from ..runtime.mpi import largest, total
 from ..typing import Array
 from . import balance, contact_state
@@ -80,10 +79,6 @@ class Certificate:
             f"tension {self.tension:.1e}, complementarity {self.complementarity:.1e}, inclusion {self.inclusion:.1e}"
             f"{mixity}; {self.second_order}"
         )
-
-    def _repr_html_(self) -> str:
-        values = [(name, value) for name, value in self.as_dict().items() if value is not None]
-        return terminal.html_table((n.replace("_", " "), f"{v:.1e}" if type(v) is float else str(v)) for n, v in values)
 
     def __repr__(self) -> str:
         return f"Certificate({'passed' if self.passed else 'not passed'} at {self.tolerance:g}: {self})"

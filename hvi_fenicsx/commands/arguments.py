@@ -18,17 +18,6 @@ class _Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see `{self.prog} --help`")
 
 
-class _RunHelp(argparse.HelpFormatter):
-    """Lists the quantities, which are looked up when the help is printed: other commands need not wait for them."""
-
-    def _get_help_string(self, action: argparse.Action) -> str | None:
-        if action.dest != "quantity":
-            return super()._get_help_string(action)
-        from ..accuracy import quantities
-
-        return f"{action.help}; one of {', '.join(quantities.names())}, or a plugin's own"
-
-
 def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     main_parser = _Parser(
@@ -37,7 +26,7 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 certified, 2 bad input, 3 no solution exists, 4 not converged, 130 interrupted.",
     )
     commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    _add_run_options(_add(commands, "run", "solve a scene; results go to results/SCENE or --out", _RunHelp))
+    _add_run_options(_add(commands, "run", "solve a scene; results go to results/SCENE or --out"))
     _add_path_options(
         _add(commands, "path", "follow the equilibria of a scene over its load, through peak and unloading")
     )
@@ -49,10 +38,8 @@ def parser() -> argparse.ArgumentParser:
     return main_parser
 
 
-def _add(
-    commands: Any, name: str, text: str, formatter: type[argparse.HelpFormatter] = argparse.HelpFormatter
-) -> argparse.ArgumentParser:
-    return commands.add_parser(name, help=text, description=text, formatter_class=formatter)
+def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
+    return commands.add_parser(name, help=text, description=text)
 
 
 def _add_scene_options(command: argparse.ArgumentParser) -> None:
@@ -94,7 +81,7 @@ def _add_run_options(run: argparse.ArgumentParser) -> None:
         metavar="REL",
         help="choose mesh, ε and tolerances so that the relative error is below REL, like 1e-2",
     )
-    run.add_argument("--quantity", metavar="NAME", help="the quantity whose error --accuracy bounds, by default energy")
+    run.add_argument("--quantity", metavar="NAME", help="whose error --accuracy bounds, by default energy")
     run.add_argument("--no-report", action="store_true", help="write no report.html")
     _add_solve_options(
         run, "result; else results/SCENE", resume="keep a finished result of the same scene, else run it"

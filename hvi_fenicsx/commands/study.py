@@ -45,7 +45,7 @@ def execute(options: argparse.Namespace) -> int:
             interrupted=interrupt.requested,
         )
         told = [f"warning: {text}" for text in warnings]
-        say([*_heading(study), *study.sentences(), *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
+        say([*_heading(study), *study.sentences, *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
     return ExitCode.CERTIFIED
 
 

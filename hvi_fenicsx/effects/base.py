@@ -245,8 +245,7 @@ class Effect(Table):
             text: what is wrong.
             where: the place.
         """
-        lines = text.replace('write "free"', "write None").splitlines()
-        return InputError("\n".join(f"{cls.__name__} on {in_words(where)}: {line}" for line in lines))
+        return InputError("\n".join(f"{cls.__name__} on {in_words(where)}: {line}" for line in text.splitlines()))
 
     def fitted(self, dimension: int) -> Self:
         """Itself in a space of 2 or 3 dimensions: what a program has left open is filled in."""

@@ -15,7 +15,7 @@ from typing_extensions import override
 from ..formula import Formula, SpatialValue
 from ..schema import refusal
 from ..typing import Array
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python, names_in_python
+from .base import Drive, Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python
 from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
 from .obstacles import NonzeroVector, Obstacle, ObstacleField, ObstacleGap, unit
 from .values import FormulaField, Value, as_value, require_components
@@ -95,9 +95,6 @@ class Contact(Effect):
         obstacle: tuple[Sequence[float], Sequence[float]] | Mapping[str, Any] | None = None,
         direction: Sequence[float] | None = None,
     ) -> None:
-        if (isinstance(obstacle, tuple | list) and len(obstacle) != 2) or isinstance(obstacle, int | float | str):
-            text = f"obstacle: give a point and a normal, ([0, 0], [0, 1]), or a table, not {obstacle!r}"
-            raise self.refused(text, names_in_python(side))
         ways = {"gap": gap, "lower": lower, "upper": upper, "obstacle": obstacle}
         given = {key: value for key, value in ways.items() if value is not None} or {"gap": 0.0}
         self._make(side, **given, direction=direction)

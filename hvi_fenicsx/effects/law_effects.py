@@ -24,8 +24,8 @@ from .. import laws
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..laws import Mixity, mixities
-from ..schema import Mistake, OneOf, refusal, validation_error
-from .base import Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python, names_in_python
+from ..schema import Mistake, OneOf, refusal, shown, validation_error
+from .base import Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python
 from .contribution import ONE, BoundaryLaw, Contribution, Direction
 from .values import FormulaField, Value
 
@@ -35,7 +35,7 @@ def _law(value: Any) -> laws.Superpotential:
     if isinstance(value, laws.Superpotential):
         return value
     if not isinstance(value, dict):
-        raise refusal('must be a table, like { law = "name", ... }')
+        raise refusal(f'must be a table, like {{ law = "name", ... }}, or a law as an object (is {shown(value)})')
     parameters = dict(value)
     name = parameters.pop("law", None)
     if not isinstance(name, str):
@@ -73,12 +73,6 @@ def _positive(value: SpatialValue) -> SpatialValue:
 Multiplier = Annotated[FormulaField, AfterValidator(_positive)]
 
 
-def _lowest_traction(law: laws.Superpotential) -> float:
-    """The smallest traction at the kinks and on the way to four times the typical displacement, N/m²."""
-    x = np.concatenate([law.kinks[law.kinks > 0.0], np.linspace(0.0, 4.0, 65)[1:] * law.length_scale])
-    return float(np.min([law.left(x), law.right(x)]))
-
-
 class LawEffect(Effect):
     """A law that acts on one displacement of a boundary part.
 
@@ -102,13 +96,7 @@ class LawEffect(Effect):
     def __init__(
         self, side: Sides, law: laws.Superpotential, *, multiplier: Value = 1.0, length_multiplier: Value = 1.0
     ) -> None:
-        self._make_law(side, law, multiplier=multiplier, length_multiplier=length_multiplier)
-
-    def _make_law(self, side: Sides, law: Any, **keys: Any) -> None:
-        if not isinstance(law, laws.Superpotential):
-            text = f"law: give a law as an object, such as hvi.laws.Graph(points), not {law!r}"
-            raise self.refused(text, names_in_python(side))
-        self._make(side, law=law, **keys)
+        self._make(side, law=law, multiplier=multiplier, length_multiplier=length_multiplier)
 
     @model_validator(mode="before")
     @classmethod
@@ -137,13 +125,10 @@ class LawEffect(Effect):
     @override
     def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:
         """A traction that is negative somewhere: it pushes the body on."""
-        lowest = _lowest_traction(self.law)
-        if lowest >= -1e-9 * self.law.traction_scale:
+        if self.law.c4 <= 1e-9 * self.law.traction_scale:
             return ()
-        return (
-            f"the law's traction falls to {lowest:.3g} N/m² at a positive displacement, where it does not resist but "
-            "pushes the body on; is a sign wrong?",
-        )
+        text = f"the law's traction falls to {-self.law.c4:.3g} N/m² at a displacement, where it does not resist but"
+        return (f"{text} pushes the body on; is a sign wrong?",)
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
@@ -211,12 +196,8 @@ class Cohesion(LawEffect):
         multiplier: Value = 1.0,
         length_multiplier: Value = 1.0,
     ) -> None:
-        if mixity is not None and not isinstance(mixity, Mixity):
-            text = f"mixity: give a criterion, such as hvi.laws.PowerLaw(...), or None, not {mixity!r}"
-            raise self.refused(text, names_in_python(side))
-        keys = {} if mixity is None else {"mixity": mixity.name, **asdict(mixity)}
-        multipliers = {"multiplier": multiplier, "length_multiplier": length_multiplier}
-        self._make_law(side, law, beta=beta, **multipliers, **keys)
+        keys = {"mixity": mixity.name, **asdict(mixity)} if isinstance(mixity, Mixity) else {"mixity": mixity}
+        self._make(side, law=law, beta=beta, multiplier=multiplier, length_multiplier=length_multiplier, **keys)
 
     @model_validator(mode="after")
     def _whole(self) -> Self:

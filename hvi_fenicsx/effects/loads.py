@@ -24,7 +24,6 @@ from .base import (
     Sizes,
     SurfaceLoad,
     from_python,
-    names_in_python,
     part_of,
 )
 from .contribution import Condition, Contribution
@@ -102,7 +101,7 @@ def _component(value: Any) -> Any:
     try:
         return as_value(value)
     except PydanticCustomError as error:
-        raise refusal(f'{error.message()}; or write "free" to leave the component alone') from None
+        raise refusal(f'{error.message()}; or write "free" (None from Python) to leave the component alone') from None
 
 
 Component = Annotated[
@@ -125,9 +124,6 @@ class Displacement(Listed):
 
     @from_python
     def __init__(self, side: Sides, values: Vector) -> None:
-        if isinstance(values, Sequence) and any(isinstance(value, str) and value == "free" for value in values):
-            where, text = names_in_python(side), 'write None in place of "free", the word of scene files'
-            raise self.refused(text, where)
         self._make(side, values=values)
 
     @override
@@ -189,15 +185,15 @@ class _Total(Listed):
 
     @override
     @classmethod
-    def _entries(cls, data: Any) -> tuple[Any, ...]:
-        numbers = tuple(data) if isinstance(data, list | tuple) else (data,)
+    def _read(cls, data: Any) -> Any:
+        numbers = data if isinstance(data, list | tuple) else (data,)
         if not all(isinstance(n, int | float) and not isinstance(n, bool) for n in numbers):
             raise refusal("is the sum over the part: numbers only; for a load that varies use traction")
         return tuple(map(float, numbers))
 
     @model_serializer(mode="wrap")
-    def _as_numbers(self, handler: SerializerFunctionWrapHandler) -> Any:
-        found = list(handler(self)["values"])
+    def _as_bare(self, handler: SerializerFunctionWrapHandler) -> Any:
+        found = handler(self)["values"]
         return found[0] if len(found) == 1 else found
 
 

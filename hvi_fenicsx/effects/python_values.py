@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -38,10 +39,9 @@ class PythonFunction(SpatialValue):
     @override
     def at(self, points: Array) -> Array:
         values = np.asarray(self._function(np.ascontiguousarray(points.T)))
-        if values.dtype.kind not in "iuf":
-            raise InputError(f"{self.source}: returns {values.dtype} values; return real numbers")
-        if values.shape not in ((), (len(points),)):
-            raise InputError(f"{self.source}: returns an array {values.shape} at {len(points)} points; return (n,)")
+        if values.dtype.kind not in "iuf" or values.shape not in ((), (len(points),)):
+            text = f"returns {values.dtype} values {values.shape} at {len(points)} points; return real numbers, (n,)"
+            raise InputError(f"{self.source}: {text}")
         return np.broadcast_to(values, (len(points),)).astype(np.float64)
 
     @override
@@ -68,7 +68,7 @@ class Expression(SpatialValue):
 
     def __init__(self, expression: Any, mesh: dmesh.Mesh) -> None:
         self._expression, self._mesh = expression, mesh
-        self.source = f"UFL expression {_shortened(str(expression))}"
+        self.source = f"UFL expression {textwrap.shorten(str(expression), 40, placeholder='...')}"
 
     @property
     @override
@@ -143,7 +143,17 @@ class VectorFunction(PythonFunction):
 
     def components(self, count: int) -> tuple[PythonFunction, ...]:
         """Each of ``count`` components."""
-        return tuple(PythonFunction(_component(self._function, i, count)) for i in range(count))
+        return tuple(PythonFunction(self._component(i, count)) for i in range(count))
+
+    def _component(self, i: int, count: int) -> Callable[[Array], Any]:
+        def component(x: Array) -> Any:
+            values = self._function(x)
+            if not isinstance(values, Sequence | np.ndarray) or len(values) != count:
+                raise InputError(f"{self.source}: must return {count} components, ({count}, n)")
+            return values[i]
+
+        component.__name__ = f"{self.source.removeprefix('Python function ')}[{i}]"
+        return component
 
 
 def expression(given: Any) -> SpatialValue:
@@ -185,26 +195,3 @@ def components(given: Any) -> tuple[SpatialValue, ...]:
             f"a vector has a component for each dimension; the UFL expression has the shape {given.ufl_shape}"
         )
     return tuple(expression(given[i]) for i in range(given.ufl_shape[0]))
-
-
-def _component(function: Callable[[Array], Any], i: int, count: int) -> Callable[[Array], Any]:
-    """One of ``count`` components of a function of space."""
-    name = getattr(function, "__name__", type(function).__name__)
-
-    def component(x: Array) -> Any:
-        values = function(x)
-        if not isinstance(values, Sequence | np.ndarray) or len(values) != count:
-            wanted = f"return {count} components, ({count}, n)"
-            raise InputError(f"Python function {name}: returns {_kind(values)}; {wanted}")
-        return values[i]
-
-    component.__name__ = f"{name}[{i}]"
-    return component
-
-
-def _kind(values: Any) -> str:
-    return f"an array {np.shape(values)}" if isinstance(values, np.ndarray) else f"{values!r}"
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= 40 else text[:37] + "..."

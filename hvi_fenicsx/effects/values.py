@@ -66,36 +66,41 @@ def require_components(formulas: tuple[Any, ...], dimension: int, key: str) -> N
         raise InputError(f"{key} has {len(formulas)} components; in {dimension}D it has {dimension}")
 
 
-class OneValue(Effect):
+class Bare(Effect):
+    """An effect of one field, which a scene writes without its name: ``pressure = 1e5``, ``traction = [1e6, 0]``."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_bare(cls, data: Any) -> Any:
+        (name,) = cls.model_fields
+        if isinstance(data, cls):
+            return data
+        return {name: cls._read(data[name] if isinstance(data, dict) and name in data else data)}
+
+    @classmethod
+    def _read(cls, data: Any) -> Any:
+        return data
+
+    @model_serializer(mode="wrap")
+    def _as_bare(self, handler: SerializerFunctionWrapHandler) -> Any:
+        (found,) = handler(self).values()
+        return found
+
+
+class OneValue(Bare):
     """An effect that is one number or formula: ``pressure = 1e5``."""
 
     value: FormulaField
 
-    @model_validator(mode="before")
-    @classmethod
-    def _from_value(cls, data: Any) -> Any:
-        return data if isinstance(data, cls | dict) else {"value": data}
 
-    @model_serializer(mode="wrap")
-    def _as_value(self, handler: SerializerFunctionWrapHandler) -> Any:
-        return handler(self)["value"]
-
-
-class Listed(Effect):
+class Listed(Bare):
     """An effect that is a list, one entry for each component: ``traction = [1e6, 0]``."""
 
     values: tuple[Any, ...]
 
-    @model_validator(mode="before")
+    @override
     @classmethod
-    def _from_list(cls, data: Any) -> Any:
-        if isinstance(data, cls):
-            return data
-        given = data["values"] if isinstance(data, dict) and "values" in data else data
-        return {"values": cls._entries(given)}
-
-    @classmethod
-    def _entries(cls, data: Any) -> tuple[Any, ...]:
+    def _read(cls, data: Any) -> Any:
         if isinstance(data, list | tuple):
             return tuple(data)
         if callable(data) or _is_ufl(data):
@@ -103,10 +108,6 @@ class Listed(Effect):
 
             return python_values.components(data)
         raise refusal("must be a list, one entry for each component, like [1e6, 0.0]")
-
-    @model_serializer(mode="wrap")
-    def _as_list(self, handler: SerializerFunctionWrapHandler) -> Any:
-        return list(handler(self)["values"])
 
     @override
     def fitted(self, dimension: int) -> Self:

@@ -14,7 +14,6 @@ from dolfinx import fem
 
 from ..certify.certificate import Examination
 from ..problem.problem import Problem
-from ..runtime import terminal
 from ..runtime.mpi import total
 from ..system.levels import Levels
 from ..system.system import System
@@ -69,9 +68,6 @@ class Estimate:
         """The numbers by name, nondimensional."""
         names = ("relative", "total", "discretisation", "smoothing", "algebraic", "energy_norm")
         return {name: float(getattr(self, name)) for name in names}
-
-    def _repr_html_(self) -> str:
-        return terminal.html_table((name.replace("_", " "), f"{value:.3g}") for name, value in self.as_dict().items())
 
     def __repr__(self) -> str:
         return f"Estimate({', '.join(f'{name}={value:.3g}' for name, value in self.as_dict().items())})"

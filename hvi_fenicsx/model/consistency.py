@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..laws import smoothing
 from ..mesh.boundary_part import BoundaryPart
 from ..schema import Mistake, shown, unknown
-from .content import Content
+from .content import Content, dotted
 
 _NAME = re.compile(r"\w[\w.-]{0,99}")
 
@@ -95,7 +95,8 @@ def _regions(model: Content) -> Iterator[Mistake]:
             yield Mistake(key, text)
         for region in material.where or ():
             if region in seen:
-                text = f"{shown(region)} has a material already, {model.said(seen[region])}; name it in one of them"
+                other = dotted(model.key(seen[region]))
+                text = f"{shown(region)} has a material already, {other}; name it in one of them"
                 yield Mistake((*key, "region"), text)
             seen[region] = material
     if model.domain.regions is not None:
@@ -157,7 +158,7 @@ def _exclusive(model: Content, items: Iterable[tuple[BoundaryPart, Effect]]) -> 
     for (part, effect), (others, second) in combinations(whole, 2):
         shared = sorted(set(part.on) & set(others.on))
         if effect.key == second.key and effect.exclusive and shared:
-            text = f"{_quoted(shared)} has {effect.key} already, from {model.said(effect)}; give it once"
+            text = f"{_quoted(shared)} has {effect.key} already, from {dotted(model.key(effect))}; give it once"
             yield Mistake(model.key(second), text)
 
 
@@ -166,7 +167,7 @@ def _on_side(model: Content, side: str, effects: list[Effect]) -> Iterator[Mista
     for effect in effects:
         for axis in effect.prescribed():
             if axis in prescribed:
-                text = f'"{side}" has {_axis(axis)} prescribed already, by {model.said(prescribed[axis])}'
+                text = f'"{side}" has {_axis(axis)} prescribed already, by {dotted(model.key(prescribed[axis]))}'
                 yield Mistake(model.key(effect), f'{text}; write "free" in one of them')
             prescribed[axis] = effect
     for effect in effects:
@@ -178,13 +179,13 @@ def _against(model: Content, effect: Effect, side: str, prescribed: Mapping[int,
     normal = model.domain.normals[side] if model.domain.normals else None
     blocking = normal if normal in prescribed else 0 if len(prescribed) == model.dimension else None
     if effect.bounds_normal and blocking is not None:
-        text = f'the displacement normal to "{side}" is prescribed by {model.said(prescribed[blocking])}'
+        text = f'the displacement normal to "{side}" is prescribed by {dotted(model.key(prescribed[blocking]))}'
         yield Mistake(model.key(effect), f'{text}; leave {effect.key} out or write "free" there')
     load = effect.surface_load()
     if load is not None:
         idle = [i for i, formula in enumerate(load.components) if i in prescribed and formula.source != 0.0]
         for axis in idle:
-            reason = f'{_axis(axis)} is prescribed on "{side}" by {model.said(prescribed[axis])}'
+            reason = f'{_axis(axis)} is prescribed on "{side}" by {dotted(model.key(prescribed[axis]))}'
             text = f'component {axis + 1} does nothing: {reason}; write "free" there or 0 here'
             yield Mistake(model.key(effect), text)
 

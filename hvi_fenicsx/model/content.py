@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from ..effects import Effect, Place, in_words
+from ..effects import Effect, Place
 from ..laws import Superpotential
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.shapes import DomainShape
@@ -86,14 +86,6 @@ class Content:
         """
         own = () if effect.place is Place.MATERIAL else (effect.key,)
         return (self.table(effect), effect.name, *own)
-
-    def said(self, effect: Effect) -> str:
-        """An effect as messages name it: by its key in the file, or by its place. Not collective.
-
-        Args:
-            effect: one of the model's.
-        """
-        return dotted(self.key(effect)) if self.from_file else f"{effect.key} on {in_words(effect.where)}"
 
 
 def dotted(key: Keys) -> str:

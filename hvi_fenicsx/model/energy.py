@@ -42,15 +42,13 @@ class Energy(Effect):
     in_files: ClassVar[bool] = False
     term: ClassVar[str] = "a(u, v), a form of the user's own"
 
-    form: Any = Field(exclude=True)
+    form: Callable[..., Any] = Field(exclude=True)
     """makes the form of trial and test function, SI"""
     modulus: float = 0.0
     """the stiffness against stretches, N/m²; known on a mesh"""
 
     @from_python
     def __init__(self, form: Form, region: Sides | None = None) -> None:
-        if not callable(form):
-            raise self.refused(f"give a function that returns the UFL form a(u, v), not {form!r}", None)
         self._make(region, form=form)
 
     @override

@@ -79,7 +79,7 @@ class Model(Content):
         order = list(TABLES)
         self.effects = tuple(sorted(effects, key=lambda e: order.index(self.table(e))))
         if mistakes := consistency.contradictions(self):
-            raise Mistakes(self, mistakes)
+            raise Mistakes(mistakes)
 
     def _placed(self, effect: Effect) -> Effect:
         """An effect of a program on the body's mesh, checked; a refusal names it and its place. Collective."""
@@ -189,24 +189,6 @@ class Model(Content):
             modify = functools.partial(smoothing.create, kind, epsilon=epsilon, epsilon_absolute=absolute)
         return Formulation(self.parts, list(self.acting()), modify, self.body.interfaces, wanted.degree or 1)
 
-    def in_words(self, message: str) -> str:
-        """A message in which keys are effects and their places, if a program made the model. Not collective.
-
-        Args:
-            message: of an error.
-        """
-        if self.from_file:
-            return message
-        words = {}
-        for effect in self.effects:
-            for place in dict.fromkeys((effect.name, *(effect.where or ()))):
-                for table in ("boundary", "interface", "body", "material"):
-                    words[f"{table}.{place}"] = in_words(effect.where)
-                    words[f"{table}.{place}.{effect.key}"] = f"{effect.key} on {in_words(effect.where)}"
-        for key in sorted(words, key=len, reverse=True):
-            message = message.replace(f"{key}.", f"{words[key]}: ").replace(key, words[key])
-        return message.replace('write "free"', "write None")
-
     def tables(self, folder: Path | None = None) -> dict[str, Any]:
         """The tables of the scene file that it is, every default written out. Not collective.
 
@@ -258,14 +240,11 @@ class Mistakes(InputError):
     """What is wrong with a model, each at its place.
 
     Args:
-        model: the model, where there is one.
         found: the mistakes.
     """
 
-    def __init__(self, model: Model | None, found: Sequence[Mistake]) -> None:
-        lines = (": ".join(filter(None, (dotted(m.where), m.text))) for m in found)
-        text = "\n".join(lines)
-        super().__init__(text if model is None else model.in_words(text))
+    def __init__(self, found: Sequence[Mistake]) -> None:
+        super().__init__("\n".join(": ".join(filter(None, (dotted(m.where), m.text))) for m in found))
         self.found = tuple(found)
 
 

@@ -257,16 +257,16 @@ def read_tables(tables: Any, folder: Path | None = None) -> Model:
         Mistakes: with all that is wrong.
     """
     if not isinstance(tables, dict):
-        raise Mistakes(None, [Mistake((), f"must be tables (is {shown(tables)})")])
+        raise Mistakes([Mistake((), f"must be tables (is {shown(tables)})")])
     folder = folder or Path.cwd()
     try:
         loaded = plugins.load(tables["plugins"], folder) if tables.get("plugins") else None
         found = _scene_tables().model_validate(tables, context={"folder": folder})
     except PydanticCustomError as error:
-        raise Mistakes(None, [Mistake(("plugins",), error.message())]) from None
+        raise Mistakes([Mistake(("plugins",), error.message())]) from None
     except ValidationError as error:
         said = error.errors(include_url=False)
-        raise Mistakes(None, [Mistake(_as_written(e["loc"], tables), e["msg"]) for e in said]) from None
+        raise Mistakes([Mistake(_as_written(e["loc"], tables), e["msg"]) for e in said]) from None
     return found.model(loaded)
 
 

@@ -42,7 +42,7 @@ def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> M
     source = _Source.read(Path(path), overrides)
     try:
         if huge := [Mistake(place, _HUGE) for place, value in _places(source.tables) if _is_huge(value)]:
-            raise Mistakes(None, huge)
+            raise Mistakes(huge)
         return read_tables(source.tables, source.file.absolute().parent)
     except Mistakes as error:
         raise InputError(source.listed(error.found)) from None

@@ -8,8 +8,6 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from collections.abc import Iterable
-from html import escape
 from typing import TextIO
 
 _STANDARD = 2
@@ -78,13 +76,3 @@ def percent(share: float) -> str:
         share: of one; from about 1e-6 on.
     """
     return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{100.0 * share:.2g} %"
-
-
-def html_table(rows: Iterable[tuple[str, str]]) -> str:
-    """Rows of a name and a text as HTML.
-
-    Args:
-        rows: plain texts.
-    """
-    cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
-    return f"<table>{cells}</table>"

@@ -111,7 +111,7 @@ class Row:
         return self.errors[quantity] if self.converged and self.errors else None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Study:
     """A finished study.
 
@@ -184,9 +184,18 @@ class Study:
         part, bare = (self.own.epsilon_part or {}).get(quantity), self.exact.error(quantity)
         return None if part is None or bare is None or part + bare == 0.0 else part / (part + bare)
 
-    def sentences(self) -> list[str]:
+    @property
+    def sentences(self) -> tuple[str, ...]:
         """What the study says in words that a person can act on."""
-        return [*_sentences(self)]
+        return tuple(_sentences(self))
+
+    @property
+    def uncertainty(self) -> dict[str, float | None]:
+        """How far the reference may be from the truth, relative, by quantity; None where it is not known."""
+        return {name: known.error for name, known in self.certain.items()}
+
+    def __repr__(self) -> str:
+        return "\n".join(self.sentences)
 
     def as_data(self) -> dict[str, Any]:
         """All of ``study.json`` (docs/study.md)."""
@@ -194,7 +203,7 @@ class Study:
             "scene": self.title,
             "version": __version__,
             "ranks": self.ranks,
-            "sentences": self.sentences(),
+            "sentences": self.sentences,
             "quantities": {key: description for key, (description, _) in NORMS.items()},
             "headlines": self.headlines(),
             "own": self.own.point,

@@ -44,7 +44,7 @@ MISTAKEN = {
     ),
     "a law of the wrong sign": (
         lambda: model(friction={"law": "graph", "points": [[0, 0], [1e-5, 1e6], [2e-5, -1e6]]}),
-        "falls to -1e+06 N/m² at a positive displacement",
+        "falls to -1e+06 N/m² at a displacement",
     ),
     "a load in MPa": (lambda: block(2, 1.0, friction=LAW), "the load may be multiplied by 1.0e+06 at most"),
     "a wide smoothing": (

@@ -313,15 +313,12 @@ def test_a_body_that_escapes_has_no_displacement_and_says_so(body: hvi.Body) -> 
 
 
 def test_it_is_short_to_read_and_can_be_seen(found: hvi.Solution) -> None:
-    assert len(repr(found)) < 1000
+    assert repr(found).startswith("result: certified")
     assert repr(found.certificate).startswith("Certificate(passed at 1e-08: equilibrium ")
     assert repr(found.estimate).startswith("Estimate(relative=0.")
     prepared = repr(hvi.check(steel_square())).splitlines()
     assert prepared[0] == "untitled: 162 unknowns on 1 rank"
     assert prepared[1].startswith("existence: held")
-    assert found._repr_html_().startswith("<table><tr><th>result</th><td>certified</td></tr>")
-    assert "<tr><th>passed</th><td>True</td></tr>" in found.certificate._repr_html_()
-    assert f"<td>{found.estimate.relative:.3g}</td>" in found.estimate._repr_html_()
     with pytest.raises(KeyError, match="no contact and no law acts on 'wall'; there are: floor"):
         found.contact["wall"]
     figure = found.plot("stress")

@@ -166,11 +166,11 @@ def test_the_front_holds_what_nothing_cheaper_is_as_accurate_as() -> None:
 
 def test_a_sentence_names_the_cheapest_setting_for_each_accuracy() -> None:
     pairs = [(0.1, 0.05), (0.2, 0.004), (0.3, 0.006), (0.4, 0.002)]
-    words = "\n".join(study_of(pairs).sentences())
+    words = "\n".join(study_of(pairs).sentences)
     assert "10 % for 0.1 s" in words
     assert "1 % for 0.2 s" in words
     assert "0.1 % is not reached here: the best is 0.2 % for 0.4 s" in words
-    unsure = "\n".join(study_of(pairs, 0.02).sentences())
+    unsure = "\n".join(study_of(pairs, 0.02).sentences)
     assert "1 % cannot be claimed: the reference itself is uncertain by 2 %" in unsure
 
 
@@ -188,4 +188,4 @@ def test_the_share_of_epsilon_is_that_of_its_distance_from_the_exact_law() -> No
         [(0.1, 0.5), (0.1, 0.01)], smoothing=("paper", None), epsilon=(1.0, None), epsilon_part=(part, None)
     )
     assert study.share_of_epsilon("friction_l1") == pytest.approx(0.98)
-    assert "98 % of it by ε" in study.sentences()[0]
+    assert "98 % of it by ε" in study.sentences[0]
