@@ -20,6 +20,7 @@ from ..typing import Array
 from .branch import Move, Outcome, Passage, Refused
 from .events import Arc, Events, displacement_rate, driven_work
 from .passages import Crossing
+from .equations import Place
 from .relations import ContactPoints
 from .state import Position
 
@@ -232,12 +233,20 @@ class Curve(Events):
     def _settle_at(self, y: Array) -> None:
         self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
 
+    def _turns_back(self, after: Place) -> bool:
+        """Whether the tangent there leads back, in units of the laws: a long spring beside them hides a fold between."""
+        way = (after.values.s - self.here.values.s) / self.points.reach(after.values)
+        rates = self.points.rates(after.y[:-1], after.tangent[:-1]) / self.points.reach(after.values)
+        return float(way @ rates) < 0.0
+
     def _checked(self, move: Arc, way: float) -> Arc:
         """The step, if it did not leave the curve."""
         if not self.points.bent:
             return move
         short = way < 1e-7
         if not short and float(self.here.tangent @ move.after.tangent) < self.limits.least_turn:
+            raise Refused
+        if not short and self._turns_back(move.after):
             raise Refused
         disagreement = self.disagreement(move)
         if not short and disagreement > 1.0:
