@@ -18,9 +18,9 @@ from typing_extensions import override
 
 from ..typing import Array
 from .branch import Move, Outcome, Passage, Refused
+from .equations import Place
 from .events import Arc, Events, displacement_rate, driven_work
 from .passages import Crossing
-from .equations import Place
 from .relations import ContactPoints
 from .state import Position
 
@@ -234,7 +234,7 @@ class Curve(Events):
         self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
 
     def _turns_back(self, after: Place) -> bool:
-        """Whether the tangent there leads back, in units of the laws: a long spring beside them hides a fold between."""
+        """Whether the tangent there leads back in units of the laws: a long spring beside them hides a fold."""
         way = (after.values.s - self.here.values.s) / self.points.reach(after.values)
         rates = self.points.rates(after.y[:-1], after.tangent[:-1]) / self.points.reach(after.values)
         return float(way @ rates) < 0.0
