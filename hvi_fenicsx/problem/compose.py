@@ -150,7 +150,7 @@ def _problem(
     constraints.check_contradictions(context, scales, bounds, thresholds)
     part_laws.check_laws(contributions)
     part_laws.check_moved(context.domain.mesh.comm, contributions, surfaces, thresholds)
-    terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify, gaps)
+    terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(
         domain=context.domain,

@@ -1,18 +1,13 @@
-"""A superpotential at the vertices of Γc, and the UFL boundary term through which it enters the equations.
+"""A superpotential at the vertices of Γc: its nodal forces and their tangent, by vertex quadrature.
 
-The regularised (or selected) Clarke derivative is a P1 field τ on Γc; its weak form ∫ τ·v ds, with vertex quadrature,
-is compiled once and serves every law. The tangent ∫ (K du)·v ds is then block-diagonal.
+The regularised (or selected) Clarke derivative is known at the vertices; the tangent is block-diagonal.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from dolfinx import fem
-from dolfinx.fem.petsc import assemble_vector
-from petsc4py import PETSc
 
 from ..effects import Direction
 from ..laws import Length, Mixity, Superpotential
@@ -37,8 +32,6 @@ class LawTerm:
         directions: unit vectors that the displacement is multiplied with, (m, k, d).
         length: what the law acts on is this length of the k components; None: the signed component, k = 1.
         free: 1 where a component is not prescribed, (m, d).
-        density: the P1 field τ.
-        residual: the compiled form ∫ τ·v ds; None where no quadrature of the functions lumps it.
         mixity: how the energy of separation depends on the mode; None: it does not.
         energies: by what the law is multiplied where it does, frozen at a state: changed by :meth:`freeze`, (m,).
     """
@@ -52,8 +45,6 @@ class LawTerm:
     directions: Array
     length: Length | None
     free: Array
-    density: fem.Function
-    residual: Any | None
     mixity: Mixity | None
     energies: Array
 
@@ -145,34 +136,15 @@ class LawTerm:
             return np.ones(components.shape, dtype=bool)
         return self.length.counts_at_zero(components, near)
 
-    def add_force(self, out: PETSc.Vec, u: Array, derivative: Array) -> None:
-        """Add the law's nodal forces to a vector, whose ghosts are to be added to their owners. Collective.
-
-        Args:
-            out: a vector with ghosts.
-            u: the displacement, a local array.
-            derivative: of the law at u, (m,).
-        """
-        if self.residual is not None:
-            self.set_traction(u, derivative)
-            assemble_vector(out, self.residual)
-            return
-        force = self.weights[:, None] * self._vector(u, derivative) * self.free
-        out.array.reshape(-1, force.shape[1])[self.surface.blocks] += force
-
-    def set_traction(self, u: Array, derivative: Array) -> None:
-        """Write τ into ``density``; ghosts are updated. Collective.
+    def force(self, u: Array, derivative: Array) -> Array:
+        """The law's nodal forces, by vertex quadrature, (m, d).
 
         Args:
             u: the displacement, a local array.
             derivative: of j at u, (m,).
         """
-        tau = self.multiplier[:, None] * self._vector(u, derivative) * self.free
-        self.density.x.array.reshape(-1, tau.shape[1])[self.surface.blocks] = tau
-        self.density.x.scatter_forward()
-
-    def _vector(self, u: Array, derivative: Array) -> Array:
-        return np.einsum("mk,mkd->md", self.gradient(self.slip(u)) * derivative[:, None], self.directions)
+        along = self.gradient(self.slip(u)) * (self.weights * derivative)[:, None]
+        return np.asarray(np.einsum("mk,mkd->md", along, self.directions) * self.free)
 
     def rate(self, u: Array, derivative: Array, second: Array) -> Array:
         """The tangent K of j', (m, d, d): times the weights it is that of the forces.

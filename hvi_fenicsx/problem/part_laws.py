@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-import ufl
-from dolfinx import fem
 from mpi4py import MPI
 
 from ..effects import BoundaryLaw
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..laws import Superpotential
-from ..mesh import nodes
-from ..runtime import forms
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from .contact_surface import Surface
-from .domain_forms import DomainForms, ScaledMeasure
+from .domain_forms import DomainForms
 from .law_term import LawTerm
 from .problem import PlacedContribution
 from .scaling import Scales
-from .spaces import contact_rule
 from .thresholds import DEFAULT, CompositionThresholds
 
 Modification = Callable[[Superpotential], Superpotential]
@@ -93,7 +88,6 @@ def make_terms(
     contributions: Sequence[PlacedContribution],
     fixed: Entities,
     modify: Modification,
-    interfaces: Collection[str],
 ) -> tuple[LawTerm, ...]:
     """The laws at the vertices of their parts. Collective.
 
@@ -104,17 +98,12 @@ def make_terms(
         contributions: of all effects.
         fixed: local scalar dofs that are prescribed.
         modify: the law that is solved in the place of each law.
-        interfaces: names of interfaces, whose weights are no vertex rule.
 
     Raises:
         InputError: on all ranks alike: a law that cannot be solved in 3D.
     """
     laws = [(surfaces[w], e.key, law) for w, e, c in contributions if w is not None for law in c.laws]
-    by_rule = nodes.degree(context.space) == 1
-    return tuple(
-        _term(context, surface, key, law, modify, scales, fixed, by_rule=by_rule and surface.part not in interfaces)
-        for surface, key, law in laws
-    )
+    return tuple(_term(context, surface, key, law, modify, scales, fixed) for surface, key, law in laws)
 
 
 def _term(
@@ -125,10 +114,8 @@ def _term(
     modify: Modification,
     scales: Scales,
     fixed: Entities,
-    *,
-    by_rule: bool,
 ) -> LawTerm:
-    """A law of an effect (its key) on a part; by a rule of quadrature where one lumps the functions. Collective."""
+    """A law of an effect (its key) on a part. Collective."""
     length = law.direction.length(where.tangents.shape[1], law.slip)
     solved, exact = (_scaled(j, scales, f"boundary.{where.part}.{key}", law.slip) for j in (modify(law.law), law.law))
     if length is not None and np.any(solved.convex.kinks > 0):
@@ -136,7 +123,6 @@ def _term(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
             "ring that bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
-    density = _density(context)
     return LawTerm(
         surface=where,
         direction=law.direction,
@@ -147,8 +133,6 @@ def _term(
         directions=law.direction.along(where.normals, where.tangents),
         length=length,
         free=(~np.isin(where.dofs, fixed)).astype(np.float64),
-        density=density,
-        residual=_residual(context, where, density) if by_rule and law.mixity is None else None,
         mixity=law.mixity,
         energies=np.ones(len(where.weights)),
     )
@@ -200,20 +184,3 @@ def _scaled(
     except InputError as error:
         units = f"beside displacements of {scales.displacement:.0e} m and stresses of {scales.stress:.0e} N/m²"
         raise InputError(f"{place}: {units} it cannot be computed with: {error}") from None
-
-
-def _density(context: DomainForms) -> fem.Function:
-    """Room for the tractions of any law, which are written before each use. Collective."""
-    name = f"tractions of degree {nodes.degree(context.space)}"
-    return context.domain.once(name, None, lambda: fem.Function(context.space, name="clarke_derivative"))
-
-
-def _residual(context: DomainForms, where: Surface, density: fem.Function) -> fem.Form:
-    """The compiled form ∫ density·v ds over a part, nondimensional. Collective."""
-
-    def make() -> fem.Form:
-        area = context.number(context.length ** (1 - context.dimension))
-        measure = ScaledMeasure(area, context.boundary(where.part, **contact_rule(context.space)))
-        return forms.compiled(ufl.inner(density, context.test) * measure)
-
-    return context.domain.once(f"forces of laws on {where.part}", where.facets.tobytes(), make)

@@ -77,17 +77,15 @@ class Equations:
 
         Args:
             x: the unknowns u.
-            out: where it is written; must have ghosts.
+            out: where it is written.
             models: what takes the place of the laws, by term.
         """
         self._jacobian.elastic_product(self.from_base(x), out)
         out.array[:] += self.base.residual
-        with out.localForm() as local:
-            local.array_w[out.local_size :] = 0.0
+        u, forces = x.array_r, out.array
         for term, model in zip(self._terms, models, strict=True):
-            u = x.array_r
-            term.add_force(out, u, model.derivative(term.argument(u)))
-        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+            force = term.force(u, model.derivative(term.argument(u)))
+            forces.reshape(-1, force.shape[1])[term.surface.blocks] += force
 
     def at_contact(self, x: PETSc.Vec) -> Array:
         """The rows of A u - b at the vertices of Γc, (m d,). Collective.

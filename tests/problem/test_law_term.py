@@ -34,14 +34,15 @@ def in_the_plane() -> Table:
 @pytest.mark.parametrize("scene", [in_the_plane, in_space])
 def test_the_tangent_is_the_derivative_of_the_traction(scene: Callable[[], Table]) -> None:
     """By central differences at random slips; a prescribed component neither feels the law nor moves it."""
-    (term,) = prepare(read_tables(scene())).problem.terms
+    problem = prepare(read_tables(scene())).problem
+    (term,) = problem.terms
     random = np.random.default_rng(4)
     d = term.free.shape[1]
-    u = random.normal(size=term.density.x.array.size)
+    u = random.normal(size=problem.points.shape[0] * d)
 
     def traction(at: np.ndarray) -> np.ndarray:
-        term.set_traction(at, term.law.convex.right(term.argument(at)) - term.law.concave.right(term.argument(at)))
-        return np.array(term.density.x.array.reshape(-1, d)[term.surface.blocks])
+        derivative = term.law.convex.right(term.argument(at)) - term.law.concave.right(term.argument(at))
+        return np.asarray(term.force(at, derivative) / term.weights[:, None])
 
     argument = term.argument(u)
     first = term.law.convex.right(argument) - term.law.concave.right(argument)
