@@ -7,21 +7,24 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import basix
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
+from ..certify.contact_state import ContactState
 from ..formula import SpatialValue
 from ..problem import spaces
 from ..problem.elastic_operator import stiffness_tensor
 from ..problem.problem import Bounds, PrescribedComponent, Problem
+from ..runtime.mpi import total
 from ..typing import Array, Entities
 from .bubbles import of_facet, quadrature, shape
-from .contact_facets import ContactFacets, contact_facets
+from .contact_facets import ContactFacets, PartTrace, contact_facets
 from .thresholds import EstimateThresholds
 
 
@@ -252,12 +255,73 @@ def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:
     return np.asarray(np.mean(q - r @ np.linalg.solve(t, np.swapaxes(r, -1, -2)), axis=0))
 
 
-def squares(problem: Problem, bubbles: fem.FunctionSpace, thresholds: EstimateThresholds) -> Array:
+def redistributed(
+    comm: MPI.Comm,
+    on: FacetModes,
+    pushes: Array,
+    gaps: Array,
+    compliance: Array,
+    *,
+    free: bool,
+    thresholds: EstimateThresholds,
+) -> Array:
+    """Pressures p ≥ 0 with w ≤ gap and p (gap - w) = 0, w being what the pushes less p cause, (f, q). Collective.
+
+    Args:
+        comm: the ranks.
+        on: the facets.
+        pushes: pressures that are given, (f, q).
+        gaps: how far the facets are from the obstacle, (f, q).
+        compliance: of the facets along the normal, (f,).
+        free: whether the body may move along the normal.
+        thresholds: how many rounds.
+    """
+    kernel = (on.values.T / (on.degrees + 0.5)) @ on.values * on.weights
+    missing = np.eye(len(on.weights)) - on.values.T @ on.values * on.weights
+    kernel += missing / (on.degrees[-1] + 1.5)
+    within, pressure = gaps / compliance[:, None], pushes.copy()
+    if not free:
+        return _solved(kernel, pushes, within, pressure, 4 * thresholds.coupled_rounds)
+    areas = on.facets.areas[:, None] * on.weights
+    wanted = total(comm, float(np.sum(areas * pushes)))
+    if wanted == 0.0:
+        return pressure
+    reach = (pushes @ kernel.T) * compliance[:, None]
+    low = comm.allreduce(float(np.min(gaps - reach, initial=0.0)), op=MPI.MIN)
+    high = comm.allreduce(float(np.max(gaps, initial=0.0)), op=MPI.MAX)
+    for _ in range(thresholds.gap_shifts):
+        shift = (low + high) / 2
+        pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, thresholds.coupled_rounds)
+        more = total(comm, float(np.sum(areas * pressure))) > wanted
+        low, high = (low, shift) if more else (shift, high)
+    return pressure
+
+
+def _solved(kernel: Array, pushes: Array, within: Array, pressure: Array, sweeps: int) -> Array:
+    """Projected Gauss-Seidel sweeps over the points, all facets at once, (f, q)."""
+    p = pressure.copy()
+    beyond = (pushes - p) @ kernel.T - within
+    for _ in range(sweeps):
+        for i, own in enumerate(np.diag(kernel)):
+            change = np.maximum(beyond[:, i] / own, -p[:, i])
+            p[:, i] += change
+            beyond -= change[:, None] * kernel[:, i]
+    return p
+
+
+_ALONG = 1e-6
+"""Share of a mean normal along an axis from which it has a component there."""
+
+
+def squares(
+    problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState], thresholds: EstimateThresholds
+) -> Array:
     """η_K² of the owned cells that the data within facets add. Collective.
 
     Args:
         problem: what was solved.
         bubbles: the space of bubbles.
+        states: of the parts of Γc at the solution.
         thresholds: how finely the data are sampled.
     """
     found = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
@@ -279,6 +343,8 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, thresholds: EstimateTh
         if varies(part.value):
             on = modes(part.facets)
             np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
+    for obstacle in _obstacles(problem, states, modes, thresholds.near):
+        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(problem, bubbles, obstacle, thresholds))
     return found
 
 
@@ -290,3 +356,65 @@ def _unprescribed(problem: Problem, on: FacetModes, part: PrescribedComponent) -
         rest -= there * shape(index, on.barycentric)
     rest /= problem.scales.displacement
     return on.energies_of_displacements(rest, on.compliance[:, part.component])
+
+
+@dataclass(frozen=True)
+class _Obstacle:
+    """One side's gap of a part with contact, nondimensional.
+
+    Attributes:
+        bounds: of the part.
+        push: pressure of the body against it at the nodes, (m,).
+        gap: distance from it at the nodes, (m,).
+        within: what interpolation between the nodes leaves of the gap at the sample points, (f, q).
+        on: the facets of the part.
+    """
+
+    bounds: Bounds
+    push: Array
+    gap: Array
+    within: Array
+    on: FacetModes
+
+
+def _obstacles(
+    problem: Problem, states: Sequence[ContactState], modes: Callable[[Entities], FacetModes], rounding: float
+) -> Iterator[_Obstacle]:
+    """The sides of the parts with contact whose gap varies within facets by more than rounding. Collective."""
+    for bounds, lower, upper in gaps(problem):
+        state = next(s for s in states if s.surface is bounds.surface)
+        for value, sign, bound in ((lower, -1.0, bounds.upper), (upper, 1.0, -bounds.lower)):
+            if value is None:
+                continue
+            on = modes(bounds.surface.facets)
+            within = np.asarray(-sign * on.beyond_nodes(value) / problem.scales.displacement)
+            if problem.domain.mesh.comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) > rounding:
+                push, gap = sign * state.contact_pressure, bound + sign * state.normal
+                yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
+
+
+def _moved_pressure(
+    problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle, thresholds: EstimateThresholds
+) -> Array:
+    """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
+    surface, on = obstacle.bounds.surface, obstacle.on
+    trace = PartTrace(problem, bubbles, surface, surface.normals[:, None, :], 1)
+    normals = trace.at_nodes(surface.normals).mean(axis=1)
+    compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
+    pushes, gaps = (on.interpolated(trace.at_nodes(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
+    solve = functools.partial(
+        redistributed,
+        comm=problem.domain.mesh.comm,
+        on=on,
+        pushes=pushes,
+        compliance=compliance,
+        free=not _held(problem, surface.normals),
+        thresholds=thresholds,
+    )
+    return on.energies(solve(gaps=gaps + obstacle.within) - solve(gaps=gaps), compliance, lowest=0)
+
+
+def _held(problem: Problem, normals: Array) -> bool:
+    """Whether a prescribed component holds the body against a translation along a part's mean normal. Collective."""
+    mean = [abs(total(problem.domain.mesh.comm, float(along))) for along in normals.sum(axis=0)]
+    return any(mean[part.component] > _ALONG * max(mean) for part in problem.prescribed)

@@ -90,7 +90,7 @@ def estimate(
     inverse = dual_norm.DualNorm(system, levels, u, thresholds)
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
-    cells += data_errors.squares(problem, traces.bubbles, thresholds)
+    cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
     cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse, thresholds)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0

@@ -12,7 +12,7 @@ class EstimateThresholds:
     """How accurately the estimates are computed.
 
     Attributes:
-        near: distance (of u0) from a kink or a bound that counts as being on it.
+        near: distance (of u0) from a kink or a bound that counts as being on it; variation of a gap that is rounding.
         facet_degree: of the quadrature of the laws on a facet, at degree 1 and 2: a drop within an edge is met to a
             fourteenth of its length at degree 1, to a thirty-second at degree 2, whose edges are longer. On the
             intersections of the facets of two bodies, which are smaller, half of it.
@@ -28,7 +28,9 @@ class EstimateThresholds:
             that could hold a motion.
         vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the nodes at each step.
         data_degree: of the modes by which the data on a facet are sampled, in the plane and in space.
-        coupled_rounds: times at most that bubbles and nodes are solved for in turns.
+        gap_shifts: bisections of the body's motion along a normal, where a gap varies within facets.
+        coupled_rounds: times at most that bubbles and nodes are solved for in turns; sweeps over a facet's points for a
+            shift of a gap.
         rounding: nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of
             nothing.
         coupled: error of the bubbles alone, relative to |||u_h|||, from which the nodes are found with them, at degree
@@ -48,6 +50,7 @@ class EstimateThresholds:
     foundation: float = 1e-8
     vertex_tolerance: float = 1e-6
     data_degree: tuple[int, int] = (14, 6)
+    gap_shifts: int = 20
     coupled_rounds: int = 12
     rounding: float = 1e-12
     coupled: tuple[float, float] = (0.3, 0.0)

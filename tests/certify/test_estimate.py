@@ -126,6 +126,8 @@ def test_against_a_mesh_four_times_finer(name: str) -> None:
 
 
 UNSEEN: dict[str, Table] = {
+    "gap": model(4, gap="2e-6*sin(25*x)"),
+    "gap with crests between the vertices": model(4, gap="1e-6*cos(50*x)"),
     "traction": model(4),
     "displacement": model(4),
     "traction on flat cells": waves([2, 8], 25),
