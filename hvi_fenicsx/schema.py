@@ -183,7 +183,7 @@ def _mend(kind: str, value: Any) -> str:
             float(value)
         except ValueError:
             is_formula = re.search(r"\b[xyz]\b", value)
-            return "; no formula can stand here (a law has multiplier and length_multiplier)" if is_formula else ""
+            return "; no formula can stand here" if is_formula else ""
         return "; write it without quotes"
     return ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Protocol
@@ -160,6 +161,7 @@ class BoundaryLaw:
             that it had.
         slip: β, what a slip is multiplied by where it is taken together with an opening.
         mixity: how the energy of separation depends on the mode; None: it does not.
+        contradictions: what keeps formulas in the place of its numbers from being one law at points (n, 3), in words.
     """
 
     direction: Direction
@@ -168,6 +170,7 @@ class BoundaryLaw:
     length_multiplier: SpatialValue = ONE
     slip: float = 1.0
     mixity: Mixity | None = None
+    contradictions: Callable[[Array], list[str]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,9 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    ModelWrapValidatorHandler,
     PlainSerializer,
+    PrivateAttr,
     SerializerFunctionWrapHandler,
     ValidationError,
     model_serializer,
@@ -25,12 +27,14 @@ from ..errors import InputError
 from ..formula import SpatialValue
 from ..laws import Mixity, mixities
 from ..schema import Mistake, OneOf, refusal, shown, validation_error
+from . import law_formulas
 from .base import Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python
 from .contribution import ONE, BoundaryLaw, Contribution, Direction
+from .law_formulas import FormulaLaw, times
 from .values import FormulaField, Value
 
 
-def _law(value: Any) -> laws.Superpotential:
+def _law(value: Any) -> laws.Superpotential | FormulaLaw:
     """The law of a table, or an object that is one."""
     if isinstance(value, laws.Superpotential):
         return value
@@ -41,7 +45,7 @@ def _law(value: Any) -> laws.Superpotential:
     if not isinstance(name, str):
         raise refusal(f'the law\'s name is missing: law = "name"; allowed: {", ".join(laws.available())}')
     try:
-        return laws.create(name, parameters)
+        return law_formulas.create(name, parameters) or laws.create(name, parameters)
     except InputError as error:
         if isinstance(error.__cause__, ValidationError):
             raise error.__cause__ from None  # it knows the place of each wrong parameter
@@ -91,6 +95,7 @@ class LawEffect(Effect):
     """what all tractions of the law are multiplied by, a positive number or a formula in x, y, z"""
     length_multiplier: Multiplier = ONE
     """what all displacements of the law are multiplied by, a positive number or a formula in x, y, z"""
+    _formulas: FormulaLaw | None = PrivateAttr(default=None)
 
     @from_python
     def __init__(
@@ -98,15 +103,22 @@ class LawEffect(Effect):
     ) -> None:
         self._make(side, law=law, multiplier=multiplier, length_multiplier=length_multiplier)
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _from_table(cls, data: Any) -> Any:
+    def _from_table(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if isinstance(data, cls) or (isinstance(data, dict) and isinstance(data.get("law"), laws.Superpotential)):
-            return data
+            return handler(data)
         if not isinstance(data, dict):
-            return {"law": _law(data)}
+            return handler({"law": _law(data)})
         own = {key: data[key] for key in cls.model_fields if key != "law" and key in data}
-        return {**own, "law": _law({key: value for key, value in data.items() if key not in own})}
+        law = _law({key: value for key, value in data.items() if key not in own})
+        if not isinstance(law, FormulaLaw):
+            return handler({**own, "law": law})
+        effect = handler({**own, "law": law.law})
+        both = {key: times(getattr(effect, key), getattr(law, key)) for key in ("multiplier", "length_multiplier")}
+        placed = effect.model_copy(update=both)
+        placed._formulas = law
+        return placed
 
     @model_serializer(mode="wrap")
     def _as_table(self, handler: SerializerFunctionWrapHandler) -> Any:
@@ -120,7 +132,10 @@ class LawEffect(Effect):
         return Contribution(laws=(self._brought(),))
 
     def _brought(self, slip: float = 1.0) -> BoundaryLaw:
-        return BoundaryLaw(self.direction, self.law, self.multiplier, self.length_multiplier, slip)
+        check = self._formulas.contradictions if self._formulas else None
+        return BoundaryLaw(
+            self.direction, self.law, self.multiplier, self.length_multiplier, slip, contradictions=check
+        )
 
     @override
     def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:

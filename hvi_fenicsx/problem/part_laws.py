@@ -123,6 +123,10 @@ def _term(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
             "ring that bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
+    if law.contradictions is not None:
+        said = agree(context.domain.mesh.comm, law.contradictions(where.points))
+        if texts := [text for rank in said for text in rank]:
+            raise InputError(f"boundary.{where.part}.{key}: {texts[0]}")
     return LawTerm(
         surface=where,
         direction=law.direction,

@@ -80,7 +80,13 @@ class Records:
 
     @classmethod
     def of(cls, file: Path, plan: Plan, ranks: int) -> Records:
-        """Those of a journal, if they were measured against the reference of a plan."""
+        """Those of a journal, if they were measured against the reference of a plan.
+
+        Args:
+            file: the journal.
+            plan: of the study.
+            ranks: by how many ranks points are measured.
+        """
         journal = Journal(file, f"{__version__} {ranks} {name_of(plan.reference[0])}")
         return cls(known={record["point"]: record for record in journal.records}, journal=journal)
 
@@ -91,7 +97,12 @@ class Records:
             self.journal.append(record)
 
     def has(self, point: Point, limit: float | None) -> bool:
-        """Whether a point is finished, or was given up after no less time than now."""
+        """Whether a point is finished, or was given up after no less time than now.
+
+        Args:
+            point: of the study.
+            limit: seconds that a point may take.
+        """
         record = self.known.get(name_of(point))
         if record is None:
             return False

@@ -122,7 +122,12 @@ class Equations:
         return self.base.energy + self.energy_from_base(x, models)
 
     def energy_from_base(self, x: PETSc.Vec, models: Sequence[LawModel]) -> float:
-        """The same less what elasticity and loads make of it at the base: small changes keep their digits."""
+        """The same less what elasticity and loads make of it at the base: small changes keep their digits. Collective.
+
+        Args:
+            x: the unknowns u.
+            models: what takes the place of the laws j, by term.
+        """
         u, local = x.array_r, 0.0
         for term, model in zip(self._terms, models, strict=True):
             local += float(np.sum(term.energy_weights * model.value(term.argument(u))))

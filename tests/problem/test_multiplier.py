@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -166,12 +167,39 @@ def test_models_from_python_give_functions(key: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("formulas", "keys"),
+    [
+        (
+            {"law": "quadratic_linear", "gamma1": "4e5*(1 + x)", "gamma2": "2e5*(1 + x)", "delta": "9e-6*(2 - x)"},
+            quadratic_linear(4e5) | {"multiplier": "1 + x", "length_multiplier": "2 - x"},
+        ),
+        (
+            {"law": "graph", "points": [[0, 0], ["1e-6*(1 + x)", 4e5], ["3e-6*(1 + x)", 1e5]]},
+            {"law": "graph", "points": [[0, 0], [1e-6, 4e5], [3e-6, 1e5]], "length_multiplier": "1 + x"},
+        ),
+        (
+            {"law": "tresca", "yield_traction": "2e5*x + 1", "multiplier": 2},
+            {"law": "tresca", "yield_traction": 1.0, "multiplier": "4e5*x + 2"},
+        ),
+    ],
+)
+def test_formulas_in_the_place_of_numbers_are_multipliers(formulas: Table, keys: Table) -> None:
+    one, two = (hvi.read_tables(model(6, 3e6, friction=law)) for law in (formulas, keys))
+    wanted = hvi.solve(two, estimate=False).energy
+    for scene in (one, pickle.loads(pickle.dumps(one)), hvi.read_tables(one.tables())):
+        assert hvi.solve(scene, estimate=False).energy == pytest.approx(wanted, rel=1e-12)
+
+
+@pytest.mark.parametrize(
     ("law", "said"),
     [
         ({"multiplier": "x - 0.5"}, "must be positive at every vertex"),
         ({"length_multiplier": "x - 0.5"}, "length_multiplier = 'x - 0.5' is .* must be positive at every vertex"),
         ({"length_multiplier": -1.0}, "must be positive"),
-        ({"delta": "9e-6*(1 + x)"}, "must be a number .* length_multiplier"),
+        ({"delta": "9e-6*(x - 0.5)"}, "must be positive at every vertex"),
+        ({"delta": "9e-6*(x + q)"}, "'q'"),
+        ({"delta": "0*x"}, "delta = 0.0 must be > 0"),
+        ({"gamma1": "1e6*(1 + x)"}, "gamma2 is 500000 at .* another shape"),
         ({"delta": "9e-6"}, "without quotes"),
     ],
 )
