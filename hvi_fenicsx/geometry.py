@@ -12,8 +12,8 @@ from .typing import Array, Integers
 
 Point = tuple[float, float]
 """Coordinates, m."""
-_ROUNDING = 1e-9
-"""A coordinate so small beside the largest one of a point is zero."""
+ROUNDING = 1e-9
+"""What is so small beside the numbers that it is made of is none."""
 
 
 class Curve(Protocol):
@@ -137,7 +137,7 @@ def spot(point: Array) -> str:
     Args:
         point: m, (d,).
     """
-    rounding = _ROUNDING * float(np.abs(point).max())
+    rounding = ROUNDING * float(np.abs(point).max())
     return f"({', '.join(f'{c if abs(c) > rounding else 0.0:.6g}' for c in point)})"
 
 

@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import override
 
 from ..errors import InputError
+from ..geometry import ROUNDING
 from ..schema import Finite, Positive, refusal
 from ..typing import Array
 from .base import Effect, FormContext, Place, Sides, from_python
@@ -21,8 +22,6 @@ from .contribution import Averaged, Contribution
 
 _LOCKING = 0.45
 """Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""
-_SYMMETRIC = 1e-9
-"""Difference of two entries of C, over the largest one, that still counts as none."""
 Plane = Literal["plane_stress", "plane_strain", "three_dimensional"]
 _PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
 """Voigt's order of tensor components, by dimension."""
@@ -70,12 +69,20 @@ class Elasticity(Effect):
             raise self.refused(str(error), self.where) from None
 
     @abstractmethod
+    def held(self) -> Array:
+        """Normal stresses from normal strains, N/m²; (2, 2) in plane stress, else (3, 3)."""
+
     def thermal_stress(self) -> Array:
         """Stress that holds the material back from expanding by 1 K, N/m²; shape (3,) or (6,)."""
+        normal, shear = (2, 1) if self.dimension() == 2 else (3, 3)
+        return np.pad(self.thermal_expansion * self.held().sum(axis=1)[:normal], (0, shear))
 
     def out_of_plane(self) -> Array:
         """σ_33 of a plane body by unit ε_11, ε_22 and ΔT = -1 K, N/m²; shape (3,). Zero in plane stress."""
-        return np.zeros(3)
+        if self.model != "plane_strain":
+            return np.zeros(3)
+        row = self.held()[2]
+        return np.array([row[0], row[1], self.thermal_expansion * row.sum()])
 
     def across(self, context: FormContext, cells: Any) -> tuple[Any, ...]:
         """∫ σ_33(u) q dx, nondimensional; nothing where it is zero.
@@ -174,18 +181,12 @@ class Isotropic(Elasticity):
             bilinear=(shear,), averaged=(Averaged(lam, two_mu, divergence, context.scalar_test * cells),)
         )
 
-    def out_of_plane(self) -> Array:
-        """λ, λ, Eα/(1-2ν)."""
-        if self.model != "plane_strain":
-            return super().out_of_plane()
-        return np.array([self.lame()[0], self.lame()[0], self.thermal_stress()[0]])
-
-    def thermal_stress(self) -> Array:
-        """Eα/(1-2ν), in plane stress Eα/(1-ν): there the thickness is free."""
-        plane = self.model == "plane_stress"
-        held = self.youngs_modulus / (1 - (1 if plane else 2) * self.poisson_ratio)
-        normal, shear = (2, 1) if self.dimension() == 2 else (3, 3)
-        return self.thermal_expansion * held * np.repeat([1.0, 0.0], [normal, shear])
+    @override
+    def held(self) -> Array:
+        """λ + 2μ on the diagonal, λ beside it."""
+        trace, twice_shear = self.lame()
+        size = 2 if self.model == "plane_stress" else 3
+        return trace * np.ones((size, size)) + twice_shear * np.eye(size)
 
     @override
     def modulus_scale(self) -> float:
@@ -217,11 +218,6 @@ class _ByMatrix(Elasticity):
         c = self.stiffness() / context.modulus
         density = sum(context.number(c[i, j]) * given[j] * virtual[i] for i, j in np.argwhere(c != 0.0))
         return Contribution(bilinear=(density * cells,), across=self.across(context, cells))
-
-    def thermal_stress(self) -> Array:
-        """C : αI."""
-        normal = self.dimension() or 2
-        return np.asarray(self.thermal_expansion * self.stiffness()[:, :normal].sum(axis=1))
 
     @override
     def modulus_scale(self) -> float:
@@ -287,31 +283,18 @@ class Orthotropic(_ByMatrix):
             s[i, j] = s[j, i] = -ratio / e[i]
         return s
 
-    def _held(self) -> Array:
+    @override
+    def held(self) -> Array:
         """Normal stresses from normal strains."""
         return np.asarray(np.linalg.inv(self._compliance()), dtype=np.float64)
 
     def stiffness(self) -> Array:
         """The inverse of the compliance; plane strain leaves out what only z would need."""
-        normal = self._held()
+        normal = self.held()
         g = self.shear_moduli
         if self.model == "three_dimensional":
             return _blocks(normal, np.diag([g[2], g[1], g[0]]))
         return _blocks(normal[:2, :2], np.diag(g))
-
-    def thermal_stress(self) -> Array:
-        """C : αI; in plane strain with the expansion along z, which is held too."""
-        if self.model != "plane_strain":
-            return super().thermal_stress()
-        normal = self._held()
-        return np.append(self.thermal_expansion * normal[:2].sum(axis=1), 0.0)
-
-    def out_of_plane(self) -> Array:
-        """The third row of what is held in plane strain."""
-        if self.model != "plane_strain":
-            return super().out_of_plane()
-        row = self._held()[2]
-        return np.array([row[0], row[1], self.thermal_expansion * row.sum()])
 
 
 def _blocks(normal: Array, shear: Array) -> Array:
@@ -353,7 +336,7 @@ class Anisotropic(_ByMatrix):
         if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
             raise refusal(f"matrix must have {size} rows of {size} numbers for {self.model}")
         c = self.stiffness()
-        if np.max(np.abs(c - c.T)) > _SYMMETRIC * np.max(np.abs(c)):
+        if np.max(np.abs(c - c.T)) > ROUNDING * np.max(np.abs(c)):
             i, j = np.unravel_index(np.argmax(np.abs(c - c.T)), c.shape)
             raise refusal(f"matrix is not symmetric: C[{i + 1}][{j + 1}] = {c[i, j]:g}, not {c[j, i]:g}")
         _definite(c, "some strain would cost no energy")
@@ -362,3 +345,19 @@ class Anisotropic(_ByMatrix):
     def stiffness(self) -> Array:
         """As it was given."""
         return np.array(self.matrix)
+
+    @override
+    def held(self) -> Array:
+        """The block of normal stresses and strains."""
+        normal = self.dimension() or 2
+        return self.stiffness()[:normal, :normal]
+
+    @override
+    def thermal_stress(self) -> Array:
+        """C : αI."""
+        return np.asarray(self.thermal_expansion * self.stiffness()[:, : self.dimension() or 2].sum(axis=1))
+
+    @override
+    def out_of_plane(self) -> Array:
+        """Zero: the matrix does not tell it."""
+        return np.zeros(3)

@@ -19,6 +19,7 @@ from typing_extensions import override
 from ..class_registry import enter
 from ..errors import InputError
 from ..formula import SpatialValue
+from ..geometry import ROUNDING
 from ..schema import ExistingFile, Finite, Positive, Table, refusal, unknown
 from ..typing import Array
 from .surface_files import distances_along
@@ -38,8 +39,6 @@ def _not_zero(vector: tuple[float, ...]) -> tuple[float, ...]:
 
 NonzeroVector = Annotated[Vector, AfterValidator(_not_zero)]
 """A vector that is not zero."""
-_ACROSS = 1e-12
-"""A displacement with no larger part than this across a direction is along it."""
 
 
 def unit(vector: Vector) -> Array:
@@ -99,8 +98,8 @@ class Obstacle(Table):
 
     def _vectors(self) -> dict[str, tuple[float, ...]]:
         """Its vectors by key."""
-        known = {key: getattr(self, key) for key, field in type(self).model_fields.items() if _is_vector(field)}
-        return {key: vector for key, vector in known.items() if vector is not None}
+        fields = type(self).model_fields
+        return {key: value for key, value in self if value is not None and _is_vector(fields[key])}
 
     @property
     def dimension(self) -> int:
@@ -129,7 +128,7 @@ class Obstacle(Table):
         if moves is None or self.direction is None:
             return moves is None
         move, way = np.asarray(moves), unit(self.direction)
-        return bool(np.linalg.norm(move - (move @ way) * way) <= _ACROSS * np.linalg.norm(move))
+        return bool(np.linalg.norm(move - (move @ way) * way) <= ROUNDING * np.linalg.norm(move))
 
     @abstractmethod
     def nearest(self, points: Array) -> tuple[Array, Array]:

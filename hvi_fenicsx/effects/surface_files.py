@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..geometry import ROUNDING
 from ..typing import Array
-
-_STEEP = 1e-9
-"""A triangle whose normal is orthogonal to the direction up to this is not met by it."""
 
 
 def triangles(file: Path) -> Array:
@@ -68,7 +66,7 @@ def distances_along(file: Path, points: Array, direction: Array) -> Array:
 
     corners = triangles(file)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = normals @ direction < -_STEEP * np.linalg.norm(normals, axis=1)
+    facing = normals @ direction < -ROUNDING * np.linalg.norm(normals, axis=1)
     corners, normals = corners[facing], normals[facing]
     across = np.linalg.svd(direction[None])[2][1:]
     tree = STRtree(polygons(corners @ across.T))

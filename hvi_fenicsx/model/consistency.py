@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import combinations
 
 from ..effects import Drive, Effect, Place, load_name
 from ..errors import InputError
 from ..laws import smoothing
-from ..mesh.boundary_part import BoundaryPart
 from ..schema import Mistake, shown, unknown
 from .content import Content, dotted
 
@@ -41,7 +39,6 @@ def _coarse(model: Content) -> Iterator[Mistake]:
 def _fine(model: Content) -> Iterator[Mistake]:
     yield from _smoothing(model)
     own = [(model.parts[e.name], e) for e in model.effects if model.table(e) == "boundary"]
-    yield from _exclusive(model, own)
     places = dict.fromkeys((side, part.where) for part, _ in own for side in part.on)
     for side, where in places:
         yield from _on_side(model, side, [e for part, e in own if side in part.on and part.where == where])
@@ -150,16 +147,6 @@ def _smoothing(model: Content) -> Iterator[Mistake]:
     if fitting is not None and (others := [n for n in names if n not in fitting]):
         text = f'{shown(wanted)} is made for law = {_quoted(fitting)}, not for {_quoted(others)}; use "quadratic"'
         yield Mistake(("solver", "smoothing"), text)
-
-
-def _exclusive(model: Content, items: Iterable[tuple[BoundaryPart, Effect]]) -> Iterator[Mistake]:
-    """A side bears one effect of an exclusive kind; whether pieces share facets, only the mesh knows."""
-    whole = (item for item in items if item[0].where is None)
-    for (part, effect), (others, second) in combinations(whole, 2):
-        shared = sorted(set(part.on) & set(others.on))
-        if effect.key == second.key and effect.exclusive and shared:
-            text = f"{_quoted(shared)} has {effect.key} already, from {dotted(model.key(effect))}; give it once"
-            yield Mistake(model.key(second), text)
 
 
 def _on_side(model: Content, side: str, effects: list[Effect]) -> Iterator[Mistake]:

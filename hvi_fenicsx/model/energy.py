@@ -16,6 +16,7 @@ from typing_extensions import override
 
 from ..effects import Contribution, Effect, FormContext, Place, Sides, from_python
 from ..errors import InputError
+from ..geometry import ROUNDING
 from ..mesh import nodes
 from ..problem.spaces import displacement_space
 from ..rigid import RigidBody, rigid_fields
@@ -24,10 +25,6 @@ from ..runtime.mpi import agree
 from ..typing import Array
 
 Form = Callable[[Any, Any], Any]
-
-
-_ROUNDING = 1e-10
-"""What counts as none in an assembled form, beside its size; of a rigid motion's energy, beside that of a stretch."""
 
 
 class Energy(Effect):
@@ -104,7 +101,7 @@ def _check_symmetry(matrix: PETSc.Mat) -> None:
     transposed.destroy()
     if not size > 0.0:
         raise InputError("the form is zero on this body")
-    if not gap <= _ROUNDING * size:
+    if not gap <= ROUNDING * size:
         raise InputError(
             f"the form is not symmetric: a(u, v) and a(v, u) differ by {gap / size:.1e} of its size; an energy "
             "is, such as a(u, v) = ∫ C ε(u) : ε(v) dx with a symmetric C"
@@ -145,7 +142,7 @@ def _check_rigid_motions(matrix: PETSc.Mat, space: fem.FunctionSpace, stiffness:
     names = [f"the translation along {axis}" for axis in "xyz"[:d]]
     names += ["the rotation"] if d == 2 else [f"the rotation about {axis}" for axis in "xyz"]
     for number, name in enumerate(names):
-        if abs(_energy(matrix, fields[:, number])) > _ROUNDING * stiffness * length ** (d - 2):
+        if abs(_energy(matrix, fields[:, number])) > ROUNDING * stiffness * length ** (d - 2):
             raise InputError(
                 f"{name} costs energy, as a rigid motion of an elastic body must not; write the form in the "
                 "strain sym(grad(u)), and what holds the body as a Displacement, Contact or Support"

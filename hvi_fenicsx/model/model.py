@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -324,19 +325,9 @@ def _no_place(name: str, known: Collection[str], alone: Collection[str]) -> str:
 
 def _named(effects: Iterable[Effect]) -> Iterator[Effect]:
     """Effects named by their places; with a number where a place has one of the kind already."""
-    taken: dict[tuple[Place, str], dict[str, tuple[str, ...] | None]] = {}
+    taken = Counter[tuple[Place, str, str]]()
     for effect in effects:
-        joined = "-".join(effect.where or (_WHOLE_BODY,))[:_LONGEST_NAME]
-        name, number = joined, 1
-        while not _fits(taken.setdefault((effect.place, name), {}), effect):
-            number += 1
-            name = f"{joined}.{number}"
-        taken[effect.place, name][effect.key] = effect.where
-        yield effect.at(effect.where, name)
-
-
-def _fits(table: Mapping[str, tuple[str, ...] | None], effect: Effect) -> bool:
-    """Whether a table of one place, with these effects by key, can hold another one."""
-    if effect.place is Place.MATERIAL and table:
-        return False
-    return effect.key not in table and all(where == effect.where for where in table.values())
+        name = "-".join(effect.where or (_WHOLE_BODY,))[:_LONGEST_NAME]
+        kind = (effect.place, name, "" if effect.place is Place.MATERIAL else effect.key)
+        taken[kind] += 1
+        yield effect.at(effect.where, name if taken[kind] == 1 else f"{name}.{taken[kind]}")

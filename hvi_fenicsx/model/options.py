@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, model_validator
 
 from ..effects.values import as_value
 from ..laws.smoothing import registered as smoothings
 from ..schema import Count, Mistake, Names, OneOf, Positive, Table, refusal, shown, validation_error
 
 LinearSolver = Literal["auto", "lu", "gamg"]
-Degree = Literal[1, 2]
 _STARTS = ("unbroken", "resting", "broken")
-
-
-def _degree(value: Any) -> Any:
-    """Refuses what is equal to a degree and none: true and 1.0 are equal to 1."""
-    if isinstance(value, bool | float):
-        raise refusal(f"must be 1 or 2 (is {shown(value)})")
-    return value
 
 
 def _start(value: Any) -> Any:
@@ -45,7 +36,7 @@ Start = Annotated[
 class SolverTable(Table):
     """How the problem is solved. Without `smoothing` and `epsilon` the law itself is solved, not a smoothed one."""
 
-    degree: Annotated[Degree | None, BeforeValidator(_degree)] = None
+    degree: Annotated[int, Field(ge=1, le=2)] | None = None
     """the degree of the elements: 1, or 2, which needs far fewer unknowns for the same accuracy; without it 1, but with
     `--accuracy` the cheaper one"""
     method: str = "auto"
@@ -95,35 +86,18 @@ _HOW_WIDE = (
     "needs its width: add epsilon = 0.01 (relative to the law's energy at its kink) "
     "or epsilon_absolute = 0.1 (N/m), or leave smoothing out to solve the law itself"
 )
-_LARGEST = 1e100
+Factor = Annotated[float, Field(ge=-1e100, le=1e100)]
 """A factor beyond this makes work of which squares are no numbers."""
+_AS_LIST = BeforeValidator(lambda value: tuple(value) if isinstance(value, list | tuple) else (value,))
 
 
-def _factors(value: Any) -> tuple[float, ...]:
-    entries = value if isinstance(value, list | tuple) else [value]
-    for entry in entries:
-        if isinstance(entry, bool) or not isinstance(entry, int | float) or not abs(entry) <= _LARGEST:
-            text = f"must be a number up to {_LARGEST:g}, or a list of numbers like [1.0, 0.2, 1.5]"
-            raise refusal(f"{text} (is {shown(value)})")
-    return tuple(float(entry) for entry in entries)
-
-
-def _programme(value: Any) -> tuple[float, ...]:
-    factors = _factors(value)
-    if trouble := next(_standstill(factors), None):
-        raise refusal(trouble)
-    return factors
-
-
-def _standstill(factors: tuple[float, ...]) -> Iterator[str]:
-    """Where a programme goes nowhere."""
+def _programme(factors: tuple[float, ...]) -> tuple[float, ...]:
     if not factors:
-        yield "is an empty list; give the factor to go to, like 1.5"
-    elif factors[0] == 0.0:
-        yield "begins with 0, where every path starts; give the factor to go to first"
-    for one, other in pairwise(factors):
+        raise refusal("is an empty list; give the factor to go to, like 1.5")
+    for one, other in pairwise((0.0, *factors)):
         if one == other:
-            yield f"goes from {one:g} to {other:g}, which is no way; leave one of them out"
+            raise refusal(f"goes from {one:g} to {other:g}, which is no way; a path starts at 0")
+    return factors
 
 
 def _written(factors: tuple[float, ...]) -> Any:
@@ -133,7 +107,7 @@ def _written(factors: tuple[float, ...]) -> Any:
 class PathTable(Table):
     """The load path that `hvi path` follows. A factor grows from 0 and multiplies what drives the body."""
 
-    to: Annotated[tuple[float, ...], BeforeValidator(_programme), PlainSerializer(_written)] = (1.0,)
+    to: Annotated[tuple[Factor, ...], _AS_LIST, AfterValidator(_programme), PlainSerializer(_written)] = (1.0,)
     """the factor at which the path ends; or a programme with turns: [1.0, 0.2, 1.5] loads, unloads, loads again"""
     scaled: Names | None = None
     """what the factor multiplies: loads, prescribed displacements and moved obstacles by name, such as
@@ -144,7 +118,7 @@ class PathTable(Table):
     memory: bool = True
     """whether bonds remember: true: they unload along the secant, and what is broken stays broken; false: the laws as
     they are, which heal"""
-    contact_at: Annotated[tuple[float, ...], BeforeValidator(_factors), PlainSerializer(list)] = ()
+    contact_at: Annotated[tuple[Factor, ...], _AS_LIST, PlainSerializer(list)] = ()
     """factors at which the state of Γc is written into path_contact.csv, each time the path crosses them"""
     states: Annotated[int, Field(ge=2)] = 50
     """how many states displacement.pvd shows at most, start, limit points, jumps and end among them"""

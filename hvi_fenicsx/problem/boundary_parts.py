@@ -35,7 +35,7 @@ def find(domain: Domain, parts: Mapping[str, BoundaryPart], effects: Sequence[Pl
     for name, part in parts.items():
         if not sum(agree(domain.mesh.comm, len(found[name]))):
             raise InputError(_empty(domain, name, part))
-    _check_overlap(domain, parts, found, effects)
+    _check_overlap(domain, found, effects)
     return found
 
 
@@ -59,15 +59,13 @@ def _ends(domain: Domain, part: BoundaryPart) -> Array:
     return np.array([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else corners
 
 
-def _check_overlap(
-    domain: Domain, parts: Mapping[str, BoundaryPart], facets: Mapping[str, Entities], effects: Sequence[Placed]
-) -> None:
-    """A facet bears one effect of an exclusive kind; of whole sides the scene knows it by their names."""
+def _check_overlap(domain: Domain, facets: Mapping[str, Entities], effects: Sequence[Placed]) -> None:
+    """A facet bears one effect of an exclusive kind. Collective."""
     placed = [(where, e) for where, e in effects if e.place is Place.BOUNDARY and e.exclusive and where is not None]
     pairs = [
         (one, other, effect.key)
         for (one, effect), (other, second) in combinations(placed, 2)
-        if effect.key == second.key and any(name in parts and parts[name].where for name in (one, other))
+        if effect.key == second.key
     ]
     shared = [bool(len(np.intersect1d(facets[one], facets[other]))) for one, other, _ in pairs]
     anywhere = np.any(agree(domain.mesh.comm, shared), axis=0) if pairs else []

@@ -403,7 +403,7 @@ REFUSED: dict[str, tuple[Table, str]] = {
                 "b": {"on": ["bottom", "top"], "friction": quadratic_linear(2e3)},
             }
         ),
-        "give it once",
+        "shares facets with boundary.a",
     ),
 }
 

@@ -325,7 +325,10 @@ def test_what_the_mesh_shows_names_effects_too(square: hvi.Body) -> None:
         ),
         (lambda body: hvi.equilibria(hvi.Model(body, [STEEL]), lowest="no"), "^lowest: must be True or False"),
         (lambda body: hvi.laws.Tresca(10**400), "yield_traction = 1000.* is not usable; give a finite number"),
-        (lambda body: hvi.follow(hvi.Model(body, [STEEL]), to=10**400), "^(path.)?to: must be a number up to 1e.100"),
+        (
+            lambda body: hvi.follow(hvi.Model(body, [STEEL]), to=10**400),
+            "^to.0: must be ",
+        ),
         (lambda body: hvi.study(hvi.Model(body, [STEEL]), mesh=[10**400]), "is no number of cells along x"),
         (lambda body: hvi.study(hvi.Model(body, [STEEL]), mesh=["\u00b2"]), "is no number of cells along x"),
     ],

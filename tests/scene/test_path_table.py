@@ -44,11 +44,11 @@ def test_what_is_read_and_written_again(text: str, tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "path={to=0}": "path.to: begins with 0, where every path starts",
+    "path={to=0}": "path.to: goes from 0 to 0, which is no way",
     "path={to=[]}": "path.to: is an empty list",
     "path={to=[1, 0.5, 0.5]}": "path.to: goes from 0.5 to 0.5, which is no way",
-    "path={to=true}": "path.to: must be a number up to 1e+100, or a list of numbers like [1.0, 0.2, 1.5] (is true)",
-    "path={to=inf}": "path.to: must be a number",
+    "path={to=true}": "path.to: must be a number (is true)",
+    "path={to=inf}": "path.to: must be 1e+100 or less",
     "path={scaled='pull'}": 'path.scaled: unknown load, prescribed displacement or moved obstacle "pull"; allowed: '
     "wall.displacement, pull.traction, press.traction",
     "path={scaled='floor.friction'}": 'prescribed displacement or moved obstacle "floor.friction"',

@@ -172,7 +172,7 @@ REFUSED = {
         '"fre"',
         "s.toml:12: boundary.wall.displacement.1: 'fre' in 'fre' is not known; a formula may use "
         "x, y, z and pi; or "
-        'write "free" to leave the component alone',
+        'write "free" (None from Python) to leave the component alone',
     ),
     "model of the other dimension": (
         '"plane_stress"',
@@ -195,11 +195,6 @@ REFUSED = {
         'law = "quadratic_linear", ',
         "",
         's.toml:19: boundary.floor.friction: the law\'s name is missing: law = "name"; allowed: LAWS',
-    ),
-    "contact twice": (
-        '[boundary.floor]\non = "bottom"',
-        '[boundary.a]\non = ["top", "bottom"]\ncontact = { gap = 0 }\n[boundary.floor]\non = "bottom"',
-        's.toml:21: boundary.floor.contact: "bottom" has contact already, from boundary.a.contact; give it once',
     ),
     "component twice": (
         'on = "right"\ntraction = [1.0e6, 0.0]',
