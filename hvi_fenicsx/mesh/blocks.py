@@ -35,7 +35,6 @@ def block(
     size: Sequence[float],
     cells: Sequence[int],
     thresholds: Thresholds = DEFAULT,
-    reflected: Sequence[int] = (),
 ) -> Domain:
     """The rectangle or box [0, size], in cells cut into triangles or tetrahedra. Collective.
 
@@ -46,16 +45,15 @@ def block(
         size: lengths of the edges, m, (d,).
         cells: cells each way, (d,).
         thresholds: how coarse the coarsest level is.
-        reflected: axes along which the parts of the ranks are reflected.
     """
-    grid, upper = mesh(comm, size, cells, reflected), np.asarray(size, dtype=float)
+    grid, upper = mesh(comm, size, cells), np.asarray(size, dtype=float)
     coarser = coarser_cells(cells, thresholds)
 
     def coarsening() -> tuple[Domain, Transfer]:
         assert coarser is not None
         nested = all(2 * few == n for few, n in zip(coarser, cells, strict=True))
         kind = NestedGridTransfer if nested else GridTransfer
-        return block(comm, size, coarser, thresholds, reflected), kind(size, coarser)
+        return block(comm, size, coarser, thresholds), kind(size, coarser)
 
     return Domain(
         mesh=grid,
@@ -65,7 +63,6 @@ def block(
         upper=upper,
         one_piece=True,
         coarsening=coarsening if coarser is not None else None,
-        reflected=lambda axes: block(comm, size, cells, thresholds, axes),
     )
 
 
@@ -96,20 +93,19 @@ def _often_halved(wanted: float, share: float) -> int:
     return round(wanted / step) * step
 
 
-def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], reflected: Sequence[int] = ()) -> dmesh.Mesh:
+def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:
     """The mesh of the rectangle or box [0, size], without ghost cells. Collective.
 
     Args:
         comm: the ranks that share it.
         size: lengths of the edges, m, (d,).
         cells: cells each way, (d,), each cut into triangles or tetrahedra.
-        reflected: axes along which the parts of the ranks are reflected.
     """
     if not compat.TAKES_TOPOLOGY:
-        lower, upper = part_of_rank(cells, comm.size, comm.rank, reflected)
+        lower, upper = part_of_rank(cells, comm.size, comm.rank)
         kind, simplices = {2: "triangle", 3: "tetrahedron"}[len(cells)], _simplices(lower, upper, cells)
         return compat.simplex_mesh(comm, simplices, _points(comm, size, cells), kind)
-    parts = [part_of_rank(cells, comm.size, rank, reflected) for rank in range(comm.size)]
+    parts = [part_of_rank(cells, comm.size, rank) for rank in range(comm.size)]
     lower, upper = parts[comm.rank]
     own, counts = vertices(comm, parts), upper - lower
     numbers = _simplices(np.zeros_like(counts), counts, counts)
@@ -125,16 +121,13 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int], reflected:
     )
 
 
-def part_of_rank(
-    cells: Sequence[int], ranks: int, rank: int, reflected: Sequence[int] = ()
-) -> tuple[Integers, Integers]:
+def part_of_rank(cells: Sequence[int], ranks: int, rank: int) -> tuple[Integers, Integers]:
     """The part of the grid that a rank keeps.
 
     Args:
         cells: cells each way, (d,).
         ranks: number of ranks.
         rank: the rank.
-        reflected: axes along which the parts of all ranks are reflected.
 
     Returns:
         The first cell, and the one after the last, (d,) both; they are equal where there are too few cells.
@@ -150,8 +143,6 @@ def part_of_rank(
             upper[axis], last = cut, middle
         else:
             lower[axis], first = cut, middle
-    for turned in reflected:
-        lower[turned], upper[turned] = 1.0 - upper[turned], 1.0 - lower[turned]
     begin, end = (np.floor(place * cells + 0.5).astype(np.int64) for place in (lower, upper))
     return begin, end
 

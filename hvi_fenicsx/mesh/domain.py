@@ -36,7 +36,6 @@ class Domain:
         bends: whether cells may have curved edges at degree 2; not where a program has data of the straight mesh.
         coarsening: makes the next coarser domain of the mesh hierarchy; None where there is none.
         shared: what several problems on this mesh have in common; None where one problem is all.
-        reflected: makes the domain with the parts of all ranks reflected along axes; None where it cannot be made.
     """
 
     mesh: dmesh.Mesh
@@ -49,7 +48,6 @@ class Domain:
     bends: bool = True
     coarsening: Coarsening | None = None
     shared: Shared | None = field(default=None, compare=False, repr=False)
-    reflected: Reflection | None = None
 
     @classmethod
     def from_mesh(
@@ -136,8 +134,6 @@ class Domain:
 
 Coarsening: TypeAlias = Callable[[], tuple[Domain, Transfer]]
 """Makes the next coarser domain, and the transfer from it. Collective."""
-Reflection: TypeAlias = "Callable[[Sequence[int]], Domain]"
-"""Makes the domain with the parts of all ranks reflected along these axes. Collective."""
 
 
 def check_affordable(comm: MPI.Comm, unknowns: float, dimension: int, place: str, mend: str) -> None:

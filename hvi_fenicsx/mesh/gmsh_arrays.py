@@ -86,14 +86,13 @@ def _check_quality(gmsh: Any, path: Path, dimension: int) -> None:
 
 def _check_connections(gmsh: Any, path: Path, dimension: int) -> None:
     """Refuse lost nodes, elements listed twice, facets of more than two cells, sides that lie on no cell."""
-    known = gmsh.model.mesh.getNodes()[0]
     cells, sides = (_elements(gmsh, d) for d in (dimension, dimension - 1))
     facets = np.concatenate([cells[:, list(c)] for c in combinations(range(dimension + 1), dimension)])
-    for found in (cells, sides):
-        lost = np.setdiff1d(found, known)
-        if len(lost):
-            raise InputError(f"mesh file {path}: node {lost[0]} of an element is not there; remesh")
-        _refuse_two_groups(gmsh, path, found.shape[1] - 1)
+    lost = np.setdiff1d(np.concatenate([cells.ravel(), sides.ravel()]), gmsh.model.mesh.getNodes()[0])
+    if len(lost):
+        raise InputError(f"mesh file {path}: node {lost[0]} of an element is not there; remesh")
+    for rows in (cells, sides):
+        _refuse_more_than(1, rows, f"mesh file {path}: the element of nodes", "is listed twice, or in two groups")
     _refuse_more_than(2, facets, f"mesh file {path}: the facet of nodes", "has more than two cells")
     distinct, _ = _counted(facets)
     together, counts = _counted(np.concatenate([distinct, distinct, sides]))
@@ -116,27 +115,6 @@ def _check_folds(gmsh: Any, path: Path, dimension: int) -> None:
 def _elements(gmsh: Any, dimension: int) -> Integers:
     """Node tags of the simplices in groups, shape (n, dimension + 1), sorted in each row."""
     return np.sort(grouped(gmsh, dimension)[0] + 1, axis=1)
-
-
-def _refuse_two_groups(gmsh: Any, path: Path, dimension: int) -> None:
-    """Refuse elements that are listed twice; where they are in two groups, with the names of both."""
-    nodes, groups = grouped(gmsh, dimension)
-    rows = np.sort(nodes + 1, axis=1)
-    distinct, counts = _counted(rows)
-    if not np.any(counts > 1):
-        return
-    twice = distinct[np.argmax(counts > 1)]
-    named = np.unique(groups[np.all(rows == twice, axis=1)])
-    names = [_group(gmsh, dimension, int(g)) for g in named]
-    where = f"is in the groups {' and '.join(names)}; leave it in one" if len(names) > 1 else "is listed twice; remesh"
-    raise InputError(f"mesh file {path}: the element of nodes {', '.join(map(str, twice))} {where}")
-
-
-def _group(gmsh: Any, dimension: int, tag: int) -> str:
-    try:
-        return gmsh.model.getPhysicalName(dimension, tag) or str(tag)
-    except UnicodeDecodeError:
-        return str(tag)
 
 
 def _refuse_more_than(most: int, rows: Integers, what: str, fault: str) -> None:

@@ -114,10 +114,6 @@ def _check_length(mesh: MeshArrays, scale: float) -> None:
         raise InputError(f"domain.scale: makes the body {length:.1e} m long; allowed is {allowed}")
 
 
-_BY_GMSH = (".med", ".unv", ".bdf", ".cgns", ".mesh")
-_BY_MESHIO = (".vtu", ".vtk", ".xdmf", ".inp", ".e", ".exo", ".h5m")
-
-
 def _is_script(path: Path) -> bool:
     """Whether the file is a script, and not a mesh.
 
@@ -130,21 +126,9 @@ def _is_script(path: Path) -> bool:
         return True
     with path.open("rb") as stream:
         if stream.read(len(_HEADER)) != _HEADER:
-            text = f"is no mesh: it does not begin with {_HEADER.decode()}; {_conversion(path)}"
-            raise InputError(f"mesh file {path}: {text}")
+            way = "save it by gmsh, convert it by meshio (--output-format gmsh), or name a script .geo"
+            raise InputError(f"mesh file {path}: is no mesh: it does not begin with {_HEADER.decode()}; {way}")
     return False
-
-
-def _conversion(path: Path) -> str:
-    """How a file of another kind becomes one that can be read."""
-    if path.suffix in _BY_GMSH:
-        return f"gmsh reads it: gmsh {path.name} -save -format msh41 -o {path.stem}.msh; name its groups"
-    if path.suffix in _BY_MESHIO:
-        return (
-            f"convert it: meshio convert {path.name} {path.stem}.msh --output-format gmsh; or read it in Python by "
-            "dolfinx, and give mesh and tags to hvi.Body"
-        )
-    return "save it by gmsh, or name a script .geo"
 
 
 def _end(done: subprocess.CompletedProcess[bytes]) -> str:

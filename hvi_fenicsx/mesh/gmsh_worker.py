@@ -9,31 +9,15 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..typing import Array, Integers
+from .thresholds import DEFAULT
 
 _TETRAHEDRON, _TRIANGLE = 4, 2
 """Gmsh's element types."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """What of a surface is kept, and when one size of cells is enough.
-
-    Attributes:
-        corner: angle by which a surface turns at an edge that is kept.
-        uniform: ratio of the sizes below which one size is enough.
-    """
-
-    corner: float = math.radians(40.0)
-    uniform: float = 1.5
-
-
-DEFAULT = Thresholds()
 
 
 def main() -> None:
@@ -43,34 +27,30 @@ def main() -> None:
     given = np.load(sys.argv[1])
     gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
-    _add_volume(gmsh, given["points"], given["triangles"], DEFAULT)
-    _set_sizes(gmsh, given["places"], given["sizes"], DEFAULT)
+    _add_volume(gmsh, given["points"], given["triangles"])
+    _set_sizes(gmsh, given["places"], given["sizes"])
     gmsh.model.mesh.generate(3)
     points, cells = _volume_mesh(gmsh)
     np.savez(sys.argv[2], points=points, cells=cells)
 
 
-def _add_volume(gmsh: Any, points: Array, triangles: Integers, thresholds: Thresholds) -> None:
+def _add_volume(gmsh: Any, points: Array, triangles: Integers) -> None:
     """Give gmsh the patches of the surface, parted at its edges, and the volume within."""
     mesh = gmsh.model.mesh
     gmsh.model.addDiscreteEntity(2, 1)
     mesh.addNodes(2, 1, np.arange(1, len(points) + 1), points.ravel())
     mesh.addElementsByType(1, _TRIANGLE, [], (triangles + 1).ravel())
-    mesh.classifySurfaces(thresholds.corner, True, True, math.pi)
+    mesh.classifySurfaces(2.0 * DEFAULT.outline_turn, True, True, math.pi)
     mesh.createGeometry()
     loop = gmsh.model.geo.addSurfaceLoop([tag for _, tag in gmsh.model.getEntities(2)])
     gmsh.model.geo.addVolume([loop])
     gmsh.model.geo.synchronize()
 
 
-def _set_sizes(gmsh: Any, places: Array, sizes: Array, thresholds: Thresholds) -> None:
+def _set_sizes(gmsh: Any, places: Array, sizes: Array) -> None:
     """Ask for cells of these sizes, everywhere that of the nearest place."""
     for option in ("ExtendFromBoundary", "FromPoints", "FromCurvature"):
         gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
-    if np.ptp(sizes) < (thresholds.uniform - 1.0) * np.min(sizes):
-        gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.median(sizes)))
-        gmsh.option.setNumber("Mesh.MeshSizeMin", float(np.median(sizes)))
-        return
     from scipy.spatial import cKDTree
 
     tree = cKDTree(places)

@@ -24,7 +24,8 @@ class Thresholds:
             time than gmsh.
         coarsest: unknowns of the coarsest mesh of a mesh file, about.
         outline_turn: angle (radian) by which an outline turns at a vertex that is kept in any case, and by which it
-            turns at most between two vertices that are kept: a coarse chord must stay near its curve.
+            turns at most between two vertices that are kept: a coarse chord must stay near its curve. Twice as
+            much is an edge of a surface.
         sampled_cells: cells, about, by which sizes, regions and ranks of a body in space are known.
         remeshed_size: part by which a coarser mesh's volume, or the area of a side, may differ.
         gmsh_file_seconds: seconds that gmsh has to read a mesh file, and to mesh a script.

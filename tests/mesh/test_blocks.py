@@ -69,12 +69,11 @@ def energies(mesh: dmesh.Mesh) -> list[float]:
     return [float(fem.assemble_scalar(fem.form(form))) for form in forms]
 
 
-@pytest.mark.parametrize("reflected", [(), (0, 1)])
 @pytest.mark.parametrize(("cells", "ranks"), [([3, 5], 2), ([16, 20], 40), ([2, 3, 4], 7)])
-def test_each_cell_is_on_one_rank(cells: Sequence[int], ranks: int, reflected: Sequence[int]) -> None:
+def test_each_cell_is_on_one_rank(cells: Sequence[int], ranks: int) -> None:
     count = np.zeros(cells, dtype=int)
     for rank in range(ranks):
-        part = blocks.part_of_rank(cells, ranks, rank, reflected)
+        part = blocks.part_of_rank(cells, ranks, rank)
         count[tuple(itertools.starmap(slice, zip(*part, strict=True)))] += 1
     assert np.all(count == 1)
 

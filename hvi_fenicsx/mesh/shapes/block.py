@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
@@ -76,19 +76,12 @@ class Block(DomainShape):
             raise InputError(f"{text!r} is no number of cells along x ({fewest} or more)")
         block = self.refined(Fraction(int(text), first))
         if block is None:
-            possible = ", ".join(str(int(first * f)) for f in self._factors(fewest))
+            others = ", ".join(map(str, self.cells[1:]))
             raise InputError(
                 f"{text} cells along x instead of {first} leave no whole number along the other sides, "
-                f"which have {', '.join(map(str, self.cells[1:]))}; possible: {possible}"
+                f"which have {others}; {2 * first}, say, would do"
             )
         return block
-
-    def _factors(self, fewest: int) -> Iterator[Fraction]:
-        """Some factors by which all cells come out whole."""
-        common = math.gcd(*self.cells)
-        for n in sorted({1, common // 4, common // 2, common, 2 * common, 4 * common} - {0}):
-            if all(c // common * n >= fewest for c in self.cells):
-                yield Fraction(n, common)
 
     def mesh_text(self, length: Callable[[float], str]) -> str:
         """The cells along each axis."""

@@ -196,12 +196,11 @@ class SeveralBodies(DomainShape):
     def _joined(self, comm: MPI.Comm, domains: Sequence[Domain]) -> Domain:
         from .. import placement
         from ..joined import joined
-        from ..placement import near_parts
 
         found = zip(self.bodies.items(), domains, strict=True)
         placed = [body.placed(name, domain) for (name, body), domain in found]
         placement.check(comm, placed)
-        return joined(comm, near_parts(comm, placed))
+        return joined(comm, placed)
 
     def _with_forms(self, forms: Mapping[str, DomainShape]) -> Self:
         return self.changed(bodies={name: body.changed(form=forms[name]) for name, body in self.bodies.items()})
