@@ -94,16 +94,6 @@ def _vector_element() -> Any:
     return basix.ufl.element("Lagrange", "tetrahedron", 1, shape=(3,))
 
 
-def test_a_number_and_a_formula_have_values_at_points() -> None:
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 2, 0]])
-    assert Formula(3).at(points).tolist() == [3.0, 3.0, 3.0]
-    assert Formula("-1e6*(1 - 1.8*x)").at(points).tolist() == pytest.approx([-1e6, 8e5, -1e5])
-    assert Formula("x if y < 1 else 7").at(points).tolist() == [0.0, 1.0, 7.0]
-    assert Formula(3).is_number
-    assert not Formula("3").is_number
-    assert Formula(3) == Formula(3.0) != Formula("3")
-
-
 def test_compiled_forms_agree(tmp_path: Any) -> None:
     dolfinx = pytest.importorskip("dolfinx")
     import ufl

@@ -10,7 +10,6 @@ import pyvista
 from dolfinx import io
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.typing import Array
 
 E, WEIGHT = 2e9, 1e6
@@ -60,27 +59,3 @@ def test_a_path_is_followed_at_another_degree_and_its_rows_have_values() -> None
     np.testing.assert_array_equal(path.u(-1).x.array, path.u(len(path.rows) - 1).x.array)
     with pytest.raises(hvi.InputError, match=f"there is no row 1000; there are rows 0 to {len(path.rows) - 1}"):
         path.u(1000)
-
-
-@pytest.mark.parametrize("wrong", ["memroy", "degre"])
-def test_an_unknown_key_of_a_path_is_refused(wrong: str) -> None:
-    with pytest.raises(hvi.InputError, match="did you mean"):
-        hvi.follow(column(2), **{wrong: 2})
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_a_solution_carried_to_another_degree_is_the_same_at_the_vertices(dimension: int) -> None:
-    model = column(dimension)
-    linear, quadratic = (hvi.solve(model, degree=degree, estimate=False) for degree in (1, 2))
-    for known, other in ((linear, quadratic), (quadratic, linear)):
-        moved = spaces.carried_over(known.solve_result.u, other.problem.space)
-        back = spaces.carried_over(moved, linear.problem.space).x.array
-        expected = spaces.carried_over(known.solve_result.u, linear.problem.space).x.array
-        np.testing.assert_array_equal(back, expected)
-        again = hvi.solve(model, degree=other.scene.solver.degree, start=known, estimate=False)
-        assert again.converged
-        assert again.energy == pytest.approx(other.energy, rel=1e-12)
-    height = linear.u.function_space.tabulate_dof_coordinates()[:, dimension - 1]
-    exact = spaces.carried_over(quadratic.solve_result.u, linear.problem.space).x.array.reshape(-1, dimension)
-    found = exact[:, dimension - 1] * quadratic.problem.scales.displacement
-    np.testing.assert_allclose(found, sinking(height), atol=1e-9)

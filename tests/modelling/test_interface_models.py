@@ -60,25 +60,6 @@ def test_an_interface_between_tagged_sides_is_that_of_a_scene() -> None:
     assert found.resultant("seam") == pytest.approx(-found.resultant("seam.second"), rel=1e-9)
 
 
-def test_cohesion_between_tagged_sides_is_that_of_a_scene() -> None:
-    body = two_block_body().interface("seam", "foot", "seat")
-    found = hvi.solve(hvi.Model(body, [*LOADS, hvi.Contact("seam"), hvi.Cohesion("seam", LAW, beta=0.5)]))
-    table = two_blocks("rectangle", [1.0], [[9, 4], [7, 3]], "plane_stress")
-    seam = table["interface"]["seam"]
-    seam["cohesion"] = {**seam.pop("friction"), "beta": 0.5}
-    same = hvi.solve(hvi.read_tables(table), MPI.COMM_SELF)
-    assert found.converged == same.converged
-    assert found.energy == pytest.approx(same.energy, rel=1e-9)
-    assert found.contact["seam"].friction == pytest.approx(same.contact["seam"].friction, rel=1e-6, abs=1.0)
-
-
-def test_glued_sides_are_one_body() -> None:
-    glued = hvi.Model(two_block_body().interface("seam", "foot", "seat", tied=True), LOADS)
-    found = hvi.solve(glued, tolerance=1e-10)
-    assert found.converged
-    assert found.solvability.state == "held"
-
-
 class Fading(hvi.laws.SampledLaw):
     """A law of a user's own: a parabola, then an exponential tail."""
 

@@ -18,10 +18,3 @@ def test_a_loop_of_calls_does_not_grow(ranks: int) -> None:
         assert more == few, name
         before, after = counts["memory"]
         assert after - before < MOST_MEMORY, name
-
-
-@pytest.mark.long
-def test_a_solve_on_ranks_frees_what_its_steps_have_left() -> None:
-    """On one rank Python does. 109 objects more were left, most as long as the unknowns; 28 are for messages."""
-    alone, together = (on_ranks(ranks, "tests/modelling/leftovers_ranks.py") for ranks in (1, 2))
-    assert together <= alone + 40

@@ -5,11 +5,6 @@ from __future__ import annotations
 import functools
 import inspect
 import json
-import pickle
-import pydoc
-import subprocess
-import sys
-import typing
 from pathlib import Path
 from typing import Any
 
@@ -153,27 +148,6 @@ def test_an_own_energy_equal_to_the_built_in_one_gives_the_same(body: hvi.Body, 
     np.testing.assert_allclose(own.stress.x.array, found.stress.x.array, rtol=0, atol=1e-4)
 
 
-def test_an_own_energy_with_data_on_the_mesh_is_solved_without_coarser_meshes(body: hvi.Body) -> None:
-    """Stiffness by a fem.Function; twice as stiff, half the displacement of the same load."""
-    factor = fem.Function(fem.functionspace(body.mesh, ("Discontinuous Lagrange", 0)))
-    factor.x.array[:] = 2.0
-
-    def stiffer(u: Any, v: Any) -> Any:
-        sigma = E / (1 + NU) * strain(u) + E * NU / (1 - NU**2) * ufl.tr(strain(u)) * ufl.Identity(2)
-        return factor * ufl.inner(sigma, strain(v)) * ufl.dx
-
-    loads = [hvi.Displacement("wall", [0.0, None]), hvi.Traction("pull", [1e6, 0.0]), hvi.Contact("floor")]
-    press = hvi.Traction("press", [0.0, -1e6])
-    once = hvi.solve(hvi.Model(body, [STEEL, press, *loads]))
-    model = hvi.Model(body, [hvi.Energy(stiffer), press, *loads])
-    twice = hvi.solve(model)
-    np.testing.assert_allclose(2 * twice.u.x.array, once.u.x.array, atol=1e-15)
-    factor.x.array[:] = 1.0
-    again = hvi.solve(model, start=twice)
-    assert again.converged
-    np.testing.assert_allclose(again.u.x.array, once.u.x.array, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     ("form", "reason"),
     [
@@ -187,24 +161,6 @@ def test_an_own_energy_with_data_on_the_mesh_is_solved_without_coarser_meshes(bo
 def test_a_form_that_is_no_elasticity_is_refused_with_the_reason(body: hvi.Body, form: Any, reason: str) -> None:
     with pytest.raises(hvi.InputError, match=reason):
         steel_square(body=body, material=hvi.Energy(form))
-
-
-def test_replacing_keeps_the_mesh_and_changes_the_rest(body: hvi.Body) -> None:
-    model = steel_square(body=body)
-    other = model.replace(hvi.Traction("pull", [2e6, 0.0]))
-    assert other.body is model.body
-    whole = hvi.solve(steel_square(body=body).replace(hvi.Traction("pull", [2e6, 0.0]))).energy
-    assert hvi.solve(other).energy == pytest.approx(whole, rel=1e-14)
-    assert whole != pytest.approx(hvi.solve(model).energy, rel=0.1)
-    with pytest.raises(hvi.InputError, match="replace: the model has no traction on floor; it has isotropic on"):
-        model.replace(hvi.Traction("floor", [1.0, 0.0]))
-
-
-def test_two_loads_on_a_side_add_up(body: hvi.Body) -> None:
-    halves = [hvi.Traction("pull", [1.5e6, 0.0])] * 2
-    others = [one for one in steel_square(body=body).effects if one.where != ("pull",)]
-    twice = hvi.solve(hvi.Model(body, [*others, *halves]))
-    assert twice.energy == pytest.approx(hvi.solve(steel_square(body=body)).energy, rel=1e-12)
 
 
 def test_regions_by_tags_of_cells(body: hvi.Body) -> None:
@@ -283,23 +239,6 @@ def test_wrong_words_are_refused_as_in_a_scene_file(body: hvi.Body) -> None:
             make()
 
 
-@pytest.mark.parametrize("linear_solver", ["gamg", "lu"])
-def test_a_preconditioner_and_a_prefix_of_the_users_choice(
-    body: hvi.Body, found: hvi.Solution, linear_solver: str
-) -> None:
-    """Jacobi needs more iterations than the program's own solver, for the same solution."""
-    model, steps = steel_square(body=body), []
-    ways = [{}, {"pc_type": "jacobi", "ksp_max_it": 5000}]
-    given = {"linear_solver": linear_solver, "petsc_prefix": "floor_", "progress": steps.append}
-    own, jacobi = (hvi.solve(model, petsc=way, **given) for way in ways)
-    assert own.solve_result is not None
-    assert jacobi.solve_result is not None
-    assert jacobi.converged
-    assert jacobi.solve_result.counts.linear > 2 * own.solve_result.counts.linear
-    assert jacobi.energy == pytest.approx(found.energy, rel=1e-10)
-    assert {type(step) for step in steps} == {hvi.NewtonStep}
-
-
 def test_a_body_that_escapes_has_no_displacement_and_says_so(body: hvi.Body) -> None:
     lifted = steel_square(body=body).replace(hvi.Traction("press", [0.0, 1e6]))
     gone = hvi.solve(lifted)
@@ -326,17 +265,6 @@ def test_it_is_short_to_read_and_can_be_seen(found: hvi.Solution) -> None:
     assert figure._repr_png_()[:4] == b"\x89PNG"  # type: ignore[attr-defined]
     with pytest.raises(hvi.InputError, match="no picture 'sketch' of this solution; there are: body"):
         found.plot("sketch")
-
-
-def test_what_python_offers_for_help(found: hvi.Solution) -> None:
-    page = pydoc.render_doc(hvi, renderer=pydoc.plaintext)
-    for name in ("class Body", "class Energy", "solution = hvi.solve(model)"):
-        assert name in page
-    for offered in (hvi.solve, hvi.check, hvi.Model.replace, hvi.Solution.plot, hvi.Solution):
-        assert typing.get_type_hints(offered)
-    assert {"Graph", "SampledLaw"} < set(dir(hvi.laws)) <= set(hvi.laws.__all__)
-    numbers = pickle.loads(pickle.dumps((found.energy, found.certificate, found.estimate, dict(found.contact))))
-    assert numbers[1] == found.certificate
 
 
 @pytest.mark.parametrize("kind", [hvi, hvi.Body, hvi.Model, hvi.Solution])
@@ -384,18 +312,6 @@ def test_the_ranks_of_any_communicator_tell_the_same(found: hvi.Solution) -> Non
             np.testing.assert_allclose(rank[part], alone.resultant(part), rtol=1e-8, atol=1e-2)
 
 
-def test_a_changed_material_is_not_the_kept_one(body: hvi.Body) -> None:
-    """Models of one body share its matrix where their elasticity is the same, and only there."""
-    stiff = hvi.Isotropic(youngs_modulus=4 * E, poisson_ratio=0.2)
-    model = steel_square(body=body)
-    hvi.solve(model)
-    changed = hvi.solve(model.replace(stiff))
-    assert changed.energy == pytest.approx(hvi.solve(steel_square(material=stiff)).energy, rel=1e-12)
-    held = model.replace(hvi.Displacement("wall", [1e-6, None]))
-    alone = hvi.solve(steel_square(body=own_square()).replace(hvi.Displacement("wall", [1e-6, None])))
-    assert hvi.solve(held).energy == pytest.approx(alone.energy, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     "other",
     [
@@ -427,36 +343,3 @@ def test_a_loop_over_loads_may_begin_at_the_last_solution(body: hvi.Body) -> Non
     assert found[2].energy == pytest.approx(found[0].energy, rel=1e-10)  # without memory the joint heals
     with pytest.raises(hvi.InputError, match="start: is a solution on another mesh"):
         hvi.solve(steel_square(), start=found[0])
-
-
-_LOOP = """
-import hvi_fenicsx as hvi
-from mpi4py import MPI
-from own_mesh import own_square, steel_square
-
-body = own_square(MPI.COMM_WORLD, 48)
-for number in range(45):
-    hvi.solve(steel_square(MPI.COMM_WORLD, body).replace(hvi.Traction("pull", [3.4e6 + number * 1e3, 0.0])))
-    if number in (14, 44):
-        pages = int(open("/proc/self/statm").read().split()[1])
-        if MPI.COMM_WORLD.rank == 0:
-            print(pages * 4096 / 2**20)
-"""
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_loop_over_loads_keeps_nothing(ranks: int, tmp_path: Path) -> None:
-    """A system of this size takes 3 MB; 30 that were kept would take 90. The front moves: all solvers take part."""
-    script = tmp_path / "loop.py"
-    script.write_text(_LOOP, encoding="utf-8")
-    done = process_of(ranks, script)
-    before, after = map(float, done.splitlines()[-2:])
-    assert after - before < 15.0
-
-
-def process_of(ranks: int, script: Path) -> str:
-    command = ["mpirun", "-n", str(ranks), sys.executable, "-m", "mpi4py", str(script)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return done.stdout

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dolfinx import mesh
 from mpi4py import MPI
-from own_mesh import LAW, STEEL, TAGS, own_square, steel_square, tagged_square
+from own_mesh import LAW, STEEL, own_square
 from scenes import model as scene_table
 from scenes import quadratic_linear
 
@@ -59,41 +58,6 @@ def test_loads_on_a_list_add_up_and_a_force_is_one(body: hvi.Body) -> None:
     assert found.energy == pytest.approx(apart.energy, rel=1e-12)
     one = solved(body, *held, hvi.Force(sides, [2e5, -4e6]))
     assert one.energy == pytest.approx(found.energy, rel=1e-12)  # 1e5 N/m² on 2 m², not on each
-
-
-def test_replacing_finds_a_list_in_any_order(body: hvi.Body) -> None:
-    model = hvi.Model(body, [*PUSHED, hvi.Contact(PLATES)])
-    moved = model.replace(hvi.Contact(PLATES[::-1], gap=1e-6))
-    assert hvi.solve(moved).energy == pytest.approx(solved(body, hvi.Contact(PLATES, gap=1e-6)).energy, rel=1e-9)
-    assert repr(moved).endswith("Contact on press, floor)")
-    with pytest.raises(hvi.InputError, match=r"no contact on floor; .*; contact on floor, press$"):
-        model.replace(hvi.Contact("floor"))
-
-
-def test_regions_in_a_list() -> None:
-    square, tags = tagged_square(MPI.COMM_SELF)
-    cells = np.arange(square.topology.index_map(2).size_local, dtype=np.int32)
-    right = mesh.compute_midpoints(square, 2, cells)[:, 0] > 0.5
-    halves = mesh.meshtags(square, 2, cells, np.where(right, 12, 11).astype(np.int32))
-    two = hvi.Body(square, tags, halves, names=TAGS, regions={"hard": 11, "soft": 12})
-    both = hvi.Isotropic(youngs_modulus=2.15e11, poisson_ratio=0.29, region=["hard", "soft"])
-    weight = hvi.BodyForce([0.0, -1e5], region=["soft", "hard"])
-    found = hvi.solve(hvi.Model(two, [both, weight, *steel_square(body=two).effects[1:]]))
-    same = hvi.solve(hvi.Model(two, [*steel_square(body=two).effects, hvi.BodyForce([0.0, -1e5])]))
-    assert found.energy == pytest.approx(same.energy, rel=1e-12)
-
-
-def test_two_forces_in_a_body_add_up(body: hvi.Body) -> None:
-    held = [hvi.Contact("floor"), hvi.Friction("floor", LAW)]
-    twice = solved(body, *held, hvi.BodyForce([0.0, -1e6]), hvi.BodyForce([0.0, -1e6]))
-    assert twice.energy == pytest.approx(solved(body, *held, hvi.BodyForce([0.0, -2e6])).energy, rel=1e-12)
-
-
-def test_a_piece_of_several_sides(body: hvi.Body) -> None:
-    ends = body.piece("ends", PLATES, "x > 0.5")
-    apart = body.piece("low", "floor", "x > 0.5").piece("high", "press", "x > 0.5")
-    found, other = solved(ends, hvi.Contact("ends")), solved(apart, hvi.Contact("low"), hvi.Contact("high"))
-    assert found.energy == pytest.approx(other.energy, rel=1e-12)
 
 
 @pytest.mark.parametrize(

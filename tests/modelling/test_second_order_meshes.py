@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import basix.ufl
@@ -11,8 +10,7 @@ import pytest
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from round_walls import RUBBER, SYMMETRY, E, P, body, lame, wall
-from runs import on_ranks
+from round_walls import RUBBER, SYMMETRY, P, body, lame, wall
 
 import hvi_fenicsx as hvi
 
@@ -36,11 +34,6 @@ def test_a_mesh_of_second_order_has_curved_cells() -> None:
     assert np.abs(curved.u.x.array.reshape(-1, 2) - lame(r) * x / r).max() < 2e-3 * lame(np.array(1.0))
 
 
-def test_at_degree_one_it_is_the_straight_mesh() -> None:
-    one, other = (solved(body(wall(MPI.COMM_SELF, 4, order)), degree=1) for order in (1, 2))
-    assert other.energy == pytest.approx(one.energy, rel=1e-11)
-
-
 @pytest.mark.parametrize("degree", [1, 2])
 def test_loads_may_be_on_the_mesh_of_the_user_or_on_that_of_the_body(degree: int) -> None:
     made = wall(MPI.COMM_SELF, 4, 2)
@@ -51,26 +44,6 @@ def test_loads_may_be_on_the_mesh_of_the_user_or_on_that_of_the_body(degree: int
     loads = [f"{P}*(1 + x)", own, straight, *([on_nodes] if degree == 2 else [])]
     energies = [solved(given, load, degree).energy for load in loads]
     assert energies[1:] == pytest.approx(energies[:1] * (len(loads) - 1), rel=1e-11)
-
-
-@pytest.mark.long
-def test_two_ranks_find_what_one_finds() -> None:
-    told = on_ranks(2, str(Path(__file__).parent / "round_walls.py"))
-    own = solved(body(wall(MPI.COMM_SELF, 8, 2))).energy
-    assert [passed for _, passed in told] == [True, True]
-    assert [energy for energy, _ in told] == pytest.approx([own, own], rel=1e-10)
-
-
-def test_an_energy_with_data_on_the_curved_mesh_is_refused() -> None:
-    made = wall(MPI.COMM_SELF, 4, 2)
-    stiffness = fem.Function(fem.functionspace(made, ("Discontinuous Lagrange", 0)))
-    stiffness.x.array[:] = E
-
-    def energy(u: Any, v: Any) -> Any:
-        return stiffness * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * ufl.dx
-
-    with pytest.raises(hvi.InputError, match=r"Energy on the body: .*on body\.mesh"):
-        hvi.solve(hvi.Model(body(made), [hvi.Energy(energy), *SYMMETRY]), degree=2)
 
 
 def test_cells_of_third_order_and_curves_that_turn_back_are_refused() -> None:

@@ -24,7 +24,6 @@ from hvi_fenicsx.rigid import (
     fields_at,
     rigid_fields,
 )
-from hvi_fenicsx.system.existence import rigid_problems
 
 Array = NDArray[np.float64]
 ALONE = MPI.COMM_SELF
@@ -166,19 +165,3 @@ def test_literal_friction_that_no_factor_of_the_load_holds_says_so() -> None:
     line = existence(prepared)
     assert "held at no load factor" in line
     assert "held up to" not in line
-
-
-def test_a_roof_makes_a_floor_that_drives_coercive() -> None:
-    """Floor residual -1e5 both ways, roof 8e5: no motion gains, though neither sum of slips is convex."""
-    scene = block(2, push=0.0)
-    boundary = scene["boundary"]
-    del boundary["pull"]
-    boundary["floor"]["friction"] = {"law": "graph", "points": [[0, 0], [9e-6, 1e6], [1.8e-5, -1e5]]}
-    boundary["roof"] = {"on": "top", "friction": {"law": "tresca", "yield_traction": 8e5}}
-    prepared = prepare(read_tables(scene))
-    found = prepared.solvability
-    assert found.margin is not None
-    (problem,) = rigid_problems(prepared.problem, prepared.system.forces)
-    agree(problem, found)
-    assert found.state == "held"
-    assert found.margin > 0

@@ -6,7 +6,6 @@ Run as a script under mpirun this file prints the verdicts of `scenes()` with th
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,6 @@ from numpy.typing import NDArray
 from runs import LONG_RANKS, on_ranks
 from scipy.optimize import linprog
 
-from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.laws import Length
 from hvi_fenicsx.rigid import (
     ContactCone,
     Directional,
@@ -34,8 +31,6 @@ from hvi_fenicsx.rigid import (
     modes,
     rigid_fields,
 )
-from hvi_fenicsx.rigid.cutting_planes import SlipIntegral
-from hvi_fenicsx.rigid.solvability import undecided
 
 Array = NDArray[np.float64]
 ALONE = MPI.COMM_SELF
@@ -168,13 +163,6 @@ def test_the_states_flip_exactly_at_the_load_factors(push: float, state: str) ->
     assert (verdict.direction is None) == (state == "held")
 
 
-def test_the_margin_of_the_block_is_what_sliding_has_left() -> None:
-    """Per unit motion sliding has 0.5 - 0.3 left, lifting 1, and tipping a half (edge 0.5 away)."""
-    assert analyse(ALONE, block(0.3)).margin == pytest.approx(0.2, abs=1e-10)
-    assert analyse(ALONE, block(0.3, growth=9.0, peak=9.0)).margin == pytest.approx(0.5, abs=1e-10)
-    assert analyse(ALONE, block(0.9)).margin == pytest.approx(-0.4, abs=1e-10)
-
-
 def test_a_tower_tips_about_its_edge_or_slides_whichever_comes_first() -> None:
     """Width 1, pushed at height 4: moments about the edge give W/8; friction gives 0.5."""
     tips = load_factors(ALONE, block(1.0, weight=2.0, height=4.0), "push")
@@ -187,50 +175,12 @@ def test_a_tower_tips_about_its_edge_or_slides_whichever_comes_first() -> None:
     assert slides.mode.name == "translation along +x"
 
 
-def test_pushed_the_other_way_the_same_tower_bears_less_than_nothing() -> None:
-    """The push may be reversed up to the same limit: the factors form an interval around 0."""
-    factors = load_factors(ALONE, block(1.0, weight=2.0, height=4.0), "push")
-    assert factors.held_from == pytest.approx(-0.25, abs=1e-9)
-    slides = load_factors(ALONE, block(1.0, weight=8.0, height=4.0), "push")
-    assert (slides.held_from, slides.peak_from) == (pytest.approx(-0.5, abs=1e-9), pytest.approx(-1.0, abs=1e-9))
-
-
-def test_several_loads_together_have_factors_of_their_own() -> None:
-    """Weight and push grow together: a tenth of the weight tips at no factor, and slides where friction bears it."""
-    both = load_factors(ALONE, block(0.2, weight=2.0, height=4.0), "push", "weight")
-    assert (both.held, both.peak) == (pytest.approx(2.5, abs=1e-8), pytest.approx(5.0, abs=1e-8))
-
-
 def test_weight_is_a_load_of_which_there_must_be_enough() -> None:
     """A push of 0.4 at height 4 has the moment 1.6 about the edge: the weight must exceed 3.2."""
     factors = load_factors(ALONE, block(0.4, weight=1.0, height=4.0), "weight")
     assert factors.held_from == pytest.approx(3.2, abs=1e-8)
     assert factors.held == np.inf
     assert factors.mode is None
-
-
-def test_no_weight_helps_a_block_that_slides() -> None:
-    factors = load_factors(ALONE, block(0.8), "weight")
-    assert factors.held == -np.inf
-    assert factors.peak == np.inf
-
-
-def test_without_friction_any_push_slides_the_tower() -> None:
-    problem = block(0.01, growth=0.0, peak=0.0, weight=2.0, height=4.0)
-    verdict = analyse(ALONE, problem)
-    assert verdict.state == "escapes"
-    assert verdict.lambda_peak == pytest.approx(0.0, abs=1e-12)
-    assert verdict.direction is not None
-    assert verdict.direction.name == "translation along +x"
-
-
-def test_the_papers_model_problem_is_held_by_its_vertical_load() -> None:
-    verdict = analyse(ALONE, wall(1.0))
-    assert words(verdict) == ["translation along y"]
-    assert (verdict.state, verdict.margin) == ("held", pytest.approx(1.0, abs=1e-12))
-    assert verdict.lambda_held == np.inf
-    assert verdict.paper.satisfied
-    assert verdict.summary()["lambda_held"] is None
 
 
 def test_the_papers_condition_is_the_conservative_one() -> None:
@@ -242,14 +192,6 @@ def test_the_papers_condition_is_the_conservative_one() -> None:
     assert verdict.paper.obtuse
     assert not verdict.paper.satisfied
     assert analyse(ALONE, wall(2.0, (friction,))).paper.satisfied
-
-
-def test_the_papers_margin_of_a_free_block() -> None:
-    """On the cone above a floor a weight alone leaves sliding undecided: not strictly obtuse."""
-    verdict = analyse(ALONE, block(0.0))
-    assert verdict.paper.margin == 0.0
-    assert not verdict.paper.obtuse
-    assert verdict.state == "held"
 
 
 def test_lift_off_begins_where_the_lift_exceeds_weight_and_adhesion() -> None:
@@ -267,27 +209,6 @@ def test_lift_off_begins_where_the_lift_exceeds_weight_and_adhesion() -> None:
     )
     assert glued.mode is not None
     assert glued.mode.name == "translation along +y"
-
-
-def test_an_adhesive_strip_peels_about_its_far_end() -> None:
-    """Force F at x = 1 turns the strip about x = 0: F = g ∫ x dx = g/2, exact for the trapezoidal rule."""
-    body = RigidBody(2, np.array([0.5, 0.0, 0.0]))
-    points, weights = edge((0.0, 0.0), (1.0, 0.0), 10)
-    contact, friction = floor_2d(10, even(50.0), even(50.0))
-    glue = Resistance(
-        points=points,
-        weights=weights,
-        directions=np.tile([[0.0, 1.0]], (11, 1, 1)),
-        growth=Directional(0.0, 0.6),
-        peak=Directional(0.0, 0.9),
-    )
-    loads = {"pull": force(body, (1.0, 0.0, 0.0), (0.0, 1.0))}
-    factors = load_factors(
-        ALONE, RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction, glue))
-    )
-    assert (factors.held, factors.peak) == (pytest.approx(0.3, abs=1e-9), pytest.approx(0.45, abs=1e-9))
-    assert factors.mode is not None
-    assert factors.mode.name == "rotation about (0, 0), counterclockwise"
 
 
 @pytest.mark.parametrize("angle", [0.2, 0.7, -0.4])
@@ -323,46 +244,6 @@ def test_a_one_sided_law_holds_one_way_only() -> None:
         assert gives_way(ALONE, problem) == (state in ("metastable", "escapes"))  # no push meets the peak exactly
 
 
-def test_the_literal_law_pushes_the_body_to_the_left() -> None:
-    """The law min{x²/.., γ2 x} grows by γ2 to the right and by -γ2 to the left."""
-    body = RigidBody(2, np.array([0.5, 0.5, 0.0]))
-    contact, friction = floor_2d(6, Directional(-0.5, 0.5), Directional(0.0, 1.0))
-    loads = {
-        "push": force(body, (0.5, 0.0, 0.0), (1.0, 0.0)),
-        "weight": force(body, (0.5, 0.5, 0.0), (0.0, -1.0)),
-    }
-    problem = RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,))
-    factors = load_factors(ALONE, problem, "push")
-    assert factors.held_from == pytest.approx(0.5, abs=1e-9)  # held needs push > 0.5 and push < 0.5: never
-    assert factors.held == pytest.approx(0.5, abs=1e-9)
-    assert factors.peak == pytest.approx(1.0, abs=1e-9)
-    assert analyse(ALONE, problem).state == "borderline"  # the push 1 is at the peak to the right
-
-
-def test_a_growth_that_is_not_convex_has_a_margin_too() -> None:
-    """Falling below zero both ways; test_growth_below_zero.py has more of these."""
-    points, weights = edge((0.0, 0.0), (0.0, 1.0), 4)
-    law = Resistance(
-        points=points,
-        weights=weights,
-        directions=np.tile([[0.0, 1.0]], (5, 1, 1)),
-        growth=Directional(-0.7, 0.2),
-        peak=Directional(0.0, 0.4),
-    )
-    verdict = analyse(ALONE, wall(1.0, (law,)))
-    assert (verdict.state, verdict.margin) == ("held", pytest.approx(1.2, abs=1e-12))
-    body = RigidBody(2, np.array([0.5, 0.5, 0.0]))
-    contact, friction = floor_2d(6, Directional(-0.7, 0.2), Directional(0.0, 0.4))
-    loads = {
-        "push": force(body, (0.5, 0.0, 0.0), (-0.9, 0.0)),
-        "weight": force(body, (0.5, 0.5, 0.0), (0.0, -1.0)),
-    }
-    open_case = analyse(ALONE, RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,)))
-    assert open_case.state == "escapes"
-    # sliding left by 1 gives 0.7 + 0.9; turning clockwise by 1 slips by another half and lifts by a half
-    assert open_case.margin == pytest.approx(-1.6 - 0.8 + 0.5, abs=1e-9)
-
-
 def test_springs_take_motions_out_of_the_kernel_and_one_sided_springs_out_of_the_cone() -> None:
     infinite = Directional(np.inf, np.inf)
     contact, spring = floor_2d(6, infinite, infinite)
@@ -384,15 +265,6 @@ def test_springs_take_motions_out_of_the_kernel_and_one_sided_springs_out_of_the
     )
     on_support = RigidProblem(body=body, loads=loads, resistances=(spring, support))
     assert analyse(ALONE, on_support).margin == pytest.approx(verdict.margin, abs=1e-10)
-
-
-def test_a_clamped_body_is_held_by_anything() -> None:
-    body = RigidBody(2, np.zeros(3))
-    points, _ = edge((0.0, 0.0), (0.0, 1.0), 3)
-    clamp = tuple(FixedDirections(points, np.tile(axis, (4, 1))) for axis in ([1.0, 0.0], [0.0, 1.0]))
-    verdict = analyse(ALONE, RigidProblem(body=body, loads={"g": np.array([1.0, 2.0, 3.0])}, fixed=clamp))
-    assert (verdict.state, verdict.margin, verdict.kernel) == ("held", None, ())
-    assert verdict.paper.satisfied
 
 
 def test_a_body_in_a_tight_corner_has_motions_but_none_that_is_admitted() -> None:
@@ -430,25 +302,6 @@ def test_balanced_and_unheld_motions_are_free_and_the_state_is_borderline() -> N
     ]
 
 
-def test_a_free_motion_does_not_hide_that_another_one_is_metastable_or_escapes() -> None:
-    """Law on x only, in space: y is free and balanced, x is pushed."""
-    problem = slab((1.0, 0.0))
-    part = problem.resistances[0]
-    for growth, peak, state in ((0.8, 1.6, "borderline"), (0.3, 0.6, "metastable"), (0.1, 0.2, "escapes")):
-        only_x = Resistance(
-            points=part.points,
-            weights=part.weights,
-            directions=part.directions[:, :1],
-            growth=even(growth),
-            peak=even(peak),
-        )
-        verdict = analyse(
-            ALONE, RigidProblem(body=problem.body, loads=problem.loads, contact=problem.contact, resistances=(only_x,))
-        )
-        assert verdict.state == state
-        assert [mode.name for mode in verdict.free] == ["translation along y"]
-
-
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.1, 2.5])
 def test_an_oblique_push_in_space_meets_the_area_times_the_growth(angle: float) -> None:
     """Area 2, growth 0.3: by symmetry no rotation helps the push, whatever its direction."""
@@ -471,38 +324,6 @@ def test_a_torque_about_the_vertical_meets_growth_times_distance() -> None:
     assert verdict.lambda_held == pytest.approx(0.3 * float(part.weights @ arms) / 0.5, abs=1e-8)
     assert verdict.critical is not None
     assert verdict.critical.name == "rotation about the axis through (1, 0.5, 0.5) along +z"
-
-
-@pytest.mark.parametrize("size", [1e-3, 1e-6])
-def test_a_small_part_that_strong_laws_hold_is_judged_as_a_large_one(size: float) -> None:
-    """Loads and areas in proportion: the margin is so too, and no tolerance of the programmes hides it."""
-    whole = slab((0.1, 0.2), torque=0.05)
-    part = whole.resistances[0]
-    small = replace(
-        whole,
-        loads={name: size * load for name, load in whole.loads.items()},
-        resistances=(replace(part, weights=size * part.weights),),
-    )
-    expected, found = analyse(ALONE, whole), analyse(ALONE, small)
-    assert found.state == expected.state == "held"
-    assert expected.margin is not None
-    assert found.margin == pytest.approx(size * expected.margin, rel=1e-8)
-
-
-def test_a_block_in_space_tips_about_an_edge_of_its_base() -> None:
-    """2 × 1 base, weight 3 in the middle, pushed along y at height 2: 3 · 0.5 = 2 P."""
-    body = RigidBody(3, np.array([1.0, 0.5, 0.5]))
-    contact, friction = floor_3d(6, 5.0, 9.0, 2.0, 1.0)
-    loads = {
-        "push": force(body, (1.0, 0.0, 2.0), (0.0, 1.0, 0.0)),
-        "weight": force(body, (1.0, 0.5, 0.5), (0.0, 0.0, -3.0)),
-    }
-    factors = load_factors(
-        ALONE, RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,)), "push"
-    )
-    assert factors.held == pytest.approx(0.75, abs=1e-8)
-    assert factors.mode is not None
-    assert factors.mode.name == "rotation about the axis through (1, 1, 0) along -x"
 
 
 def test_an_eccentric_push_in_space_agrees_with_a_fine_search() -> None:
@@ -654,21 +475,6 @@ def test_kernels_in_space_are_told_in_words(axes: list[int], expected: list[str]
     assert found == expected
 
 
-def test_a_hinge_in_space_leaves_one_rotation() -> None:
-    body = RigidBody(3, np.array([0.5, 0.5, 0.5]), length=2.0)
-    points = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    fixed = [FixedDirections(points, np.tile(axis, (2, 1))) for axis in np.eye(3)]
-    found = modes(kernel(ALONE, body, fixed), body)
-    assert [mode.name for mode in found] == ["rotation about the axis through (0, 0, 1) along z"]
-
-
-def test_a_screw_is_called_a_screw() -> None:
-    body = RigidBody(3, np.zeros(3))
-    screw = np.array([0.0, 0.0, 0.5, 0.0, 0.0, -1.0])
-    expected = "screw motion about the axis through (0, 0, 0) along -z, advancing -0.5 per radian"
-    assert body.describe(screw, signed=True) == expected
-
-
 def test_bodies_that_do_not_touch_are_as_weak_as_the_weakest() -> None:
     both = combine([analyse(ALONE, block(0.3)), analyse(ALONE, block(0.8))])
     assert both.state == "metastable"
@@ -677,62 +483,11 @@ def test_bodies_that_do_not_touch_are_as_weak_as_the_weakest() -> None:
     assert len(both.kernel) == 6
 
 
-def test_what_cannot_be_meant_is_refused() -> None:
-    points = np.zeros((1, 3))
-    with pytest.raises(InputError, match="both sides"):
-        Resistance(
-            points=points,
-            weights=np.ones(1),
-            directions=np.zeros((1, 2, 3)),
-            growth=Directional(0.0, 1.0),
-            peak=even(1.0),
-        )
-    with pytest.raises(ValueError, match="2 or 3"):
-        RigidBody(4, np.zeros(3))
-    with pytest.raises(InputError, match="finite"):
-        RigidProblem(body=RigidBody(2, np.zeros(3)), loads={"g": np.array([np.nan, 0.0, 0.0])})
-    with pytest.raises(InputError, match="no load 'pull'"):
-        load_factors(ALONE, block(0.3), "pull")
-    with pytest.raises(InputError, match="inf"):
-        Resistance(
-            points=points,
-            weights=np.ones(1),
-            directions=np.zeros((1, 1, 2)),
-            growth=Directional(np.nan, 0.0),
-            peak=even(1.0),
-        )
-
-
-@pytest.mark.parametrize("components", [1, 2])
-def test_an_integral_with_merged_rows_is_the_same(components: int) -> None:
-    """In any order, as ranks join them; the vertices of a flat part have one row, whatever their number."""
-    random = np.random.default_rng(components)
-    rows = random.normal(size=(5, components, 3))[random.integers(0, 5, 40)] * random.uniform(0.1, 2.0, (40, 1, 1))
-    rows[7], rows[8] = 0.0, -rows[9]
-    whole = SlipIntegral(rows, Length.plain(components))
-    first, second, third = (SlipIntegral(part, whole.length) for part in (rows[:13], rows[13:14], rows[14:]))
-    for joined in (first.joined(second).joined(third), first.joined(second.joined(third))):
-        assert len(joined.rows) == 6
-        for y in random.normal(size=(20, 3)):
-            assert joined.value(y) == pytest.approx(whole.value(y), rel=1e-12)
-
-
 def test_the_example_in_the_documents_prints_what_they_say(capsys: pytest.CaptureFixture[str]) -> None:
     text = (Path(__file__).parents[2] / "docs" / "solvability.md").read_text()
     source, printed = text.split("```python\n")[1].split("```", 1)
     exec(compile(source, "docs/solvability.md", "exec"), {})
     assert capsys.readouterr().out.strip() == printed.split("```")[1].strip()
-
-
-def test_of_several_bodies_the_worst_that_is_known_counts() -> None:
-    """One that escapes decides, whatever is not known of others; else what is not known of one is not of all."""
-    unknown = undecided((), 0.0, "broke down")
-    alone = analyse(ALONE, block(0.8))
-    gone = replace(alone, state="escapes", margin=-1.0, lambda_held=0.25, lambda_peak=0.5)
-    assert combine([unknown, gone]).lambda_peak == 0.5
-    assert combine([gone, unknown]).state == "escapes"
-    assert combine([replace(alone, state="held"), unknown]).state == "undecided"
-    assert combine([unknown, alone]).kernel == alone.kernel
 
 
 def scenes() -> dict[str, RigidProblem]:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pytest
 from dolfinx import fem
 from enumeration import Floor, Point, polyline
-from scenes import DELTA, Table, block, context_of, displacement, energy, far, model, points, quadratic_linear, solved
+from scenes import DELTA, Table, block, context_of, displacement, energy, far, model, points, solved
 
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.certify.certificate import Certificate, examine
@@ -77,9 +77,9 @@ THREE = Case(3, 6e6, 1e6, paper(3e6))
 LOADS = [(1e6, 1e6), (3e6, 1e6), (6e6, 1e6), (6e6, 1e5), (-4e6, 3e5)]
 FAST = [
     THREE,
-    *(Case(n, *load, paper(g)) for n in (1, 2) for load in LOADS for g in (1e3, 1e6, 3e6, 1e7)),
-    *(Case(3, *load, paper(g)) for load in LOADS[1:] for g in (1e6, 1e7)),
-    *(Case(2, *load, graph) for load in LOADS for graph in (SAWTOOTH, RISING, TRESCA)),
+    *(Case(n, *load, paper(g)) for n in (1, 2) for load in LOADS[n - 1 :: 2] for g in (1e3, 1e6, 1e7)),
+    *(Case(3, *load, paper(1e7)) for load in LOADS[1:]),
+    *(Case(2, *load, graph) for load in LOADS[1::2] for graph in (SAWTOOTH, RISING, TRESCA)),
     Case(3, 3e6, 1e6, TRESCA),
     *(pushed_block(r) for r in (0.3, 0.55, 0.7, 0.8)),
 ]
@@ -233,8 +233,3 @@ def test_where_the_list_is_empty_the_solver_says_that_it_found_nothing(ratio: fl
     assert found.exit_code == 4
     assert found.solvability.state == "metastable"
     assert "no equilibrium found" in found.reason
-
-
-def test_the_papers_law_and_its_graph_are_one_law() -> None:
-    named = solved(model(3, 6e6, 1e6, quadratic_linear(3e6)))
-    assert far(displacement(named), displacement(solved(THREE.scene()))) < 1e-12

@@ -7,12 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from runs import hvi, summary, write_scene
-from scenes import DELTA, STEEL, P, Q, Table, block, displacement, model, points, quadratic_linear, solved
-
-from hvi_fenicsx import read_tables, solve, workflow
-from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.system import boundedness
-from hvi_fenicsx.workflow import Thresholds
+from scenes import DELTA, Q, Table, block, displacement, model, points, quadratic_linear, solved
 
 GAMMA = 1.0e6
 LAW = quadratic_linear(GAMMA)
@@ -96,49 +91,6 @@ def test_a_push_high_up_tips_the_block() -> None:
     assert "rotation about (1, 0), clockwise" in found.solvability.direction.name
 
 
-def test_the_margin_is_what_the_load_has_left() -> None:
-    """Only y = e_y: the margin of the model problem is Q over the stress scale."""
-    for press in (1e3, 1e6):
-        assert solved(model(3, P, press)).solvability.margin == pytest.approx(press / P, rel=1e-9)
-
-
-def test_in_space_too_a_support_does_not_show_in_the_friction() -> None:
-    """Where a wall prescribes a component, the residual holds its reaction; the law's own traction stands there."""
-    found = solve(
-        read_tables(
-            {
-                "domain": {"shape": "box", "size": [1.0, 1.0, 0.5], "cells": [4, 4, 2]},
-                "material": {"model": "three_dimensional", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29},
-                "boundary": {
-                    "wall": {"on": "left", "displacement": [0.0, "free", "free"]},
-                    "pull": {"on": "right", "traction": [1e6, 2e5, 0.0]},
-                    "press": {"on": "top", "traction": [0.0, 0.0, -1e6]},
-                    "floor": {
-                        "on": "bottom",
-                        "contact": {"gap": 0.0},
-                        "friction": {"law": "quadratic_linear", "gamma1": 1e6, "gamma2": 5e5, "delta": 9e-6},
-                    },
-                },
-            }
-        )
-    )
-    assert found.converged
-    assert found.examination is not None
-    state, scales = found.examination.states[0], found.problem.scales
-    held = state.surface.points[:, 0] < 1e-9
-    wanted = 1e6 / 9e-6 * state.slip[held] * scales.displacement / scales.stress
-    assert np.allclose(state.friction[held], wanted, rtol=1e-9, atol=1e-12)
-
-
-def test_the_search_for_an_equilibrium_that_need_not_exist_ends() -> None:
-    brief = Thresholds(solvers=SolverThresholds(search_steps=3))
-    found = solved(block(3, 0.97 * GAMMA, Q, LAW), brief)
-    assert found.solvability.state == "metastable"
-    assert found.exit_code == 4
-    assert "no equilibrium found in 3 Newton steps" in found.reason
-    assert solved(block(3, 0.45 * GAMMA, Q, LAW), brief).converged  # held: no such limit
-
-
 @pytest.mark.parametrize("gap", [-1e-3, "-1e-3*x", "-1e-3*(1 + x)"])
 def test_an_obstacle_that_presses_a_free_body_up_moves_it_rigidly(gap: float | str) -> None:
     """No load at all: the least rigid motion that the obstacle demands, and no force beyond rounding."""
@@ -151,23 +103,3 @@ def test_an_obstacle_that_presses_a_free_body_up_moves_it_rigidly(gap: float | s
     assert u[:, 1] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
     turn = 0.0 if gap == -1e-3 else 1e-3
     assert u[:, 0] == pytest.approx(-turn * (x[:, 1] - 0.5), rel=1e-9, abs=1e-12)
-
-
-def test_in_space_a_law_that_has_fallen_below_zero_resists_nothing() -> None:
-    """ξ > H' everywhere: what is left of the law pushes the body on, and is no negative resistance to divide by."""
-    law = {"law": "graph", "points": [[0, 4e5], [1e-6, -2e5], [1e-6, -8e5]]}
-    table = {
-        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]},
-        "material": STEEL | {"model": "three_dimensional"},
-        "boundary": {
-            "wall": {"on": "right", "displacement": [0.0, "free", "free"]},
-            "pull": {"on": "left", "traction": [5e5, 1e4, 0.0]},
-            "press": {"on": "top", "traction": [0.0, 0.0, -1e6]},
-            "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
-        },
-    }
-    prepared = workflow.prepare(read_tables(table))
-    term = prepared.problem.terms[0]
-    beyond = term.law.concave.left(np.full(len(term.surface.blocks), 10.0 * term.law.length_scale))
-    assert np.all(beyond > term.law.convex.right(np.array([10.0 * term.law.length_scale])))
-    assert boundedness.is_unbounded(prepared.problem, prepared.system.forces, [term.law], [beyond])

@@ -23,7 +23,7 @@ def falling(height: float, slope: float, cells: int) -> Table:
     }
 
 
-@pytest.mark.parametrize(("height", "slope", "cells"), [(0.0332, 1.3e-6, 2), (0.33, 1e-6, 2), (1.0, 1e-7, 4)])
+@pytest.mark.parametrize(("height", "slope", "cells"), [(0.0332, 1.3e-6, 2), (1.0, 1e-7, 4)])
 def test_the_rounding_of_its_travel_does_not_hide_what_makes_a_body_slide(
     height: float, slope: float, cells: int
 ) -> None:
@@ -35,15 +35,3 @@ def test_the_rounding_of_its_travel_does_not_hide_what_makes_a_body_slide(
     (bond,) = floor.laws
     carried = np.sum(bond.allowed[:, 0] * floor.surface.weights) * found.problem.scales.stress
     assert abs(carried) == pytest.approx(PRESS * slope, rel=1e-7)
-
-
-def test_a_wedge_that_lets_a_body_travel_beyond_what_rounding_allows_is_told() -> None:
-    wedge = {"obstacle": {"point": [1.0, 0.0], "normal": [-3e-9, 1.0]}}
-    boundary = {
-        "floor": {"on": "bottom", "contact": wedge},
-        "push": {"on": "left", "traction": [3e5, 0.0]},
-        "lid": {"on": "top", "displacement": ["free", 0.0]},
-    }
-    found = solved(falling(0.0, 0.0, 4) | {"boundary": boundary, "solver": {"method": "snes_vi"}})
-    assert found.exit_code == 4
-    assert found.reason == "not certified (a displacement of more than 1e+08 times p0 L / E0)"

@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
 import pytest
 from scenes import Table, solved
-
-from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.paths.follower import Follower
-from hvi_fenicsx.paths.state import PathOptions
-from hvi_fenicsx.reduced.condensation import Condensation
 
 MOST_STEPS = 65
 """Newton steps where a load path ends: those before it, and three further starts of at most 15."""
@@ -33,16 +27,6 @@ def bar(pull: float, cells: int = 95) -> Table:
             },
         },
     }
-
-
-def exponential_bar(share: float) -> Table:
-    """The bar under a share of what its bond bears if the traction falls exponentially from the first slip on."""
-    peak, delta, stiffness, length = 7.2e6, 6.4e-5, 4.224e7, 0.190
-    process = np.sqrt(2.0 * stiffness * delta / peak)  # E t u" = peak exp(-u/delta), u = u' = 0 at the far end
-    table = bar(share * np.sqrt(2.0 * stiffness * peak * delta) * np.tanh(length / process), 48)
-    law = {"law": "exponential", "peak_traction": peak, "residual_traction": 0.0, "delta": delta}
-    table["boundary"]["glue"]["friction"] = law
-    return table
 
 
 def strip(**solver: object) -> Table:
@@ -74,12 +58,6 @@ def anchor(load: float) -> Table:
     }
 
 
-def largest_factor(table: Table) -> float:
-    """The factor at which the path of unsmoothed laws ends."""
-    problem = Condensation(prepare(read_tables(table)).system).problem
-    return max(state.factor for state in Follower(problem, PathOptions(programme=(9.0,))).states())
-
-
 def said_factor(reason: str) -> float:
     match = re.search(r"no equilibrium on the loading path: at the factor ([\d.]+)", reason)
     assert match is not None
@@ -103,24 +81,6 @@ def test_above_its_strength_in_space_with_friction_on_a_length_the_curve_says_wh
     assert solved(anchor(0.999 * borne)).converged
 
 
-@pytest.mark.long
-def test_where_a_bond_weakens_exponentially_the_curve_says_which_load_is_borne() -> None:
-    found = solved(exponential_bar(1.05))
-    assert found.exit_code == 4
-    assert said_factor(found.solve_result.reason) * 1.05 == pytest.approx(1.0, rel=3e-3)
-    assert solved(exponential_bar(0.99)).converged
-
-
-@pytest.mark.long
-def test_above_the_strength_of_a_smoothed_law_the_curve_says_which_load_is_borne() -> None:
-    table = bar(1.05 * STRENGTH, 24)
-    table["solver"] = {"smoothing": "quadratic", "epsilon": 0.01}
-    found = solved(table)
-    strength = largest_factor(bar(STRENGTH, 24))
-    assert said_factor(found.solve_result.reason) * 1.05 == pytest.approx(strength, rel=2e-3)
-    assert found.solve_result.counts.newton < MOST_STEPS
-
-
 def test_just_below_its_strength_the_bar_is_solved() -> None:
     found = solved(bar(0.995 * STRENGTH))
     assert found.converged
@@ -132,24 +92,6 @@ def test_a_peeled_strip_is_the_same_as_by_the_branch_iteration_in_few_newton_ste
     assert branch.converged
     assert path.examination.energy == pytest.approx(branch.examination.energy, rel=1e-10)
     assert path.solve_result.counts.newton < 20 < branch.solve_result.counts.newton
-
-
-def test_a_path_that_bears_no_load_does_not_say_that_the_whole_load_is_not_borne() -> None:
-    """Where slips are negative the law pushes on: no small load is borne, but the whole one is."""
-    law = {"law": "quadratic_linear_literal", "gamma1": 1e6, "gamma2": 5e5, "delta": 9.302325581395349e-07}
-    found = solved(
-        {
-            "domain": {"shape": "rectangle", "size": [1.0, 0.001], "cells": [8, 8]},
-            "material": {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.49},
-            "boundary": {
-                "pull": {"on": "right", "traction": ["4.5e8*(4 - 6*y/0.001)", 0.0]},
-                "press": {"on": "top", "traction": [0.0, -1e6]},
-                "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": law},
-            },
-        }
-    )
-    assert found.solvability.state == "metastable"
-    assert found.converged
 
 
 def test_an_equilibrium_to_which_loading_leads_by_a_jump_only_is_found_and_told() -> None:
@@ -169,20 +111,3 @@ def test_an_equilibrium_to_which_loading_leads_by_a_jump_only_is_found_and_told(
     assert found.converged
     assert "loading leads to it by a jump, if at all: at the factor 0.703226" in found.reason
     assert found.examination.energy == pytest.approx(resting.examination.energy, rel=1e-10)
-
-
-def test_an_edge_that_has_no_path_is_no_bad_input() -> None:
-    """In space, where a law on |u_t| and a wall meet, a path is not known; the other starts are tried."""
-    soft = {"law": "graph", "points": [[0, 0], [1e-6, 1e6], [1e-5, 2e5]]}
-    table = anchor(0.0) | {
-        "domain": {"shape": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]},
-        "boundary": {
-            "press": {"on": "top", "traction": [0.0, 0.0, -1e6]},
-            "push": {"on": "left", "traction": [1.5e6, 0.0, 0.0]},
-            "floor": {"on": "bottom", "contact": {"gap": 0.0}, "friction": soft},
-            "wall": {"on": "back", "contact": {"gap": 0.0}, "friction": soft},
-        },
-    }
-    found = solved(table)
-    assert (found.exit_code, found.solvability.state) == (4, "metastable")
-    assert found.solve_result is not None

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import logging
-import re
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import P, Table, block, displacement, energy, far, model, quadratic_linear, solved
+from scenes import P, Table, displacement, energy, far, model, quadratic_linear, solved
 
-from hvi_fenicsx import NewtonStep, Solution, prepare, read_tables
-from hvi_fenicsx.errors import InputError
+from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.workflow import Thresholds, finish
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 import petsc_methods  # noqa: F401
 
-METHODS = ["tao", "ssls", "condensed"]
+METHODS = ["tao", "condensed"]
 LIFTING = [0.0, "-1e6*(1 - 1.8*x)"]
 
 
@@ -51,31 +49,22 @@ def assert_alike(found: Solution, wanted: Solution) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("linear_solver", ["lu", "gamg"])
-def test_on_the_papers_data_all_methods_agree(method: str, linear_solver: str) -> None:
+def test_on_the_papers_data_all_methods_agree(method: str) -> None:
     """The smoothed law through `auto`, which is the branch iteration."""
     wanted = solved(paper(epsilon=0.01))
-    assert_alike(solved(paper(epsilon=0.01, method=method, linear_solver=linear_solver)), wanted)
+    assert_alike(solved(paper(epsilon=0.01, method=method)), wanted)
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("pull", "gamma1"), [(P, 1.0e3), (3 * P, 1.0e6)])
-def test_where_the_body_lifts_off_all_methods_agree(method: str, pull: float, gamma1: float) -> None:
-    wanted = solved(strong(16, pull, gamma1, lift=True, epsilon=0.1))
-    found = solved(strong(16, pull, gamma1, lift=True, epsilon=0.1, method=method))
+def test_where_the_body_lifts_off_all_methods_agree(method: str) -> None:
+    wanted = solved(strong(16, 3 * P, 1.0e6, lift=True, epsilon=0.1))
+    found = solved(strong(16, 3 * P, 1.0e6, lift=True, epsilon=0.1, method=method))
     assert 0 < lifted(wanted) < 17
     assert lifted(found) == lifted(wanted)
     assert_alike(found, wanted)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_without_friction_they_solve_the_convex_programme(method: str) -> None:
-    found = solved(model(8, method=method))
-    assert found.exit_code == 0
-    assert energy(found) == pytest.approx(-6.0, rel=1e-9)
-
-
-CASES = [(6.0e6, 3.0e6, 0.1), (6.0e6, 3.0e6, 1.0e-3), (1.0e7, 8.0e6, 1.0e-2), (4.0e6, 3.0e6, 1.0e-4)]
+CASES = [(6.0e6, 3.0e6, 0.1), (1.0e7, 8.0e6, 1.0e-2)]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -105,9 +94,7 @@ def test_iterations_that_run_out_are_said_to(method: str) -> None:
     found = solved(strong(16, 6 * P, 3.0e6, epsilon=1.0, method=method, max_iterations=2))
     assert found.exit_code == 4
     assert found.solve_result is not None
-    assert {"tao": "DIVERGED_MAXITS", "ssls": "DIVERGED_MAX_IT", "condensed": "used up"}[
-        method
-    ] in found.solve_result.reason
+    assert {"tao": "DIVERGED_MAXITS", "condensed": "used up"}[method] in found.solve_result.reason
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -139,35 +126,7 @@ def test_an_interrupt_on_the_second_level_of_three_gives_what_was_found_there(ca
     assert np.linalg.norm(off) < 0.1 * np.linalg.norm(whole.u.x.array)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_progress_is_told(method: str) -> None:
-    steps: list[NewtonStep] = []
-    prepared = prepare(read_tables(strong(8, 3 * P, 1.0e6, epsilon=0.1, method=method)))
-    finish(prepared, progress=steps.append)
-    assert {step.method for step in steps} == {method}
-    assert [step.iteration for step in steps] == sorted(step.iteration for step in steps)
-    assert all(step.epsilon == 0.1 for step in steps)
-    assert steps[-1].contact > 0
-    assert re.fullmatch(rf"{method}, ε 0\.1, iteration \d+, residual \S+, \d+ vertices in contact", repr(steps[-1]))
-
-
-@pytest.mark.parametrize("method", ["tao", "ssls"])
-@pytest.mark.parametrize(
-    "wanted", [{}, {"smoothing": "paper", "epsilon_absolute": 0.1}], ids=["the law itself", "the paper's S"]
-)
-def test_laws_with_kinks_are_refused_with_the_mend(method: str, wanted: Table) -> None:
-    with pytest.raises(InputError, match=r'"quadratic" and epsilon = 0\.01'):
-        solved(paper(method=method, **wanted))
-
-
 @pytest.mark.parametrize("wanted", [{}, {"smoothing": "paper", "epsilon_absolute": 0.1}], ids=["the law itself", "S"])
 def test_the_papers_procedure_takes_the_papers_law(wanted: Table) -> None:
     """No vertex ends on a kink but the wall's corner, where the slip is prescribed."""
     assert_alike(solved(paper(method="condensed", **wanted)), solved(paper(**wanted)))
-
-
-def test_the_condensed_problem_may_be_the_whole_one() -> None:
-    """A body of two cells between floor and roof has no vertex off Γc."""
-    table = block(1, P, P, quadratic_linear(4 * P), epsilon=0.1, method="condensed")
-    table["boundary"]["press"] |= {k: table["boundary"]["floor"][k] for k in ("contact", "friction")}
-    assert solved(table).converged

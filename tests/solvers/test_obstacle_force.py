@@ -6,16 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from runs import ROOT
 from scenes import Table
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.accuracy import control
-from hvi_fenicsx.accuracy.adaptive import AdaptiveSolver
-from hvi_fenicsx.accuracy.goal import Goal
 from hvi_fenicsx.errors import ExitCode
-from hvi_fenicsx.runtime.timing import Timer
 
 E, AREA, HEIGHT, GAP = 1e9, 0.12, 0.5, 2e-4
 PLATE = {"point": [0.0, 0.0, HEIGHT + GAP], "normal": [0.0, 0.0, -1.0], "force": [0.0, 0.0, -3e4]}
@@ -120,34 +115,6 @@ def roller(cells: int, moved: dict[str, list[float]]) -> Table:
     }
 
 
-def test_the_error_under_a_force_is_that_of_the_body_under_the_obstacle_where_it_is() -> None:
-    """Energies over those of a fine mesh are squares of errors: to leading order the same with the obstacle held."""
-    force = {"force": [0.0, -5e5]}
-    coarse, fine = (solved(roller(n, force), estimate=n == 10) for n in (10, 40))
-    assert coarse.obstacle is not None
-    assert fine.obstacle is not None
-    below = coarse.energy - fine.energy
-    below -= 5e5 * (fine.obstacle.displacement[1] - coarse.obstacle.displacement[1])
-    held = {"displacement": coarse.obstacle.displacement.tolist()}
-    same, other = (solved(roller(n, held), estimate=n == 10) for n in (10, 40))
-    assert np.sqrt(below) == pytest.approx(np.sqrt(same.energy - other.energy), rel=0.08)
-    assert coarse.estimate is not None
-    assert same.estimate is not None
-    assert coarse.estimate.relative == pytest.approx(same.estimate.relative, rel=1e-6)
-
-
-@pytest.mark.parametrize("degree", [1, 2])
-def test_the_mesh_is_refined_under_a_force(degree: int) -> None:
-    scene = hvi.read_tables(roller(5, {"force": [0.0, -5e5]}) | {"solver": {"degree": degree}})
-    found = control.solve_to_goal(scene, MPI.COMM_WORLD, Goal(0.3), AdaptiveSolver(timer=Timer()), lambda _: None)
-    assert found.why is None
-    assert len(found.steps) > 1
-    assert found.solution.obstacle is not None
-    assert found.solution.obstacle.difference <= 1e-8
-    assert found.solution.estimate is not None
-    assert found.solution.estimate.relative <= 0.3
-
-
 GLIDES = {side: {"on": side, "displacement": way} for side, way in _HELD.items()}
 
 
@@ -173,19 +140,6 @@ def test_the_force_on_the_plate_has_the_limit_load_of_the_bed() -> None:
     assert hvi.solve(hvi.read_tables(table)).exit_code == ExitCode.NO_SOLUTION
 
 
-@pytest.mark.parametrize(("foot", "state"), [(0.1, "escapes"), (0.3, "borderline")])
-def test_a_plate_that_presses_beside_the_foot_tips_the_block(foot: float, state: str) -> None:
-    """The plate does not turn: it tips the block where all that it touches is beside the foot. The block may slide."""
-    table = block(
-        base={"on": "bottom", "where": f"x < {foot}", "contact": {"gap": 0.0}},
-        front={"on": ["front", "back"], "displacement": ["free", 0.0, "free"]},
-    )
-    table["domain"]["cells"] = [4, 1, 2]
-    table["boundary"]["lid"]["where"] = "x > 0.2"
-    prepared = hvi.prepare(hvi.read_tables(table))
-    assert prepared.solvability.state == state
-
-
 @pytest.mark.parametrize(
     ("obstacle", "said"),
     [
@@ -199,22 +153,6 @@ def test_forces_that_make_no_sense_are_refused(obstacle: Table, said: str) -> No
     table = block(base=BASE)
     table["boundary"]["lid"]["contact"]["obstacle"] |= obstacle
     with pytest.raises((hvi.InputError, ValueError), match=said):
-        hvi.solve(hvi.read_tables(table))
-
-
-def test_a_ball_needs_a_direction_along_its_force() -> None:
-    table = block(base=BASE)
-    ball = {"shape": "sphere", "center": [0.2, 0.15, 1.5], "radius": 1.0, "force": [0.0, 0.0, -1e3]}
-    table["boundary"]["lid"]["contact"]["obstacle"] = ball
-    with pytest.raises(hvi.InputError, match="direction along the force"):
-        hvi.solve(hvi.read_tables(table))
-
-
-def test_a_force_presses_one_obstacle_only() -> None:
-    table = block(base=BASE)
-    side = {"point": [0.4, 0.0, 0.0], "normal": [-1.0, 0.0, 0.0], "force": [-1e3, 0.0, 0.0]}
-    table["boundary"]["right"] = {"on": "right", "contact": {"obstacle": side}}
-    with pytest.raises(hvi.InputError, match="one obstacle"):
         hvi.solve(hvi.read_tables(table))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from enumeration import Floor, polyline
-from scenes import Table, block, displacement, energy, model, solved
+from scenes import Table, block, energy, model, solved
 
 
 def test_an_equilibrium_that_is_no_minimum_is_found() -> None:
@@ -52,13 +52,3 @@ def test_others_are_found_as_well(push: float, press: float, law: list[tuple[flo
     found = solved(block(2, push, press, {"law": "graph", "points": [list(point) for point in law]}))
     assert found.exit_code == 0
     assert any(energy(found) == pytest.approx(point.energy, rel=1e-7) for point in points)
-
-
-def test_without_a_load_zero_is_found_though_a_literal_law_pushes_from_it() -> None:
-    """Its interval at zero ends at zero: no smoothing has a solution near, and each piece leads off."""
-    literal: Table = {"law": "quadratic_linear_literal", "gamma1": 6e5, "gamma2": 3e5, "delta": 2.7e-5}
-    table = block(3, friction=literal)
-    table["boundary"] = {"floor": table["boundary"]["floor"], "roof": {"on": "top", "contact": {"gap": 0.0}}}
-    found = solved(table)
-    assert found.exit_code == 0
-    assert not displacement(found).any()
