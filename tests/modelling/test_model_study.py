@@ -39,14 +39,13 @@ def test_meshes_of_a_model_are_refinements_of_its_body(body: hvi.Body) -> None:
     assert errors[0] is not None
     assert errors[1] is not None
     assert 1.4 < errors[0] / errors[1] < 2.6  # of first order in h
-    assert "<td>given mesh, refined once, exact law</td><td>162</td>" in found._repr_html_()
 
 
 @pytest.mark.long
 def test_data_on_the_mesh_leave_the_model_that_mesh(body: hvi.Body, tmp_path: Path) -> None:
     model = with_ufl(body)
     for axis in ({"mesh": [0, 1]}, {"accuracy": [0.1]}):
-        with pytest.raises(hvi.InputError, match=r"study: (mesh|accuracy): .*(no other mesh|cannot be refined)"):
+        with pytest.raises(hvi.InputError, match=r"--axis (mesh|accuracy): .*(no other mesh|cannot be refined)"):
             hvi.study(model, **axis)  # type: ignore[arg-type]
     found = hvi.study(model, tmp_path / "kept", tolerance=[1e-4], repeats=1)
     assert {row.mesh for row in found.rows} == {"the body's mesh"}
@@ -66,7 +65,7 @@ def test_data_on_the_mesh_leave_the_model_that_mesh(body: hvi.Body, tmp_path: Pa
     ],
 )
 def test_what_is_no_axis_of_a_model_is_refused(body: hvi.Body, axes: Any, reason: str) -> None:
-    with pytest.raises(hvi.InputError, match=f"study: {reason}|study: .*{reason}"):
+    with pytest.raises(hvi.InputError, match=reason):
         hvi.study(steel_square(body=body), **axes)
 
 

@@ -62,13 +62,13 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
             lambda: hvi.Moment("right", [1.0, 2.0, 3.0]),
             "^Moment on right: moment has 3 components; in 2D it is one number",
         ),
-        (lambda: hvi.Displacement("left", [[0.0], 0.0]), "values.0: .*; or write None to leave the component alone"),
+        (lambda: hvi.Displacement("left", [[0.0], 0.0]), "values.0: .*; or write .free. .None from Python. to leave"),
         (
             lambda: hvi.Isotropic(youngs_modulus=1e9, poisson_ratio=0.3, model="three_dimensional"),
             "is not for 2D; use plane",
         ),
-        (lambda: hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: give a point and a normal"),  # type: ignore[arg-type]
-        (lambda: hvi.Friction("bottom", "graph"), "^Friction on bottom: law: give a law as an object"),  # type: ignore[arg-type]
+        (lambda: hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: must be a table, like"),  # type: ignore[arg-type]
+        (lambda: hvi.Friction("bottom", "graph"), "^Friction on bottom: law .graph.: points missing"),  # type: ignore[arg-type]
     ],
 )
 def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any, reason: str) -> None:
@@ -120,9 +120,9 @@ def test_numbers_may_be_of_any_kind(square: hvi.Body) -> None:
 @pytest.mark.parametrize(
     ("traction", "reason"),
     [
-        (lambda x: x, r"returns an array \(3, \d+\); return 2 components"),
-        (lambda x: 1.0, "returns 1.0; return 2 components"),
-        ([lambda x: 1j * x[0], 0.0], "returns complex128 values; return real numbers"),
+        (lambda x: x, "must return 2 components"),
+        (lambda x: 1.0, "must return 2 components"),
+        ([lambda x: 1j * x[0], 0.0], "returns complex128 values .*; return real numbers"),
     ],
 )
 def test_a_function_with_values_of_another_kind_is_refused(square: hvi.Body, traction: Any, reason: str) -> None:
@@ -173,12 +173,12 @@ def test_a_boolean_is_no_option(square: hvi.Body, options: Any) -> None:
         hvi.check(hvi.Model(square, [STEEL, hvi.Displacement("left", [0.0, 0.0])]), **options)
 
 
-def test_a_contradiction_names_effects_and_not_the_tables_of_a_scene(square: hvi.Body) -> None:
+def test_a_contradiction_names_effects_and_places(square: hvi.Body) -> None:
     with pytest.raises(hvi.InputError) as refused:
         hvi.Model(square, [STEEL, hvi.Displacement("bottom", [None, 0.0]), hvi.Contact("bottom")])
     assert str(refused.value) == (
-        'contact on bottom: the displacement normal to "bottom" is prescribed by displacement on bottom; '
-        "leave contact out or write None there"
+        'boundary.bottom.contact: the displacement normal to "bottom" is prescribed by boundary.bottom.displacement; '
+        'leave contact out or write "free" there'
     )
 
 
@@ -187,8 +187,6 @@ def test_a_contradiction_names_effects_and_not_the_tables_of_a_scene(square: hvi
     [
         (lambda model: hvi.read_scene(3), "^path: must be a path.* .is 3"),  # type: ignore[arg-type]
         (lambda model: hvi.study(model, True), "^folder: must be a path.* .is True"),
-        (lambda model: hvi.set_log_level(None), "^log level: must be a name.* .is None"),  # type: ignore[arg-type]
-        (lambda model: hvi.solve(model, timer=3), "^timer: must be a Timer.* .is 3"),
         (lambda model: hvi.solve(model, estimate=False).write(True), "^folder: must be a path.* .is True"),
         (lambda model: hvi.solve(model, estimate=False).plot([1.0]), "^picture: must be the name.* .is .1.0"),
     ],

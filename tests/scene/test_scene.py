@@ -108,7 +108,7 @@ REFUSED = {
         '"fre"',
         "s.toml:12: boundary.wall.displacement.1: 'fre' in 'fre' is not known; a formula may use "
         "x, y, z and pi; or "
-        'write "free" to leave the component alone',
+        'write "free" (None from Python) to leave the component alone',
     ),
     "model of the other dimension": (
         '"plane_stress"',
