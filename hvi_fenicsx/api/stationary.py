@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from mpi4py import MPI
 
 from ..equilibrium_search import bodies
-from ..equilibrium_search.found import Clock, Found, certified_in_words
 from ..model import Model
 from ..model.argument_checks import require_between, require_switch
 from ..runtime import log
 from ..runtime.mpi import time_over
-from ..workflow import Solution
 from .solution import ModelSolution
 from .solving import check, fields_of
 
@@ -81,26 +78,14 @@ def equilibria(
     searched = bodies.Equilibria(prepared)
     stop = time_over(prepared.system.comm, limit)
     found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
-    solutions = tuple(_certified(searched, found))
+    solutions = tuple(ModelSolution(**fields_of(searched.solution(point))) for point in found.points)
     searched.free()
     prepared.system.free()
-    return _result(found, solutions, prepared.problem.scales.energy)
-
-
-def _certified(searched: bodies.Equilibria, found: Found) -> Iterator[Solution]:
-    """The whole bodies at all points, each certified. Collective."""
-    clock, count = Clock(), len(found.points)
-    for i, point in enumerate(found.points):
-        yield searched.solution(point)
-        _LOG.debug(certified_in_words(i + 1, count, clock))
-
-
-def _result(found: Found, solutions: Sequence[Solution], energy: float) -> Equilibria:
     return Equilibria(
-        solutions=tuple(ModelSolution(**fields_of(solution)) for solution in solutions),
+        solutions=solutions,
         kinds=tuple(str(point.kind) for point in found.points),
         complete=found.complete,
-        lower_bound=None if found.lower_bound is None else found.lower_bound * energy,
+        lower_bound=None if found.lower_bound is None else found.lower_bound * prepared.problem.scales.energy,
         gap=found.gap,
         proven=found.proven,
         nodes=found.nodes,

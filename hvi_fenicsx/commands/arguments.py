@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from ..errors import InputError
 
@@ -26,147 +27,109 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 certified, 2 bad input, 3 no solution exists, 4 not converged, 130 interrupted.",
     )
     commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    _add_run_options(_add(commands, "run", "solve a scene; results go to results/SCENE or --out"))
-    _add_path_options(
-        _add(commands, "path", "follow the equilibria of a scene over its load, through peak and unloading")
-    )
-    _add_check_options(_add(commands, "check", "validate a scene and say whether a solution exists; solves nothing"))
+    scene, folder, solve = _scene(), _folder(), _solve()
+
+    def add(name: str, text: str, *parents: argparse.ArgumentParser) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text, parents=parents)
+
+    _run(add("run", "solve a scene; by default into results/SCENE", scene, folder, solve))
+    text = "follow the equilibria of a scene over its load, through peak and unloading; by default into"
+    add("path", f"{text} results/SCENE-path", scene, folder, solve)
+    _check(add("check", "validate a scene and say whether a solution exists; solves nothing", scene))
     text = "find all equilibria of a scene, or the lowest with a proof; by default into results/SCENE-equilibria"
-    _add_equilibria_options(_add(commands, "equilibria", text))
-    _add_study_options(_add(commands, "study", "measure what accuracy costs in time, along several axes"))
-    _add(commands, "version", "versions of everything")
+    _equilibria(add("equilibria", text, scene, folder, solve))
+    text = "measure what accuracy costs in time, along several axes; by default into results/SCENE-study"
+    _study(add("study", text, scene, folder))
+    add("version", "versions of everything")
     return main_parser
 
 
-def _add(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
-    return commands.add_parser(name, help=text, description=text)
+def _scene() -> argparse.ArgumentParser:
+    """What all commands have that read a scene."""
+    found = _Parser(add_help=False)
+    found.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
+    text = "override a value of the scene, like domain.cells=[64,64]"
+    found.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help=text)
+    return found
 
 
-def _add_scene_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="overrides",
-        metavar="KEY=VALUE",
-        help="override a value of the scene, like domain.cells=[64,64]",
-    )
+def _folder() -> argparse.ArgumentParser:
+    """What all commands have that write a folder."""
+    found = _Parser(add_help=False)
+    found.add_argument("--out", type=Path, metavar="DIR", help="the folder for the result")
+    found.add_argument("--force", action="store_true", help="replace what is there")
+    text = "keep a finished result of the same scene; else go on with what was stopped, or begin"
+    found.add_argument("--resume", action="store_true", help=text)
+    found.add_argument("--np", type=_whole_number(4096), metavar="N", help="run on N MPI ranks")
+    return found
 
 
-def _add_solve_options(command: argparse.ArgumentParser, result: str, *, resume: str) -> None:
-    """What all commands have that solve a scene into a folder."""
-    _add_folder_options(command, result, resume=resume)
-    command.add_argument(
-        "--petsc",
-        default="",
-        metavar="OPTIONS",
-        help='PETSc options, like "-hvi_ksp_monitor"; those of the solvers begin with -hvi_',
-    )
-    command.add_argument("--no-pictures", action="store_true", help="write no pictures")
+def _solve() -> argparse.ArgumentParser:
+    """What all commands have that solve one scene into a folder."""
+    found = _Parser(add_help=False)
+    text = 'PETSc options, like "-hvi_ksp_monitor"; those of the solvers begin with -hvi_'
+    found.add_argument("--petsc", default="", metavar="OPTIONS", help=text)
+    found.add_argument("--no-pictures", action="store_true", help="write no pictures")
+    return found
 
 
-def _add_folder_options(command: argparse.ArgumentParser, result: str, *, resume: str) -> None:
-    command.add_argument("--out", type=Path, metavar="DIR", help=f"the folder for the {result}")
-    command.add_argument("--force", action="store_true", help="replace what is there")
-    command.add_argument("--resume", action="store_true", help=resume)
-    command.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
-
-
-def _add_run_options(run: argparse.ArgumentParser) -> None:
-    _add_scene_options(run)
-    run.add_argument(
-        "--accuracy",
-        type=_relative_error,
-        metavar="REL",
-        help="choose mesh, ε and tolerances so that the relative error is below REL, like 1e-2",
-    )
+def _run(run: argparse.ArgumentParser) -> None:
+    text = "choose mesh, ε and tolerances so that the relative error is below REL, like 1e-2"
+    run.add_argument("--accuracy", type=_relative, metavar="REL", help=text)
     run.add_argument("--quantity", metavar="NAME", help="whose error --accuracy bounds, by default energy")
     run.add_argument("--no-report", action="store_true", help="write no report.html")
-    _add_solve_options(
-        run, "result; else results/SCENE", resume="keep a finished result of the same scene, else run it"
-    )
 
 
-def _add_path_options(path: argparse.ArgumentParser) -> None:
-    _add_scene_options(path)
-    _add_solve_options(
-        path, "path; else results/SCENE-path", resume="keep a finished path, else go on from its last row"
-    )
-
-
-def _add_check_options(check: argparse.ArgumentParser) -> None:
-    _add_scene_options(check)
-    check.add_argument(
-        "--load",
-        action="append",
-        default=[],
-        dest="loads",
-        metavar="NAME",
-        help="also print the factors of this load, the others constant: its part or region, or PART.traction",
-    )
+def _check(check: argparse.ArgumentParser) -> None:
+    text = "also print the factors of this load, the others constant: its part or region, or PART.traction"
+    check.add_argument("--load", action="append", default=[], dest="loads", metavar="NAME", help=text)
     check.add_argument("--json", action="store_true", help="print the report as JSON")
 
 
-def _add_equilibria_options(equilibria: argparse.ArgumentParser) -> None:
-    _add_scene_options(equilibria)
+def _equilibria(equilibria: argparse.ArgumentParser) -> None:
     equilibria.add_argument("--lowest", action="store_true", help="the lowest energy with a proof, instead of all")
-    equilibria.add_argument(
-        "--gap",
-        type=_relative_error,
-        default=1e-8,
-        metavar="REL",
-        help="what the proof of the lowest energy may leave open, relative to the energy; by default 1e-8",
-    )
+    text = "what the proof of the lowest energy may leave open, relative to the energy; by default 1e-8"
+    equilibria.add_argument("--gap", type=_relative, default=1e-8, metavar="REL", help=text)
     equilibria.add_argument("--limit", type=_seconds, metavar="SECONDS", help="stop the search after so many seconds")
-    _add_solve_options(
-        equilibria, "results; else results/SCENE-equilibria", resume="go on with a search that was stopped"
+
+
+def _study(study: argparse.ArgumentParser) -> None:
+    text = (
+        "solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, tolerance, "
+        "linear_solver or accuracy; several axes: all combinations; none: the program plans the study"
     )
+    study.add_argument("--axis", action="append", default=[], metavar="NAME=VALUE,...", help=text)
+    text = "solve a point at most N times for its time, by default 9"
+    study.add_argument("--repeat", type=_whole_number(1000), default=9, metavar="N", help=text)
+    text = "give a point up after so many seconds, by default 120"
+    study.add_argument("--limit", type=_seconds, default=120.0, metavar="SECONDS", help=text)
 
 
-def _add_study_options(study: argparse.ArgumentParser) -> None:
-    _add_scene_options(study)
-    study.add_argument(
-        "--axis",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE,...",
-        help="solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, "
-        "tolerance, linear_solver or accuracy; several axes: all combinations; none: the program plans the study",
-    )
-    repeat, limit = "solve a point at most N times for its time, by default 9", "give a point up after so many seconds"
-    study.add_argument("--repeat", type=_repetitions, default=9, metavar="N", help=repeat)
-    study.add_argument("--limit", type=_seconds, default=120.0, metavar="SECONDS", help=f"{limit}, by default 120")
-    _add_folder_options(study, "study; else results/SCENE-study", resume="keep the points that are finished")
+def _number(below: float, allowed: str) -> Callable[[str], float]:
+    """Reads a number above 0."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not 0 < value < below:
+            raise argparse.ArgumentTypeError(f"must be {allowed} (is {text!r})")
+        return value
+
+    return read
 
 
-def _relative_error(text: str) -> float:
-    return _number(text, 1.0, "a relative error between 0 and 1, like 1e-2")
+_relative = _number(1.0, "a relative error between 0 and 1, like 1e-2")
+_seconds = _number(math.inf, "a number of seconds above 0")
 
 
-def _seconds(text: str) -> float:
-    return _number(text, math.inf, "a number of seconds above 0")
+def _whole_number(most: int) -> Callable[[str], int]:
+    """Reads a number of things."""
 
+    def read(text: str) -> int:
+        if not re.fullmatch(r"[1-9][0-9]{0,8}", text) or int(text) > most:
+            raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most}, in digits like 2 (is {text!r})")
+        return int(text)
 
-def _number(text: str, below: float, allowed: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < below:
-        raise argparse.ArgumentTypeError(f"must be {allowed} (is {text!r})")
-    return value
-
-
-def _repetitions(text: str) -> int:
-    return _whole_number(text, 1000)
-
-
-def _ranks(text: str) -> int:
-    return _whole_number(text, 4096)
-
-
-def _whole_number(text: str, most: int) -> int:
-    if not re.fullmatch(r"[1-9][0-9]{0,8}", text) or int(text) > most:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most}, in digits like 2 (is {text!r})")
-    return int(text)
+    return read

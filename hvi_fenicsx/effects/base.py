@@ -370,21 +370,6 @@ class Effect(Table):
         return text.split("\n\n")[0].replace("\n", " ").replace("`", "")
 
 
-def part_of(where: str | None, key: str) -> str:
-    """The boundary part that an effect acts on, which cannot do without one.
-
-    Args:
-        where: the part, or None for the whole body.
-        key: the effect's, for the message.
-
-    Raises:
-        InputError: it is the whole body.
-    """
-    if where is None:
-        raise InputError(f"a {key} needs a boundary part")
-    return where
-
-
 def load_name(where: str | None, effect: Effect) -> str:
     """The name of what drives the body at one place: a load, a prescribed displacement, a given strain.
 

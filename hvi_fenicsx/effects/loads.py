@@ -24,7 +24,6 @@ from .base import (
     Sizes,
     SurfaceLoad,
     from_python,
-    part_of,
 )
 from .contribution import Condition, Contribution
 from .elasticity import Elasticity, strain, voigt
@@ -50,7 +49,7 @@ class Traction(Listed):
         """The linear form over its part."""
         import ufl  # here and below: a scene is read without it
 
-        part = part_of(where, self.key)
+        part = where or ""
         vector = ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
         return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(part, *self.values),))
 
@@ -161,7 +160,7 @@ class Pressure(OneValue):
 
         pressure = context.render(self.value) / context.number(context.stress)
         work = -pressure * ufl.inner(context.normal, context.test)
-        return Contribution(linear=(work * context.facets(part_of(where, self.key), self.value),))
+        return Contribution(linear=(work * context.facets(where or "", self.value),))
 
     @override
     def surface_load(self) -> SurfaceLoad:
@@ -213,7 +212,7 @@ class Force(_Total):
         """The linear form over its part."""
         import ufl
 
-        part = part_of(where, self.key)
+        part = where or ""
         scale = context.side_moments(part).area * context.stress
         mean = ufl.as_vector([context.number(force / scale) for force in self.values])
         return Contribution(linear=(ufl.inner(mean, context.test) * context.facets(part),))
@@ -260,7 +259,7 @@ class Moment(_Total):
         """
         import ufl
 
-        part = part_of(where, self.key)
+        part = where or ""
         moments = context.side_moments(part)
         rate, met = _rotation(moments.second, self.values)
         if not met:

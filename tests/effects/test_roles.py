@@ -224,21 +224,23 @@ class Unwritable(PolylineLaw, register=False):
 def test_the_role_of_an_effect_that_says_nothing_says_nothing() -> None:
     Nothing.key = "does_nothing"
     role = role_of(Nothing(), Contribution())
-    assert (role.label, role.meaning) == ("does nothing", "An effect that says nothing of itself.")
-    assert (role.place, role.drive) == ("body", "resistance")
-    assert not any((role.traction, role.pressure, role.prescribed, role.bounded, role.obstacle, role.laws))
+    assert (role["label"], role["meaning"]) == ("does nothing", "An effect that says nothing of itself.")
+    assert (role["place"], role["drive"]) == ("body", "resistance")
+    assert not any(
+        (role["traction"], role["pressure"], role["prescribed"], role["bounded"], role["obstacle"], role["laws"])
+    )
     assert Nothing().superpotentials() == ()
 
 
 def test_roles_are_plain_data_whatever_the_law() -> None:
     contact = Contact.model_validate({"obstacle": {"point": [0, 0], "normal": [0, 2]}})
     role = role_of(contact, contact.contribute(None, "floor"))  # type: ignore[arg-type]
-    assert (role.bounded, role.obstacle) == (True, (0.0, -1.0))
+    assert (role["bounded"], role["obstacle"]) == (True, (0.0, -1.0))
     friction = Friction.model_validate(GLUED)
-    (brought,) = role_of(friction, friction.contribute(None, "floor")).laws  # type: ignore[arg-type]
+    (brought,) = role_of(friction, friction.contribute(None, "floor"))["laws"]  # type: ignore[arg-type]
     assert brought == {"direction": "slip", "law": GLUED, "multiplier": 1.0, "length_multiplier": 1.0}
     assert [law.name for law in friction.superpotentials()] == ["exponential"]
     law = Unwritable(lambda: TractionGraph.from_points([(0.0, 1.0)]))
     own = Contribution(laws=(BoundaryLaw(Direction.OPENING, law),))
-    (opening,) = role_of(friction, own).laws
+    (opening,) = role_of(friction, own)["laws"]
     assert (opening["direction"], opening["law"]) == ("opening", {"law": "unwritable"})

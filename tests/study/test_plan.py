@@ -106,7 +106,7 @@ def test_a_plan_of_the_programs_own_varies_what_the_scene_has() -> None:
         (["mash=1"], "did you mean 'mesh'"),
         (["mesh="], "needs values"),
         (["epsilon=-1"], "greater than 0"),
-        (["degree=3"], "1 or 2"),
+        (["degree=3"], "must be 2 or less"),
         (["accuracy=2"], "less than 1"),
         (["method=newton"], "method"),
         (["mesh=0"], "number of cells"),
