@@ -169,23 +169,6 @@ def test_a_manufactured_solution_is_met_at_second_order(name: str) -> None:
     assert np.log2(errors[-2] / errors[-1]) > (1.7 if solid(name) else 1.85)
 
 
-def test_materials_that_are_the_same_give_the_same(tmp_path: Path) -> None:
-    """Steel told as an orthotropic material and as a tensor, beside the aluminium of another region."""
-    bar = ROOT / "demos" / "thermal_bar.toml"
-    table = read_scene(bar).tables()
-    nu, e = 0.3, 2.1e11
-    told: list[Table] = [
-        {"elasticity": "orthotropic", "youngs_moduli": [e, e], "poisson_ratios": [nu], "shear_moduli": [e / 2.6]},
-        {
-            "elasticity": "tensor",
-            "matrix": (e / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.35]])).tolist(),
-        },
-    ]
-    wanted = energy(solve(read_scene(bar)))
-    for words in told:
-        words |= {"region": "steel", "model": "plane_stress", "thermal_expansion": 12e-6}
-        table["material"]["steel"] = words
-        assert energy(solved(table)) == pytest.approx(wanted, rel=1e-9)
 
 
 # --- thermal strain
@@ -206,16 +189,6 @@ def test_a_free_body_expands_without_stress(name: str) -> None:
     assert found.problem.scales.stress > 0
 
 
-def test_a_free_body_on_a_floor_is_warmed_without_escaping() -> None:
-    """Rounding in the thermal load must not count as a load that lifts it."""
-    table = body("isotropic plane stress", thermal_expansion=ALPHA) | {"body": {"temperature": HEAT}}
-    table["boundary"] = {
-        "wall": {"on": "left", "displacement": [0.0, "free"]},
-        "floor": {"on": "bottom", "contact": {"gap": 0.0}},
-    }
-    found = solved(table)
-    assert found.exit_code == 0
-    assert far(displacement(found), points(found) * ALPHA * HEAT) < 1e-10
 
 
 def test_a_held_bar_is_pressed_by_e_alpha_t() -> None:
@@ -240,34 +213,13 @@ def test_two_materials_end_to_end_are_exact_where_their_widths_agree() -> None:
 BAR = {"poisson_ratio": 0.0, "thermal_expansion": ALPHA}
 
 
-def test_a_law_is_written_without_what_was_left_out() -> None:
-    floor = read_scene(ROOT / "demos" / "strong_law.toml").tables()["boundary"]["floor"]
-    assert floor["friction"] == {"law": "quadratic_linear", "gamma1": 1e6, "gamma2": 5e5, "delta": 9e-6}
 
 
-def test_heat_in_one_region_strains_that_region_only() -> None:
-    table = read_scene(ROOT / "demos" / "thermal_bar.toml").tables()
-    table["body"] = {"warm": {"region": "steel", "temperature": 30.0}}
-    found = solved(table)
-    x, u = points(found), displacement(found)
-    assert u[x[:, 0] > 1 - 1e-9, 0].mean() == pytest.approx(12e-6 * 30 * 0.6, rel=1e-2)
-    assert np.abs(u[x[:, 0] < 0.25, 0]).max() < 1e-7
 
 
 # --- loads, supports, shapes
 
 
-def test_a_column_under_its_own_weight() -> None:
-    errors = []
-    for cells in (8, 16):
-        table = body("isotropic plane stress", cells, poisson_ratio=0.0) | {"body": {"force": [0.0, -8.0e4]}}
-        table["boundary"] = rollers("isotropic plane stress")
-        found = solved(table)
-        y = points(found)[:, 1]
-        wanted = -8.0e4 / 2.0e11 * (y - y**2 / 2)
-        errors.append(float(np.linalg.norm(displacement(found)[:, 1] - wanted) / np.linalg.norm(wanted)))
-    assert errors[1] < 2e-3
-    assert np.log2(errors[0] / errors[1]) > 1.85
 
 
 @pytest.mark.parametrize(("effect", "load"), [("support", -Q), ("adhesion", Q)])
@@ -312,13 +264,6 @@ def test_a_floor_bears_the_weight_of_any_shape(shape: str) -> None:
     assert borne == pytest.approx(8.0e4 * area, rel=1e-9 if shape in ("l_shape", "notched_strip") else 4e-3)
 
 
-def test_what_a_scene_does_not_name_is_not_there() -> None:
-    table = body("isotropic plane stress")
-    table["boundary"] = rollers("isotropic plane stress") | {"pull": {"on": "right", "traction": [P, 0.0]}}
-    problem = prepare(read_tables(table)).problem
-    assert (problem.bounds, problem.terms, problem.surfaces, problem.bulk.averaged) == ((), (), (), ())
-    assert list(problem.linear) == ["pull.traction"]
-    assert not problem.bulk.strains
 
 
 # --- what makes no sense

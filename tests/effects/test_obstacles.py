@@ -74,45 +74,12 @@ def test_a_surface_from_a_file_is_met_where_its_triangles_are(tmp_path: Path) ->
     np.testing.assert_allclose(in_mm.gap(1e-3 * points), 1e-3 * (from_file.gap(points - [0, 0, 1.0])), atol=1e-12)
 
 
-def test_a_surface_that_has_changed_is_read_again(tmp_path: Path) -> None:
-    """A program may write a die anew between two runs."""
-    table = {"shape": "surface", "file": str(tmp_path / "ball.stl"), "direction": [0, 0, -1]}
-    gaps = []
-    for radius in (0.7, 0.5):
-        stl_of_a_ball(tmp_path / "ball.stl", radius, [0.0, 0.0, 0.0])
-        gaps.append(float(obstacle(table).gap(np.array([[0.0, 0.0, 1.0]]))[0]))
-    assert gaps == pytest.approx([0.3, 0.5], abs=1e-2)
 
 
-class Stairs(Obstacle):
-    """An obstacle whose table has a list that is no vector."""
-
-    shape = "stairs of a test"
-    begin: Vector
-    heights: tuple[float, ...]
-
-    def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        raise NotImplementedError
-
-    def ahead(self, points: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        raise NotImplementedError
 
 
-def test_a_list_of_an_obstacle_that_is_no_vector_may_have_any_length() -> None:
-    found = obstacle({"shape": Stairs.shape, "begin": [0.0, 0.0], "heights": (1.0, 2.0, 3.0), "force": [0.0, -1.0]})
-    found.check(2)
-    assert found.dimension == 2
-    with pytest.raises(InputError, match="has 2 components; in 3D it has 3"):
-        found.check(3)
 
 
-@pytest.mark.parametrize("key", ["direction", "normal", "force"])
-def test_a_direction_that_is_zero_is_refused_at_its_key(key: str) -> None:
-    with pytest.raises(ValidationError) as refused:
-        Contact.model_validate({"obstacle": {"point": [0, 0], "normal": [0, 1], key: [0, 0.0]}})
-    (mistake,) = mistakes_of(refused.value, Contact)
-    assert mistake.where[-1] == key
-    assert mistake.text == "is zero; give a direction"
 
 
 def stl_of_a_ball(file: Path, radius: float, center: list[float]) -> Path:
@@ -216,7 +183,3 @@ def test_what_is_refused(contact: Table, said: str) -> None:
         hvi.prepare(hvi.read_tables(table))
 
 
-def test_a_scene_writes_its_obstacles_as_it_read_them() -> None:
-    for table in (BALL, TUBE | MOVED, FLAT, BALL | {"hollow": True, "direction": [0.0, -1.0, 0.0]}):
-        written = Contact.model_validate({"obstacle": table}).model_dump(mode="json")
-        assert Contact.model_validate(written).obstacle == obstacle(table)

@@ -82,37 +82,7 @@ def test_at_a_notch_it_goes_down_and_up_again(tables: dict[str, Array]) -> None:
     assert rows["y"] == pytest.approx(1.0 - 0.3 * (1 - np.abs(rows["s"] - side) / side))
 
 
-def test_two_pieces_follow_one_another(tables: dict[str, Array]) -> None:
-    """The top on both sides of the notch, 0.8 each."""
-    rows = tables["top"]
-    right = rows["x"] > 1.0
-    assert rows["s"][~right] == pytest.approx(rows["x"][~right])
-    assert rows["s"][right] == pytest.approx(0.8 + rows["x"][right] - 1.2)
-    assert np.all(np.diff(rows["x"]) > 0)
 
 
-def test_a_part_that_doubles_back_counts_from_its_smallest_vertex() -> None:
-    """Three sides of a rectangle of 2 x 1, open to the right: from the lower right over the origin to the upper."""
-    corners = np.array([[2.0, 1.0], [0.0, 1.0], [0.0, 0.0], [2.0, 0.0]])
-    pairs = np.array(list(itertools.pairwise([13, 7, 5, 11])))  # the body is to their left
-    order, s = along(corners, np.array([13, 7, 5, 11]), pairs)
-    assert order.tolist() == [3, 2, 1, 0]
-    assert s == pytest.approx([-2.0, 0.0, 1.0, 3.0])
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_order_does_not_depend_on_the_numbering(seed: int) -> None:
-    """A closed chain and an open one beside it, shuffled, with facets that two ranks know."""
-    phi = np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    ring = np.column_stack([np.cos(phi), np.sin(phi)])
-    line = np.column_stack([np.linspace(5.0, 3.0, 5), np.zeros(5)])
-    points = np.concatenate([ring, line])
-    pairs = [(i, (i + 1) % 12) for i in range(12)] + [(i, i + 1) for i in range(12, 16)]
-    rng = np.random.default_rng(seed)
-    shuffle, numbers = rng.permutation(17), rng.permutation(100)[:17]
-    facets = numbers[rng.permutation(np.array(pairs + pairs[::3]))]
-    order, s = along(points[shuffle], numbers[shuffle], facets)
-    wanted = [*np.roll(np.arange(12), -6), *range(16, 11, -1)]
-    assert shuffle[order].tolist() == wanted
-    chord = 2 * np.sin(np.pi / 12)
-    assert s == pytest.approx([*(chord * np.arange(12)), *(12 * chord + 0.5 * np.arange(5))])

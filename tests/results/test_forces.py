@@ -93,39 +93,10 @@ def test_the_rows_of_a_part_add_up_to_its_resultant_and_all_parts_to_nothing(tmp
     np.testing.assert_allclose(traction[inside, 2], 0.6e6 * (1 + (x[inside] - 0.1) / 0.3), rtol=0.05)
 
 
-def test_where_no_solution_exists_the_table_has_the_loads_alone(tmp_path: Path) -> None:
-    scene = model(2)
-    del scene["boundary"]["wall"]
-    folder = run(tmp_path, scene)
-    rows = table(folder / "boundary.csv")
-    assert summary(folder)["resultants"] is None
-    np.testing.assert_allclose(rows["traction_x"][rows["part"] == "pull"], P)
-    assert np.isnan([vectors(rows, quantity) for quantity in ("u_", "reaction_")]).all()
-    assert "Forces on the body" not in (folder / "report.html").read_text(encoding="utf-8")
 
 
-def test_heat_puts_no_force_on_the_body() -> None:
-    heated = model(2)
-    heated["material"]["thermal_expansion"] = 1e-5
-    forces = solved(heated | {"body": {"temperature": 10.0}}).forces
-    assert forces is not None
-    assert set(forces.loads) == {"pull", "press"}
 
 
-def test_a_spring_pulls_back_where_it_stands() -> None:
-    problem = prepare(read_tables(model(2))).problem
-    v, u = problem.bulk.form.arguments()
-    stiffness = 3.0
-    spring = Contribution(bilinear=(stiffness * ufl.inner(u, v) * ufl.ds,))
-    press = next(placed for placed in problem.contributions if placed.where == "press")
-    problem = replace(problem, contributions=(PlacedContribution("press", press.effect, spring),), held=())
-    shifted = fem.Function(problem.space)
-    shifted.x.array.reshape(-1, 2)[:] = [2.0, -1.0]
-    forces = contact_state.forces(problem, shifted)
-    found = placed_forces.reactions(problem, shifted, forces, ())
-    assert list(found) == ["press"]
-    around = 4.0
-    np.testing.assert_allclose(found["press"].values.sum(axis=0), -stiffness * around * np.array([2.0, -1.0]))
 
 
 def test_paraview_is_given_the_whole_stress_and_the_reactions_as_vectors(uniform: Path) -> None:

@@ -75,16 +75,6 @@ def test_only_what_the_manifest_lists_makes_room(tmp_path: Path) -> None:
     assert all((tmp_path / beside / "thesis.txt").exists() for beside in (".r.old", ".r.partial"))
 
 
-def test_results_within_a_result_make_room_but_for_files_of_others(tmp_path: Path) -> None:
-    out = tmp_path / "r"
-    nested(out, "1", "one", "two", "three")
-    (out / "two" / "mine.txt").write_text("mine")
-    (out / "three" / "mine.txt").write_text("mine")
-    kept = nested(out, "2", "one", "two")
-    assert names(out) == ["manifest.json", "one", "summary.json", "three", "two", "two.kept"]
-    assert names(out / "two") == ["manifest.json", "summary.json"]
-    assert names(out / "two.kept") == names(out / "three") == ["mine.txt"]
-    assert len(kept) == 1
 
 
 def test_files_put_there_meanwhile_are_kept_and_one_with_a_name_of_ours_gets_another(tmp_path: Path) -> None:
@@ -127,43 +117,12 @@ def test_a_manifest_of_others_or_one_that_points_outside_is_none(text: str, tmp_
     assert names(tmp_path / "r") == ["manifest.json", "summary.json"]
 
 
-def test_a_link_stands_for_what_it_points_to(tmp_path: Path) -> None:
-    (tmp_path / "disk").mkdir()
-    (tmp_path / "out").symlink_to(tmp_path / "disk" / "r")  # dangling: made there
-    written(tmp_path / "out", summary="1")
-    written(tmp_path / "out", summary="2")
-    assert (tmp_path / "out").is_symlink()
-    assert (tmp_path / "disk" / "r" / "summary.json").read_text() == "2"
-    (tmp_path / "loop").symlink_to(tmp_path / "loop")
-    with pytest.raises(InputError, match="--out"):
-        OutputFolder(tmp_path / "loop", "result")
-    assert sorted(f.name for f in tmp_path.iterdir()) == ["disk", "loop", "out"]
 
 
-def test_the_folder_itself_stays_so_that_a_shell_in_it_does_too(tmp_path: Path) -> None:
-    (tmp_path / "r").mkdir()
-    before = (tmp_path / "r").stat().st_ino
-    written(tmp_path / "r", summary="1")
-    assert (tmp_path / "r").stat().st_ino == before
 
 
-def test_a_folder_that_may_not_be_written_is_refused_before_anything_is_computed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "r").mkdir()
-    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everywhere
-    folder = OutputFolder(tmp_path / "r", "result")
-    with pytest.raises(InputError, match="r: could not be written: Permission denied; choose another folder"):
-        folder.check("refuse")
-    assert names(tmp_path) == ["r"]
 
 
-def test_an_input_is_never_replaced(tmp_path: Path) -> None:
-    written(tmp_path / "r", summary="1", a="1")
-    folder = OutputFolder(tmp_path / "r", "result")
-    with pytest.raises(InputError, match="is to be read"):
-        folder.check("replace", [tmp_path / "r" / "a.json"])
-    assert names(tmp_path) == ["r"]
 
 
 def test_the_second_writer_is_refused_at_once_and_the_lock_goes_with_the_first(tmp_path: Path) -> None:
@@ -177,24 +136,8 @@ def test_the_second_writer_is_refused_at_once_and_the_lock_goes_with_the_first(t
     written(tmp_path / "r", summary="1")
 
 
-def test_a_lock_file_of_others_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / ".r.hvi-lock").write_text("mine")
-    with pytest.raises(InputError, match="move it away"):
-        written(tmp_path / "r", summary="1")
-    assert (tmp_path / ".r.hvi-lock").read_text() == "mine"
 
 
-def test_without_flock_nothing_of_others_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = OutputFolder(tmp_path / "r", "result")
-    work = first.stage()
-
-    def refused(*_: object) -> None:
-        raise OSError(38, "Function not implemented")
-
-    monkeypatch.setattr("fcntl.flock", refused)
-    with pytest.raises(InputError, match="File exists"):
-        written(tmp_path / "r", summary="1")
-    assert work.is_dir()
 
 
 class Killed(BaseException):
@@ -313,36 +256,8 @@ def test_killed_at_any_call_results_within_a_result_are_those_of_one(
     assert seen.count("2") > 6
 
 
-def test_a_result_given_up_is_not_moved_in_by_the_next_run_wherever_its_removal_is_killed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A second signal may come when the files are whole, and a third end their removal."""
-
-    def whole(work: Path) -> None:
-        filled(work)
-        manifest.write(work, manifest.Manifest(kind="result", files=manifest.listed(work)))
-
-    begin = functools.partial(written, summary="1", a="1", b="1")
-    outs = [*killed_everywhere(tmp_path, monkeypatch, begin, fill=whole, finish=lambda _: None)]
-    for out in outs:
-        OutputFolder(out, "result").close()
-        assert intact(out)
-        assert names(out.parent) == ["r"]
-    assert len(outs) > 4
 
 
-def test_killed_while_a_growing_file_is_announced_the_next_run_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The folder is made then, and its manifest is not whole yet."""
-    outs = [
-        *killed_everywhere(tmp_path, monkeypatch, lambda _: None, finish=lambda folder: folder.announce("rows.csv"))
-    ]
-    for out in outs:
-        written(out, "resume", summary="1", a="1")
-        assert set(names(out)) == set(RESULT)
-        assert names(out.parent) == ["r"]
-    assert len(outs) > 4
 
 
 def test_a_signal_waits_until_all_is_moved_whichever_thread_gets_it(
@@ -383,72 +298,9 @@ def test_a_signal_waits_until_all_is_moved_whichever_thread_gets_it(
     assert names(tmp_path) == ["r"]
 
 
-def test_what_cannot_be_moved_stays_whole_and_the_next_run_moves_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "r"
-    written(out, summary="1", a="1")
-
-    replace = os.replace
-
-    def refused(source: Path, goal: Path) -> None:
-        if goal.parent == out:
-            raise OSError(5, "Input/output error")
-        replace(source, goal)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(os, "replace", refused)
-        with pytest.raises(InputError, match="the whole result is in") as error:
-            written(out, summary="2", a="2")
-    left = Path(str(error.value).split("the whole result is in ")[1].split(",")[0])
-    assert (left / "summary.json").read_text() == "2"
-    with pytest.raises(InputError, match="already holds a result"):
-        written(out, "refuse", summary="3")
-    assert (out / "summary.json").read_text() == "2"
-    assert names(tmp_path) == ["r"]
 
 
-def test_a_left_result_that_cannot_be_moved_yet_is_not_forgotten(tmp_path: Path) -> None:
-    """A file stands where the folder was; when it is away, the next run goes on."""
-    out = tmp_path / "r"
-    folder = OutputFolder(out, "result")
-    (folder.stage() / "summary.json").write_text("1")
-    out.write_text("mine")
-    with pytest.raises(InputError, match="the whole result is in"):
-        folder.move_in({})
-    folder.close()
-    for _ in range(2):
-        with pytest.raises(InputError, match="Not a directory"):
-            written(out, summary="2")
-    assert out.read_text() == "mine"
-    out.unlink()
-    with pytest.raises(InputError, match="already holds a result"):
-        written(out, "refuse", summary="3")
-    assert (out / "summary.json").read_text() == "1"
-    assert names(tmp_path) == ["r"]
 
 
-def test_a_folder_in_the_place_of_a_listed_file_is_kept(tmp_path: Path) -> None:
-    out = tmp_path / "r"
-    written(out, summary="1", a="1", b="1")
-    for name in ("a.json", "b.json"):
-        (out / name).unlink()
-        (out / name).mkdir()
-        (out / name / "thesis.txt").write_text("mine")
-    written(out, summary="2", a="2")
-    assert (out / "a.json.kept" / "thesis.txt").exists()
-    assert (out / "b.json" / "thesis.txt").exists()
-    assert (out / "a.json").read_text() == "2"
 
 
-def test_a_damaged_file_is_found_whichever_it_is(tmp_path: Path) -> None:
-    out = tmp_path / "r"
-    written(out, summary="1", a="1")
-    assert intact(out)
-    found = manifest.read(out)
-    assert found is not None
-    (out / "a.json").write_text("")
-    assert found.damaged(out) == "a.json"
-    (out / "a.json").unlink()
-    assert found.damaged(out) == "a.json"
-    assert json.loads((out / "manifest.json").read_text())["kind"] == "result"

@@ -58,5 +58,3 @@ def test_a_disk_that_is_full_is_told_to_all_ranks_and_leaves_nothing(found: Any,
     assert left == []
 
 
-def test_pictures_are_begun_before_the_result_is_finished_where_a_processor_is_free(found: Any, ranks: int) -> None:
-    assert found["begun"] is (ranks < (os.cpu_count() or 1))

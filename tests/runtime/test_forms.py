@@ -49,10 +49,6 @@ def entry(cache: Path) -> Path:
     return next(folder for folder in cache.iterdir() if folder.is_dir())
 
 
-def test_a_form_is_compiled_once(kept: Path) -> None:
-    before = sorted((f.name, f.stat().st_mtime_ns) for f in entry(kept).iterdir())
-    assert value(FormCache(kept).compiled(area())) == pytest.approx(3.0)
-    assert sorted((f.name, f.stat().st_mtime_ns) for f in entry(kept).iterdir()) == before
 
 
 def test_parts_of_a_boundary_share_a_compiled_form_and_keep_their_own_facets(tmp_path: Path) -> None:
@@ -73,31 +69,6 @@ def test_parts_of_a_boundary_share_a_compiled_form_and_keep_their_own_facets(tmp
     assert both @ x == pytest.approx((8.5 + 4 * 5.5 + 3 * 31.5) / 70**2)
 
 
-def test_more_parts_compile_no_more_forms(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loads, contact and laws on 3 pieces of a side and on 12."""
-    names: set[str] = set()
-    compile_form = fem.form
-
-    def noted(form: Any, *, jit_options: dict[str, Any]) -> fem.Form:
-        names.add(jit_options["cache_dir"].name.partition(".")[0])
-        return compile_form(form, jit_options=jit_options)
-
-    monkeypatch.setattr(fem, "form", noted)
-
-    def needed(pieces: int) -> set[str]:
-        names.clear()
-        table = model(12)
-        for i in range(pieces):
-            where = f"x > {i / pieces} and x < {(i + 1) / pieces}"
-            table["boundary"][f"loaded-{i}"] = {"on": "top", "where": where, "traction": [f"{i}*y", -1e3 * i]}
-            touching = {"contact": {"gap": 1e-6 * i}, "friction": quadratic_linear(1e6)}
-            table["boundary"][f"floor-{i}"] = {"on": "bottom", "where": where, **touching}
-        del table["boundary"]["floor"]
-        assert prepare(read_tables(table)).problem.loads
-        return set(names)
-
-    assert needed(12) == needed(3)
-    assert needed(3)
 
 
 def test_what_a_killed_run_left_is_removed(kept: Path, tmp_path: Path) -> None:
@@ -121,18 +92,6 @@ def test_a_damaged_form_is_compiled_again(kept: Path, tmp_path: Path) -> None:
     assert min(sizes) > 0
 
 
-def test_a_lock_that_is_held_is_waited_for(kept: Path, tmp_path: Path) -> None:
-    lock = os.open(tmp_path / f"{entry(kept).name}.lock", os.O_RDWR | os.O_CREAT)
-    fcntl.flock(lock, fcntl.LOCK_EX)
-    released: list[float] = []
-
-    def release() -> None:
-        released.append(time.monotonic())
-        os.close(lock)
-
-    threading.Timer(0.5, release).start()
-    assert value(FormCache(tmp_path).compiled(area())) == pytest.approx(3.0)
-    assert released
 
 
 def test_a_cache_that_cannot_be_written_is_replaced_with_a_warning(
@@ -148,22 +107,6 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_a_warning(
     ]
 
 
-def test_a_compiler_that_a_signal_ended_is_not_started_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is the run that was interrupted, not the form that is wrong."""
-
-    def ended(*_: Any, **__: Any) -> None:
-        os.kill(os.getpid(), signal.SIGUSR1)
-        raise OSError("the compiler was ended")
-
-    monkeypatch.setattr(fem, "form", ended)
-    before = signal.getsignal(signal.SIGUSR1)
-    processes.catch([signal.SIGUSR1], lambda *_: None)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            FormCache(tmp_path / "cache").compiled(area())
-    finally:
-        signal.signal(signal.SIGUSR1, before)
-        processes.forget_signals()
 
 
 def test_a_form_that_cannot_be_compiled_is_one_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,14 +116,6 @@ def test_a_form_that_cannot_be_compiled_is_one_error(tmp_path: Path, monkeypatch
     assert [f.suffix for f in tmp_path.iterdir()] == [".lock"]
 
 
-def test_options_in_the_current_folder_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = forms.options()
-    forms.options.cache_clear()
-    forms.dolfinx.jit._load_options.cache_clear()
-    (tmp_path / "dolfinx_jit_options.json").write_text(json.dumps({"cffi_extra_compile_args": ["-O0"]}))
-    (tmp_path / "ffcx_options.json").write_text("not JSON")
-    monkeypatch.chdir(tmp_path)
-    assert forms.options() == before
 
 
 def test_all_forms_are_compiled_in_one_place() -> None:
@@ -220,8 +155,3 @@ def test_a_run_killed_while_forms_compile_does_not_stop_the_next(
     assert summary(tmp_path / "r")["converged"]
 
 
-def test_a_cache_in_the_current_folder_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    """XDG: a relative or an empty XDG_CACHE_HOME is ignored."""
-    for given, wanted in (("fenics", Path.home() / ".cache" / "fenics"), ("/kept", Path("/kept"))):
-        monkeypatch.setattr(forms, "options", lambda given=given: {"cache_dir": given})
-        assert forms._cache_folder() == wanted

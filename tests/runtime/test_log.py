@@ -66,21 +66,8 @@ def test_the_log_has_the_lines_of_the_terminal_and_every_newton_step(scene: Path
     assert seconds == sorted(seconds)
 
 
-def test_a_record_that_cannot_be_written_is_told_when_the_log_is_finished() -> None:
-    full = log.RunLog(Path("/dev/full"))
-    with log.handled(full):
-        log.logger("commands").info("a line")
-        log.logger("commands").info("another")
-    with pytest.raises(NotWrittenError, match="No space left"):
-        full.finish()
 
 
-def test_handlers_leave_the_package_as_they_found_it(tmp_path: Path) -> None:
-    package = logging.getLogger("hvi_fenicsx")
-    before = package.level, list(package.handlers)
-    with log.handled(log.RunLog(tmp_path / "run.log")):
-        assert package.level == logging.DEBUG
-    assert (package.level, package.handlers) == before
 
 
 def solve_from_python(caplog: pytest.LogCaptureFixture, level: int, **keys: object) -> list[logging.LogRecord]:
@@ -100,16 +87,9 @@ def test_from_python_existence_levels_and_certificate_are_told_at_info(caplog: p
     assert "existence: held, margin 0.333" in records[0].getMessage()
 
 
-def test_from_python_every_newton_step_is_told_at_debug(caplog: pytest.LogCaptureFixture) -> None:
-    steps = [r for r in solve_from_python(caplog, logging.DEBUG) if r.levelno == logging.DEBUG]
-    assert len(steps) > 3
-    assert {r.name for r in steps} == {"hvi_fenicsx.solvers"}
-    assert all(r.getMessage().startswith("branch, iteration ") for r in steps)
-    assert "ε 0.1" in solve_from_python(caplog, logging.DEBUG, epsilon=0.1)[-2].getMessage()
 
 
 _QUIET = "from hvi_fenicsx import read_scene, solve; solve(read_scene('square.toml'))"
-_TOLD = "import logging, sys; logging.basicConfig(level=logging.DEBUG, stream=sys.stdout, format='%(name)s'); " + _QUIET
 
 
 def test_python_users_who_configure_nothing_see_nothing(scene: Path) -> None:
@@ -117,9 +97,3 @@ def test_python_users_who_configure_nothing_see_nothing(scene: Path) -> None:
     assert (done.stdout, done.stderr) == ("", "")
 
 
-@pytest.mark.long
-def test_on_two_ranks_only_the_first_tells(scene: Path) -> None:
-    words = ["mpirun", "-n", "2", sys.executable, "-m", "mpi4py", "-c", _TOLD]
-    done = subprocess.run(words, cwd=scene.parent, capture_output=True, text=True, check=True, timeout=300)
-    assert done.stdout.split().count("hvi_fenicsx.preparation") == 1
-    assert "hvi_fenicsx.solvers" in done.stdout

@@ -61,29 +61,8 @@ def test_an_mpirun_that_ends_without_a_word_is_told(
     assert "TMPDIR" in done.stderr
 
 
-def test_each_mpirun_keeps_its_own_files_in_a_folder_of_its_own_or_where_the_user_wants_them(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A killed one's are in the way of a later one of the same process number, which would not start."""
-    local, common = "PRTE_MCA_prte_local_tmpdir_base", "PRTE_MCA_prte_tmpdir_base"
-    monkeypatch.setenv("PATH", on_path(tmp_path, f"echo ${local}; ls -d ${local}; exit 1"))
-    monkeypatch.delenv(local)
-    first, second = (hvi("run", scene, "--np", "2").stdout.split() for _ in range(2))
-    assert first[0] == first[1] != second[0]
-    assert not Path(first[0]).exists()
-    monkeypatch.setenv(common, "elsewhere")
-    assert hvi("run", scene, "--np", "2").stdout.split() == ["."]
 
 
-def test_without_a_folder_for_temporary_files_nothing_is_started(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PATH", on_path(tmp_path, "echo started"))
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
-    done = hvi("run", scene, "--np", "2", "--out", tmp_path / "r")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "--np: no temporary folder can be made" in done.stderr
-    assert not (tmp_path / "r").exists()
 
 
 def test_ranks_that_were_interrupted_are_so_when_mpirun_is_ended_without_a_word(scene: Path, tmp_path: Path) -> None:
@@ -97,11 +76,3 @@ def test_ranks_that_were_interrupted_are_so_when_mpirun_is_ended_without_a_word(
         assert process.stderr.read() == ""
 
 
-def test_a_name_with_a_line_end_is_told_in_one_line(scene: Path, tmp_path: Path) -> None:
-    out = tmp_path / "two\nlines"
-    out.mkdir()
-    (out / "mine.txt").write_text("mine")
-    done = hvi("run", scene, "--out", out)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "two\\nlines: holds other files" in done.stderr

@@ -27,15 +27,6 @@ def broken_pipe() -> TextIO:
     return open(writing, "w", encoding="utf-8")
 
 
-@pytest.mark.parametrize("closed", [False, True])
-def test_lines_that_cannot_be_written_are_passed_over(closed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    with open("/dev/full", "w", encoding="utf-8") as stream:
-        if closed:
-            stream.close()
-        monkeypatch.setattr(sys, "stdout", stream)
-        for _ in range(2):
-            terminal.say("a line")
-        terminal.finish()
 
 
 def test_what_is_not_printable_is_escaped() -> None:
@@ -43,13 +34,6 @@ def test_what_is_not_printable_is_escaped() -> None:
     assert terminal.printable("\x1b[31m \x7f \u202e \udce9") == r"\u001b[31m \u007f \u202e \udce9"
 
 
-def test_a_hangup_that_the_caller_ignores_stays_ignored() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        processes.catch([signal.SIGHUP], lambda *_: None)
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGHUP, before)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from hvi_fenicsx import InputError, prepare, read_scene, read_tables
 
 LAW = quadratic_linear(1e3)
 TABLE: dict[str, tuple[str, str]] = {
-    "a degree that there is not": ("solver.degree=3", "--set solver.degree: must be 1 or 2 (is 3)"),
+    "a degree that there is not": ("solver.degree=3", "--set solver.degree: must be 2 or less (is 3)"),
     "unknown key": ("domain.sell=[4, 4]", "sell: unknown key"),
     "unknown table": ("boundry.x.on='left'", "boundry"),
     "misspelt side": ("boundary.wall.on='lefft'", 'did you mean "left"'),

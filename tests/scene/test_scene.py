@@ -120,11 +120,6 @@ REFUSED = {
         '[material]\nregion = "a"',
         's.toml:7: material.region: a rectangle has no regions; leave region out, or use shape = "file"',
     ),
-    "contact twice": (
-        '[boundary.floor]\non = "bottom"',
-        '[boundary.a]\non = ["top", "bottom"]\ncontact = { gap = 0 }\n[boundary.floor]\non = "bottom"',
-        's.toml:21: boundary.floor.contact: "bottom" has contact already, from boundary.a.contact; give it once',
-    ),
     "contact where nothing can close": (
         'on = "bottom"',
         'on = "left"',
