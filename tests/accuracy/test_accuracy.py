@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
 from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantities import FrictionTraction
-from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, extrapolated, prolong
+from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, prolong
 from hvi_fenicsx.certify import contact_state
 from hvi_fenicsx.runtime import memory
 from hvi_fenicsx.runtime.timing import Timer
@@ -91,8 +90,6 @@ def test_a_drop_on_its_way_and_a_wavy_gap_keep_what_is_asked_for(table: dict[str
     assert requested / 2 < far_in_energy(finer(reached.level, 3)) < requested
 
 
-
-
 @pytest.mark.parametrize(
     ("name", "quantity", "asked"),
     [("drop", "u_t", 5e-2), ("drop", "sigma_t", 5e-2), pytest.param("glue", "u_t", 0.1, marks=pytest.mark.long)],
@@ -110,12 +107,6 @@ def test_a_quantity_on_the_floor_is_kept(name: str, quantity: str, asked: float)
     apart = contact_norm(levels[-1], own.x.array - field.x.array, power)  # type: ignore[union-attr]
     whole = contact_norm(levels[-1], own.x.array, power)  # type: ignore[union-attr]
     assert asked / 5 * whole < apart < asked * whole
-
-
-
-
-
-
 
 
 def test_smoothing_is_narrowed_as_far_as_asked_for_without_a_finer_mesh() -> None:
@@ -175,10 +166,6 @@ def test_the_degree_is_two_unless_a_quantity_is_compared_from_mesh_to_mesh() -> 
     assert reach(scene, Goal(0.2, "resultant"), None).degree == 1
 
 
-
-
-
-
 def test_an_accuracy_beyond_all_numbers_is_refused_in_words() -> None:
     reached = reach(read_tables(STRONG), Goal(1e-200))
     assert reached.why == "1e-200 is beyond any number of unknowns"
@@ -208,8 +195,6 @@ def test_a_signal_leaves_the_last_mesh_with_an_error(at: str) -> None:
     assert reached.level.dofs == reached.steps[-1].dofs
     assert reached.why == lines[-1] == "interrupted"
     assert reached.exit_code == 130
-
-
 
 
 @pytest.mark.parametrize(

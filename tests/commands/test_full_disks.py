@@ -12,11 +12,6 @@ from full_disk import room_for
 from runs import ROOT, hvi, on_ranks, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import InputError, read_scene, solve
-from hvi_fenicsx.errors import NotWrittenError
-from hvi_fenicsx.report.pictures import draw
-from hvi_fenicsx.runtime import processes
-
 BAR = ROOT / "demos" / "glued_bar.toml"
 SHORT = ("--set", "domain.size=[0.05, 0.001]", "--set", "domain.cells=[10, 1]")
 
@@ -59,46 +54,6 @@ def test_a_run_leaves_nothing(room: int, name: str, scene: Path, tmp_path: Path)
     with room_for(room):
         refused(hvi("run", scene, "--out", tmp_path / "r", "--no-pictures"), tmp_path / "r", name)
     assert [f.name for f in tmp_path.iterdir()] == ["square.toml"]
-
-
-@pytest.mark.long
-def test_a_picture_that_finds_no_room_is_told_and_one_that_cannot_be_drawn_costs_a_line(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with room_for(50_000):
-        refused(hvi("run", scene, "--out", tmp_path / "r"), tmp_path / "r", "body.png")
-    assert [f.name for f in tmp_path.iterdir()] == ["square.toml"]
-    monkeypatch.setattr(processes, "PYTHON", ("false",))
-    done = hvi("run", scene, "--out", tmp_path / "r")
-    assert done.returncode == 0
-    assert "pictures: the drawing process ended with 1" in done.stdout
-
-
-@pytest.mark.long
-def test_a_search_names_the_file_in_the_folder_of_its_equilibrium(scene: Path, tmp_path: Path) -> None:
-    out = tmp_path / "r"
-    with room_for(10_000):
-        refused(hvi("equilibria", scene, "--out", out, "--no-pictures"), out, "equilibrium-1/report.html")
-    assert [f.name for f in tmp_path.iterdir()] == ["square.toml"]
-    hvi("equilibria", scene, "--out", out, "--no-pictures")
-    with (
-        room_for(10_000),
-        pytest.raises(NotWrittenError, match=r"equilibria\.png could not be written: File too large"),
-    ):
-        draw.draw(out)
-
-
-def test_a_folder_that_is_made_for_a_path_goes_where_nothing_can_be_written(tmp_path: Path) -> None:
-    with room_for(50):
-        refused(hvi("path", BAR, "--out", tmp_path / "r", *SHORT), tmp_path / "r", "manifest.json")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_from_python_the_error_names_file_and_folder(scene: Path, tmp_path: Path) -> None:
-    solution = solve(read_scene(scene))
-    with room_for(100), pytest.raises(InputError, match=r"r: contact\.csv could not be written: File too large; make"):
-        solution.write(tmp_path / "r", pictures=False)
-    assert not (tmp_path / "r").exists()
 
 
 @pytest.mark.long

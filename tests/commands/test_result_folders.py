@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import signal
 import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +13,6 @@ from damage import grid, msh
 from runs import command, hvi, summary, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx.report import page
-from hvi_fenicsx.report.errors import ResultError
 from hvi_fenicsx.results.output_folder import OutputFolder
 
 TABLE = model(2, friction=quadratic_linear(1e3))
@@ -97,37 +92,6 @@ def test_a_damaged_result_is_not_finished(name: str, text: str | None, copy: Pat
     assert "finished already" in run(copy / "square.toml", copy / "r", "--resume").stdout
 
 
-@pytest.mark.parametrize("name", ["summary.json", "scene.toml"])
-def test_a_file_that_the_manifest_lists_without_its_hash_is_not_trusted(name: str, copy: Path) -> None:
-    record = json.loads((copy / "r" / "manifest.json").read_text())
-    record["files"][name] = None
-    (copy / "r" / "manifest.json").write_text(json.dumps(record))
-    (copy / "r" / name).write_bytes(b"\xff")
-    done = run(copy / "square.toml", copy / "r", "--resume")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert f"{name} is not as it was written; the scene is run again" in done.stdout
-
-
-def test_a_page_that_is_made_again_leaves_the_result_whole(copy: Path) -> None:
-    (copy / "r" / "report.html").unlink()
-    page.write(copy / "r")
-    assert "finished already" in run(copy / "square.toml", copy / "r", "--resume").stdout
-
-
-def test_a_page_that_could_not_be_written_is_not_recommended(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refused(folder: Path) -> Path:
-        raise ResultError("no page today")
-
-    assert "open report.html there" in run(scene, tmp_path / "r").stdout
-    monkeypatch.setattr(page, "write", refused)
-    done = run(scene, tmp_path / "s")
-    assert done.returncode == 0
-    assert "no page today" in done.stdout
-    assert "open report.html" not in done.stdout
-
-
 def test_a_run_into_a_folder_that_is_being_written_is_refused_at_once(scene: Path, tmp_path: Path) -> None:
     first = OutputFolder(tmp_path / "r", "result")
     first.stage()
@@ -147,15 +111,6 @@ def from_file(tmp_path: Path) -> Path:
     (tmp_path / "meshes" / "part.msh").write_bytes(msh(grid()))
     table = TABLE | {"domain": {"shape": "file", "file": str(tmp_path / "meshes" / "part.msh")}}
     return write_scene(tmp_path / "part.toml", table)
-
-
-def test_paths_in_scene_and_page_are_short(from_file: Path, tmp_path: Path) -> None:
-    assert run(from_file, tmp_path / "r").returncode == 0
-    for name in ("scene.toml", "report.html"):
-        assert str(tmp_path) not in (tmp_path / "r" / name).read_text(encoding="utf-8"), name
-    assert 'file = "../meshes/part.msh"' in (tmp_path / "r" / "scene.toml").read_text(encoding="utf-8")
-    assert run(tmp_path / "r" / "scene.toml", tmp_path / "again").returncode == 0
-    assert summary(tmp_path / "again")["energy"] == summary(tmp_path / "r")["energy"]
 
 
 def test_a_result_of_another_mesh_is_not_finished(from_file: Path, tmp_path: Path) -> None:
@@ -188,22 +143,3 @@ def test_of_runs_that_start_together_one_writes_and_the_others_are_refused(
         assert json.loads((tmp_path / "r" / "manifest.json").read_text())["files"].keys() == set(
             names(tmp_path / "r")
         ) - {"manifest.json"}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_the_lock_goes_with_a_killed_run(ranks: int, scene: Path, tmp_path: Path) -> None:
-    large = ["--set", "domain.cells=[200, 200]", "--set", 'solver.linear_solver="gamg"', "--no-pictures"]
-    words = command("run", scene, "--out", tmp_path / "r", *large, ranks=ranks)
-    child = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, start_new_session=True)
-    assert child.stdout is not None
-    while (line := child.stdout.readline()) and not line.startswith("existence"):
-        pass
-    refused = run(scene, tmp_path / "r")
-    assert (refused.returncode, refused.stdout) == (2, "")
-    os.killpg(child.pid, signal.SIGKILL)
-    child.communicate()
-    time.sleep(0.5)  # ranks end with their mpirun, a moment later
-    assert not (tmp_path / "r").exists()
-    assert run(scene, tmp_path / "r").returncode == 0
-    assert names(tmp_path) == ["r", "square.toml"]

@@ -7,7 +7,6 @@ the program's own words.
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 import subprocess
 import sys
@@ -89,13 +88,6 @@ def test_a_body_of_the_users_shape_stands_on_its_floor_with_its_weight(files: Pa
     assert 'unknown side "botom"; did you mean "bottom"? allowed: bottom, right, top, left' in refused.stderr
 
 
-def test_check_tells_what_they_add(files: Path) -> None:
-    data = json.loads(process("check", "pressed.toml", "--json", cwd=files).stdout)
-    pressure = next(e for e in data["effects"] if e["effect"] == "water")
-    assert (pressure["adds"], pressure["terms"]) == ("<g, v> += -∫ ρ g (level - y) v·n ds", "1 linear")
-    assert "the lower energy" in data["solver"]
-
-
 @pytest.mark.long
 def test_the_users_smoothing_gives_what_a_narrow_one_of_the_programs_gives(files: Path) -> None:
     for name in ("cubic", "quadratic"):
@@ -105,12 +97,6 @@ def test_the_users_smoothing_gives_what_a_narrow_one_of_the_programs_gives(files
     own, program = (summary(files / name) for name in ("cubic", "quadratic"))
     assert (own["smoothing"], own["certificate"]["passed"]) == ("cubic", True)
     assert own["energy"] == pytest.approx(program["energy"], rel=1e-6)
-
-
-def test_a_misspelt_smoothing_is_told_with_the_users_own(files: Path) -> None:
-    done = process("check", "pressed.toml", "--set", 'solver={smoothing="cubik", epsilon=0.01}', cwd=files)
-    assert done.returncode == 2
-    assert 'unknown value "cubik"; did you mean "cubic"? allowed: chks, cubic, log_exp' in " ".join(done.stderr.split())
 
 
 @pytest.mark.long
@@ -125,19 +111,6 @@ def test_an_accuracy_of_the_users_quantity_is_kept(files: Path) -> None:
     assert (asked["accuracy"]["quantity"], asked["accuracy"]["reached"]) == ("work", True)
     assert "of the work of the loads" in (files / "asked" / "run.log").read_text(encoding="utf-8")
     assert asked["energy"] == pytest.approx(summary(files / "exact")["energy"], rel=0.02)
-
-
-def test_a_misspelt_quantity_is_told_with_the_users_own(files: Path) -> None:
-    done = process("run", "pressed.toml", "--accuracy", "0.1", "--quantity", "werk", "--out", "x", cwd=files)
-    assert done.returncode == 2
-    assert "--quantity: unknown name 'werk' (did you mean 'work'?); allowed: " in done.stderr
-    assert not (files / "x").exists()
-
-
-def test_the_result_runs_again_from_its_own_scene(files: Path, pressed: Path) -> None:
-    again = process("run", pressed / "scene.toml", "--out", "again", "--no-pictures", cwd=files)
-    assert again.returncode == 0, again.stderr
-    assert summary(files / "again")["energy"] == summary(pressed)["energy"]
 
 
 def test_from_python(files: Path, pressed: Path) -> None:

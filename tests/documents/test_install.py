@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import configparser
-import os
 import re
 import shutil
 import subprocess
@@ -111,24 +110,3 @@ def test_its_command_runs_a_scene_elsewhere(wheel: zipfile.ZipFile, tmp_path: Pa
         assert done.stdout.startswith(str(tmp_path / "site"))
         names = {file.name for file in (tmp_path / f"r{ranks}").iterdir()}
         assert {"report.html", "summary.json", "contact.png", "body.png"} <= names
-
-
-@pytest.mark.parametrize(("sections", "jupyter"), [("", False), ("notebook", True)])
-def test_further_sections_of_packages_are_installed_where_they_are_asked_for(sections: str, jupyter: bool) -> None:
-    script = 'root=$PWD; eval "$(sed -n "/^packages()/,/^}/p" hvi)"; packages run tests'
-    wanted = {**os.environ, "HVI_SECTIONS": sections}
-    done = subprocess.run(["bash", "-c", script], cwd=ROOT, env=wanted, capture_output=True, text=True, check=True)
-    assert "python3-dolfinx" in done.stdout.split()
-    assert ("jupyter-notebook" in done.stdout.split()) == jupyter
-
-
-def test_a_cache_that_cannot_be_written_is_named_where_no_environment_is_found(tmp_path: Path) -> None:
-    """It is why an environment that could have been made there was not found, or not made."""
-    (tmp_path / "file").touch()
-    cache = tmp_path / "file" / "cache"
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("HVI_")}
-    chosen = {"HVI_WAY": "image", "XDG_CACHE_HOME": str(cache), "TMPDIR": str(tmp_path), "PATH": "/usr/bin:/bin"}
-    words = [ROOT / "hvi", "version"]
-    done = subprocess.run(words, env=kept | chosen, capture_output=True, text=True, check=False, timeout=60)
-    assert done.returncode == 1
-    assert f"the cache {cache}/hvi_fenicsx cannot be written to; no docker or podman engine" in done.stderr

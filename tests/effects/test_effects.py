@@ -7,7 +7,6 @@ not come from this program.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy.typing as npt
 import pytest
 import sympy
 from runs import ROOT
-from scenes import STEEL, E, P, Q, Table, block, displacement, energy, far, model, points, quadratic_linear, solved
+from scenes import STEEL, E, P, Q, Table, block, displacement, far, model, points, quadratic_linear, solved
 
 from hvi_fenicsx import InputError, prepare, read_scene, read_tables, solve
 
@@ -169,8 +168,6 @@ def test_a_manufactured_solution_is_met_at_second_order(name: str) -> None:
     assert np.log2(errors[-2] / errors[-1]) > (1.7 if solid(name) else 1.85)
 
 
-
-
 # --- thermal strain
 
 
@@ -187,8 +184,6 @@ def test_a_free_body_expands_without_stress(name: str) -> None:
         factor -= s[:2, 2] / s[2, 2]
     assert far(displacement(found), points(found) * ALPHA * HEAT * factor) < 1e-10
     assert found.problem.scales.stress > 0
-
-
 
 
 def test_a_held_bar_is_pressed_by_e_alpha_t() -> None:
@@ -213,13 +208,7 @@ def test_two_materials_end_to_end_are_exact_where_their_widths_agree() -> None:
 BAR = {"poisson_ratio": 0.0, "thermal_expansion": ALPHA}
 
 
-
-
-
-
 # --- loads, supports, shapes
-
-
 
 
 @pytest.mark.parametrize(("effect", "load"), [("support", -Q), ("adhesion", Q)])
@@ -262,8 +251,6 @@ def test_a_floor_bears_the_weight_of_any_shape(shape: str) -> None:
     state = found.examination.states[0]
     borne = -float(state.surface.weights @ state.pressure) * found.problem.scales.force
     assert borne == pytest.approx(8.0e4 * area, rel=1e-9 if shape in ("l_shape", "notched_strip") else 4e-3)
-
-
 
 
 # --- what makes no sense

@@ -6,15 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from runs import ROOT
 from scenes import E, Table, model
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.effects import Contact
-from hvi_fenicsx.effects.obstacles import Obstacle, Vector
-from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.schema import mistakes_of
+from hvi_fenicsx.effects.obstacles import Obstacle
 
 BALL = {"shape": "sphere", "center": [0.3, -1.0, 0.2], "radius": 0.7}
 TUBE = {"shape": "cylinder", "center": [0.3, -1.0, 0.2], "axis": [1.0, 2.0, -0.5], "radius": 0.7}
@@ -72,14 +69,6 @@ def test_a_surface_from_a_file_is_met_where_its_triangles_are(tmp_path: Path) ->
         {"shape": "surface", "file": str(file), "direction": [0, 0, -1], "scale": 1e-3, "displacement": [0, 0, 1e-3]}
     )
     np.testing.assert_allclose(in_mm.gap(1e-3 * points), 1e-3 * (from_file.gap(points - [0, 0, 1.0])), atol=1e-12)
-
-
-
-
-
-
-
-
 
 
 def stl_of_a_ball(file: Path, radius: float, center: list[float]) -> Path:
@@ -181,5 +170,3 @@ def test_what_is_refused(contact: Table, said: str) -> None:
     table["boundary"]["floor"]["contact"] = contact
     with pytest.raises((hvi.InputError, ValueError), match=said):
         hvi.prepare(hvi.read_tables(table))
-
-

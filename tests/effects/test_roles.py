@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +13,7 @@ import tomli_w
 from runs import process, summary
 from scenes import model
 
-from hvi_fenicsx.effects import (
-    BoundaryLaw,
-    Contact,
-    Contribution,
-    Direction,
-    Effect,
-    FormContext,
-    Friction,
-    Place,
-    role_of,
-)
-from hvi_fenicsx.laws import Exponential, PolylineLaw, TractionGraph
+from hvi_fenicsx.laws import Exponential
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.pictures import sides
 from hvi_fenicsx.report.pictures.sides import touches
@@ -195,52 +183,3 @@ def test_a_scene_of_the_users_effects_is_checked_for_contradictions(folder: Path
     assert done.returncode == 2
     assert '"left" has u_x prescribed already, by boundary.wall.' in told
     assert "leave bed out or write" in told
-
-
-class Nothing(Effect):
-    """An effect that says nothing of itself.
-
-    And a second paragraph.
-    """
-
-    place = Place.BODY
-
-    def contribute(self, context: FormContext, where: str | None) -> Contribution:
-        return Contribution()
-
-
-class Unwritable(PolylineLaw, register=False):
-    """A law whose parameter no file can hold."""
-
-    name = "unwritable"
-
-    def __init__(self, graph_of: Callable[[], TractionGraph]) -> None:
-        self.graph_of = graph_of
-
-    def build(self) -> TractionGraph:
-        return self.graph_of()
-
-
-def test_the_role_of_an_effect_that_says_nothing_says_nothing() -> None:
-    Nothing.key = "does_nothing"
-    role = role_of(Nothing(), Contribution())
-    assert (role["label"], role["meaning"]) == ("does nothing", "An effect that says nothing of itself.")
-    assert (role["place"], role["drive"]) == ("body", "resistance")
-    assert not any(
-        (role["traction"], role["pressure"], role["prescribed"], role["bounded"], role["obstacle"], role["laws"])
-    )
-    assert Nothing().superpotentials() == ()
-
-
-def test_roles_are_plain_data_whatever_the_law() -> None:
-    contact = Contact.model_validate({"obstacle": {"point": [0, 0], "normal": [0, 2]}})
-    role = role_of(contact, contact.contribute(None, "floor"))  # type: ignore[arg-type]
-    assert (role["bounded"], role["obstacle"]) == (True, (0.0, -1.0))
-    friction = Friction.model_validate(GLUED)
-    (brought,) = role_of(friction, friction.contribute(None, "floor"))["laws"]  # type: ignore[arg-type]
-    assert brought == {"direction": "slip", "law": GLUED, "multiplier": 1.0, "length_multiplier": 1.0}
-    assert [law.name for law in friction.superpotentials()] == ["exponential"]
-    law = Unwritable(lambda: TractionGraph.from_points([(0.0, 1.0)]))
-    own = Contribution(laws=(BoundaryLaw(Direction.OPENING, law),))
-    (opening,) = role_of(friction, own)["laws"]
-    assert (opening["direction"], opening["law"]) == ("opening", {"law": "unwritable"})

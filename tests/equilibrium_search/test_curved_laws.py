@@ -12,7 +12,6 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.curved_laws import CurvedLaws
-from hvi_fenicsx.equilibrium_search.law_graphs import law_graph
 from hvi_fenicsx.equilibrium_search.stationarity import Kind
 from hvi_fenicsx.equilibrium_search.systematic import near_stationary
 from hvi_fenicsx.laws.smoothing import registered
@@ -66,20 +65,6 @@ def test_minimisers_and_saddles_of_two_bonds_are_those_of_a_scan(
         assert (point.kind == Kind.MINIMISER) == bool(np.linalg.eigvalsh(turning)[0] > 0.0)
 
 
-def test_a_point_that_newton_does_not_reach_is_none() -> None:
-    both = two_bonds(CHKS, np.array([1.0, 1.0]))
-    assert both.point(np.array([40.0, -40.0])) is None
-
-
-def test_an_unknown_in_stick_stays_there() -> None:
-    law = laws.Exponential(2.0, 0.5, 1.0)
-    problem = condensed.problem([[1.0]], [1.0], condensed.bonds(law, [0]))
-    curved = CurvedLaws(near=scalar_problem(problem), problem=problem)
-    found = near_stationary(curved.near, [], lambda: False, curved.point)
-    assert [tuple(p.x) for p in found] == [(0.0,)]
-    assert found[0].kind == Kind.MINIMISER
-
-
 def test_all_saddles_of_a_curved_scene_are_certified() -> None:
     """No solver makes a saddle exact; each is certified as it was found. A small ε leaves their number as it is."""
     plain = hvi.equilibria(hvi.read_tables(model(2, 6e6, 1e6, quadratic_linear(3e6))))
@@ -88,12 +73,3 @@ def test_all_saddles_of_a_curved_scene_are_certified() -> None:
     assert all(s.converged for s in found.solutions)
     assert sorted(found.kinds) == sorted(plain.kinds)
     assert [s.energy for s in found.solutions] == pytest.approx([s.energy for s in plain.solutions], rel=1e-3)
-
-
-def test_places_of_a_law_that_only_rounding_tells_apart_are_one() -> None:
-    """Breaks of the smoothing at 0.04 and 0.16 meet doubled distances that differ in the last digit."""
-    law = registered()["log_exp"]().smooth(laws.QuadraticLinearLiteral(0.1, 0.05, np.nextafter(0.2, 1.0)), 1e-3)
-    graph = law_graph(law, 1e6, 1e-4 * law.energy_scale)
-    assert np.isfinite(graph.error)
-    x = np.linspace(-1.0, 1.0, 20_001)
-    np.testing.assert_allclose(graph.graph.traction(x, "right"), law.right(x), atol=0.02 * law.traction_scale)

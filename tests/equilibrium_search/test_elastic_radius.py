@@ -9,11 +9,8 @@ from array_enumeration import stationary
 from scenes import block
 
 from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.equilibrium_search.boxes import fresh_box
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
-from hvi_fenicsx.equilibrium_search.elastic_radius import ElasticRadius
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
-from hvi_fenicsx.equilibrium_search.rigid_balance import RigidBalance
 from hvi_fenicsx.equilibrium_search.scalar_problem import ScalarProblem
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.typing import Array
@@ -57,19 +54,6 @@ def test_all_points_of_a_row_that_only_bonds_hold_are_those_of_brute_force(seed:
     wanted, listed = stationary(problem), [p.x for p in all_of(problem).points]
     assert all(near(x, listed) for x in wanted)
     assert all(near(x, wanted) for x in listed)
-
-
-@pytest.mark.parametrize("seed", [*QUICK, *MANY])
-def test_smaller_cells_keep_all_points_whatever_the_other_point_is(seed: int) -> None:
-    problem, random = free_chain(seed), np.random.default_rng(seed)
-    test = ElasticRadius(problem, RigidBalance(problem))
-    for x in stationary(problem):
-        for reach in (1e-2, 1.0, 1e3, 1e6):
-            ends = [x + sign * reach * random.uniform(0.01, 1.0, problem.size) for sign in (-1.0, 1.0)]
-            low, high = np.maximum(problem.lower, ends[0]), np.minimum(problem.upper, ends[1])
-            smaller = test.tightened(fresh_box(low, high, random.uniform(low, high)))
-            assert smaller is not None
-            assert np.all((x >= smaller.low) & (x <= smaller.high))
 
 
 def test_a_block_whose_floor_stretches_farther_than_its_bonds_slide_has_no_equilibrium() -> None:

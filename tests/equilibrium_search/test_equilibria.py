@@ -7,19 +7,17 @@ import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import tomli_w
 from enumeration import Floor, polyline
 from matplotlib.colors import to_rgb
 from PIL import Image
-from scenes import DELTA, Table, block, model, quadratic_linear
+from scenes import DELTA, Table, model, quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.cli import main
 from hvi_fenicsx.commands import equilibria as command
-from hvi_fenicsx.commands import session
 from hvi_fenicsx.equilibrium_search.found import Saved
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
 
@@ -145,24 +143,6 @@ def test_a_search_that_is_killed_goes_on_from_its_last_state(
     assert not (out / "search.journal").exists()
 
 
-def test_a_search_of_another_version_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-
-    words = ["equilibria", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--no-pictures"]
-    assert main([*words, "--limit", "1e-9"]) == 4
-    asked: list[Saved | None] = []
-    find = command.Equilibria.find
-
-    def noted(bodies: command.Equilibria, **words: Any) -> Any:
-        asked.append(words["saved"])
-        return find(bodies, **words)
-
-    monkeypatch.setattr(command.Equilibria, "find", noted)
-    assert main([*words, "--resume", "--limit", "1e-9"]) == 4
-    monkeypatch.setattr(session, "__version__", "another")
-    assert main([*words, "--resume", "--limit", "1e-9"]) == 4
-    assert [saved is None for saved in asked] == [False, True]
-
-
 @pytest.mark.long
 def test_a_search_that_is_stopped_goes_on_where_it_was(tmp_path: Path) -> None:
     out = tmp_path / "out"
@@ -182,13 +162,6 @@ def test_the_picture_has_a_strip_for_each_equilibrium_and_lines_to_the_saddle(tm
         assert picture.width == 1200
         colours = {c for _, c in picture.convert("RGB").getcolors(1_000_000) or []}
     assert {to_rgb(c) for c in (BLUE, ORANGE, VERMILION, PALE)} <= {tuple(v / 255 for v in c) for c in colours}
-
-
-@pytest.mark.long
-def test_a_metastable_block_has_no_lowest_energy(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text(tomli_w.dumps({"title": "block", **block(2, 7e5, friction=quadratic_linear(1e6))}))
-    assert main(["equilibria", str(path), "--lowest", "--out", str(tmp_path / "out"), "--no-pictures"]) == 4
 
 
 @pytest.mark.parametrize("words", [(), ("--lowest",)])

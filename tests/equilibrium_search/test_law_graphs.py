@@ -28,16 +28,6 @@ CURVED = [
 ]
 
 
-@pytest.mark.parametrize("law", [MODEL, TEETH, laws.Tresca(1.0)], ids=lambda law: law.name)
-def test_the_quadratic_smoothing_of_a_polyline_is_a_polyline(law: laws.Superpotential) -> None:
-    smoothed = registered()["quadratic"]().relative(law, 0.1)
-    found = law_graph(smoothed, 1e6, 1e-9)
-    x = np.random.default_rng(1).uniform(-5, 5, 20_000)
-    assert found.error == 0.0
-    np.testing.assert_allclose(found.graph.primitive(x) + found.offset, smoothed.value(x), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(found.graph.traction(x, "right"), smoothed.right(x), rtol=0, atol=1e-11)
-
-
 def near_and_far() -> Array:
     """Displacements near the pieces of a law, and some far away."""
     random = np.random.default_rng(1)
@@ -52,17 +42,6 @@ def test_a_curved_law_is_as_near_to_its_polyline_as_is_said(law: laws.Superpoten
     difference = np.abs(found.graph.primitive(x) + found.offset - law.value(x))
     assert np.max(difference) <= found.error <= tolerance
     assert np.max(difference) > 0.05 * found.error  # the bound is not idle
-
-
-@pytest.mark.parametrize("name", ["chks", "log_exp"])
-def test_the_straight_part_of_a_smoothed_spring_needs_few_nodes(name: str) -> None:
-    """Its energy there is 5e5; what is bounded by tractions alone is off by more than 1e-3 with all nodes there are."""
-    spring = registered()[name]().relative(laws.LinearSpring(1.0), 0.01)
-    found = law_graph(spring, 1e3, 1e-9)
-    x = np.random.default_rng(1).uniform(-1e3, 1e3, 20_000)
-    difference = np.abs(found.graph.primitive(x) + found.offset - spring.value(x))
-    assert np.max(difference) <= found.error <= 1e-9
-    assert len(found.graph.breaks) < 1000
 
 
 @pytest.mark.long

@@ -17,7 +17,6 @@ from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.equilibrium_search.boxes import fresh_box
 from hvi_fenicsx.equilibrium_search.lengths import Lengths
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
-from hvi_fenicsx.equilibrium_search.motions import divided
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_search.scalar_problem import ScalarProblem
 from hvi_fenicsx.equilibrium_search.stationarity import Kind, kind_of
@@ -189,28 +188,6 @@ def freed(problem: ScalarProblem, held: float) -> ScalarProblem:
     return replace(problem, stiffness=rest @ problem.stiffness @ rest, force=force)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_no_point_of_a_box_is_below_a_bound_with_curvature_lent_along_a_rigid_motion(seed: int) -> None:
-    problem, random = freed(random_problem(seed, 3, 2, opening=False), 0.3), np.random.default_rng(seed)
-    low = np.maximum(random.uniform(-2, 0, problem.size), problem.lower)
-    low, high = problem.with_lengths(low, low + random.uniform(1.0, 3, problem.size))
-    relaxation = Relaxation(problem)
-    least, most = relaxation.share_span(low, high)
-    first, last = least + 0.3 * (most - least), least + 0.6 * (most - least)
-    box = replace(fresh_box(low, high, low[: problem.size]), motion_low=first, motion_high=last)
-    solved, curvature = relaxation.solve(box, 0.999, lost=1e6)
-    assert curvature.lent.any()
-    samples = random.uniform(low[: problem.size], high[: problem.size], (4000, problem.size))
-    inside = [x for x in samples if np.all((relaxation.shares(x) >= first) & (relaxation.shares(x) <= last))]
-    assert inside
-    assert min(problem.energy(x) for x in inside) >= solved.bound
-    added = problem.diagonal(curvature.added)
-    lent = relaxation.lent(solved, curvature).matrix
-    step = np.array(inside) - solved.x
-    near = 0.5 * np.einsum("ij,jk,ik->i", step, problem.stiffness - np.diag(added) + lent, step)
-    assert np.all(np.array([problem.energy(x) for x in inside]) >= solved.value + near - 1e-9)
-
-
 @pytest.mark.parametrize("seed", [0, 1, 7, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3, 4, 5, 6, 8))])
 def test_the_lowest_energy_of_a_body_that_only_laws_hold_is_below_all_descents(seed: int) -> None:
     problem = random_problem(seed, 3, 2, opening=False)
@@ -221,63 +198,6 @@ def test_the_lowest_energy_of_a_body_that_only_laws_hold_is_below_all_descents(s
     least = min(_descended(problem, 2.0 * random.normal(size=problem.size)) for _ in range(6))
     assert found.progress().lower <= least
     assert found.upper <= least + 1e-6 * abs(least)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_far_away_where_laws_bear_just_the_load_the_bound_is_the_least_energy_at_infinity(seed: int) -> None:
-    """There the laws' forces are known, so that the least energy follows from linear systems."""
-    problem = random_problem(seed, 3, 2, opening=False)
-    law = TractionGraph.from_points([(0.0, 0.0), (0.1, 2.0), (1.5, 1.0)])
-    problem = replace(problem, chains=(*problem.chains[: problem.size], *(chain(law, 1.0, 1.0) for _ in range(3))))
-    motion = freed(problem, 1.0).force - freed(problem, 0.0).force
-    borne = np.zeros(problem.size)
-    members = problem.lengths.unknowns[:, 1]
-    borne[members] = problem.lengths.factors[:, 1]
-    problem = freed(problem, float(borne @ motion))
-    low, high = (1e5 * motion - 20.0, 1e6 * motion + 20.0)
-    low, high = problem.with_lengths(np.maximum(low, problem.lower), high)
-    relaxation = Relaxation(problem)
-    box = fresh_box(low, high, np.maximum(5e5 * motion + 1.0, problem.lower))
-    first, last = relaxation.share_span(low, high)
-    bound = relaxation.solve(replace(box, motion_low=first, motion_high=last), 0.999)[0].bound
-    least = min(_least_with_forces(problem, borne, held) for held in ([], [problem.size - 1]))
-    least += 3 * (0.1 + 2.1 - 1.5)  # behind its last point each law has the energy r + 0.7
-    assert least - 1e-5 <= bound <= least + 1e-3  # at a distance of 1e6 the other components add their square over it
-
-
-def _least_with_forces(problem: ScalarProblem, borne: Array, held: list[int]) -> float:
-    """The least energy with laws that bear these forces, some unknowns being zero; inf where this is not admissible."""
-    free = np.setdiff1d(np.arange(problem.size), held)
-    force, matrix = (problem.force - borne)[free], problem.stiffness[np.ix_(free, free)]
-    x = np.linalg.pinv(matrix, rcond=1e-10) @ force
-    return float(-0.5 * force @ x) if held or x[-1] >= 0.0 else np.inf
-
-
-def test_a_search_with_divided_rigid_motions_goes_on_where_it_was_stopped() -> None:
-    problem = random_problem(1, 3, 2, opening=False)
-    softening = TractionGraph.from_points([(0.0, 0.0), (0.1, 2.0), (1.5, 1.0)])
-    laws = (*problem.chains[: problem.size], *(chain(softening, 1.0, 1.0) for _ in range(3)))
-    problem = freed(replace(problem, chains=laws), 0.5)
-    whole, part, rest = proven(problem), LowestSearch(problem=problem), LowestSearch(problem=problem)
-    part.start()
-    assert not part.run(lambda: part.boxes > 3, lambda _: None)
-    left = list(part.open_boxes())
-    assert all(len(low) == problem.size + 3 + 1 for low, *_ in left)  # unknowns, lengths, one rigid motion
-    rest.resume(left, part.x)
-    assert rest.run(lambda: False, lambda _: None)
-    assert part.boxes < whole.boxes
-    assert rest.upper == pytest.approx(whole.upper, rel=1e-8)
-
-
-def test_intervals_of_shares_are_divided_far_behind_joints_in_growing_parts() -> None:
-    assert divided(-1e6, 1e6, 2.0, 0.5) == 2.0
-    parts = [2.0]
-    while parts[-1] * 8.0 < 1e6:
-        parts.append(divided(parts[-1], 1e6, 2.0, 0.5))
-    assert parts == [2.0 * 8.0**k for k in range(len(parts))]
-    assert divided(-1e6, 2.0, 2.0, 0.5) == -2.0
-    assert divided(-2.0, 2.0, 2.0, 0.5) == 0.5
-    assert divided(-2.0, 2.0, 2.0, 1.99) == pytest.approx(1.2)
 
 
 def space(cells: int) -> Table:
@@ -327,20 +247,6 @@ def test_the_lowest_equilibrium_of_a_scene_is_certified_and_a_run_is_not_below_i
     assert found.solutions[0].converged
     assert found.solutions[0].energy == pytest.approx(found.lower_bound, rel=2e-8)
     assert hvi.solve(scene).energy >= found.lower_bound
-
-
-@pytest.mark.long
-def test_a_search_of_such_laws_that_is_stopped_tells_what_it_found_and_what_is_open() -> None:
-    found = hvi.equilibria(hvi.read_tables(space(2)), limit=20.0)
-    assert (found.complete, found.proven) == (False, False)
-    assert "open" in found.reason
-    assert len(found.solutions) > 1
-    assert all(s.converged for s in found.solutions)
-    energies = [s.energy for s in found.solutions]
-    assert found.lower_bound is not None
-    assert found.lower_bound <= min(energies)
-    lowest = hvi.equilibria(hvi.read_tables(space(2)), lowest=True)
-    assert min(energies) == pytest.approx(lowest.solutions[0].energy, rel=1e-8)
 
 
 def test_a_block_that_sticks_and_could_slide_off_has_one_minimiser_and_no_lowest_energy() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,13 +15,12 @@ from condensed import problem as condensed
 from enumeration import Floor, polyline
 from scenes import DELTA, block, model
 
-from hvi_fenicsx import prepare, read_tables, solve
-from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain, energy, total
+from hvi_fenicsx import prepare, read_tables
+from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain, energy
 from hvi_fenicsx.equilibrium_search.boxes import fresh_box
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.equilibrium_search.envelopes import envelopes
-from hvi_fenicsx.equilibrium_search.found import Clock, Unit, Wanted, lowest_in_words
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_search.rigid_balance import RigidBalance
@@ -122,22 +120,6 @@ def test_cells_made_smaller_by_the_balance_of_bodies_keep_all_points(case: Case)
             assert np.all((point.x >= ends[0]) & (point.x <= ends[1]))
 
 
-def test_bonds_that_stick_keep_their_point_however_often_its_cell_is_clipped() -> None:
-    """Points that hardly give way bear the block: they stick at zero, about which all cells close again and again."""
-    teeth = [[0, 0], [3e-6, 120], [3e-6, 40], [9e-6, 60], [9e-6, 30]]
-    table = block(2, 150.0, 100.0, {"law": "graph", "points": teeth})
-    table["domain"]["size"] = [1.0, 0.5]
-    table["material"] |= {"youngs_modulus": 6e7, "poisson_ratio": 0.0}
-    table["boundary"]["floor"]["support"] = {"law": "tresca", "yield_traction": 347.7}
-    del table["boundary"]["floor"]["contact"]
-    scene = read_tables(table)
-    known = solve(scene, estimate=False)
-    assert known.converged
-    points = found(scalar_problem(Condensation(prepare(scene).system).problem)).points
-    wanted = known.energy / known.problem.scales.energy
-    assert min(abs(point.energy / wanted - 1.0) for point in points) < 1e-9
-
-
 def random_bonds(random: np.random.Generator, unknown: int) -> tuple[Bonds, float]:
     """A law with drops, now and then with a jump at rest, and one of its joints."""
     points = [[0.0, 0.0]]
@@ -184,20 +166,6 @@ def _check_kind(problem: ScalarProblem, point: StationaryPoint, random: np.rando
     fall = point.energy - min(map(problem.energy, places))
     if point.kind is not Kind.UNDECIDED:
         assert (fall > 1e-14) == (point.kind is Kind.SADDLE)
-
-
-def test_the_balance_of_bodies_knows_that_all_bonds_must_bear_nearly_their_peak() -> None:
-    """Pulled by the peak less 1 % of it, no bond can be broken: all slips lie just before the drop."""
-    far_drop = 1e3 * DELTA  # the body's own strain is small beside it
-    law = {"law": "graph", "points": [[0.0, 0.0], [far_drop, 1e6], [far_drop, 5e5]]}
-    problem = scalar_problem(Condensation(prepare(read_tables(block(8, 0.99e6, 1e6, law))).system).problem)
-    low, high = np.maximum(problem.lower, -problem.far), np.minimum(problem.upper, problem.far)
-    ends = RigidBalance(problem).tightened(low, high)
-    bonded = np.array([len(chain) > 1 for chain in problem.chains])
-    assert ends is not None
-    assert np.all(ends[0][bonded] > 0.8 * problem.reach)
-    assert np.all(ends[1][bonded] <= problem.reach * (1.0 + 1e-9))
-    assert len(found(problem).points) >= 1
 
 
 def on_teeth(count: int, drop: float = 3.0) -> TractionGraph:
@@ -280,15 +248,6 @@ def test_an_envelope_is_the_hull_of_samples_and_never_above_the_law(seed: int) -
     assert all(b >= a - 1e-9 * (1 + abs(a)) for a, b in itertools.pairwise(slopes))
 
 
-def test_two_laws_on_one_unknown_add_up() -> None:
-    random = np.random.default_rng(1)
-    a, b = random_graph(random), random_graph(random)
-    both = total([chain(a, 1.0, 1.0), chain(b, 2.0, -1.0)])
-    for x in random.uniform(-4, 4, 50):
-        wanted = a.primitive(np.array([x]))[0] + 2.0 * b.primitive(np.array([-x]))[0]
-        assert energy(both, x) == pytest.approx(wanted, rel=1e-12, abs=1e-12)
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_no_point_of_a_box_is_below_its_bound(seed: int) -> None:
     """The bound allows for rounding, so it must hold without any tolerance."""
@@ -307,46 +266,3 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int) -> None:
         bound = Relaxation(problem).solve(fresh_box(low, high, low), part)[0].bound
         samples = random.uniform(low, high, (300, n))
         assert min(problem.energy(x) for x in samples) >= bound
-
-
-def test_a_drop_that_is_rounding_is_none() -> None:
-    """The end of a softening law, whose last piece ends a rounding error above 0: the search once ended in an error."""
-    table = model(3, 6e6, 1e6, {"law": "graph", "points": [list(p) for p in paper(3e6)]})
-    glue = {"law": "graph", "points": [[0, 0], [4e-6, 5e6], [2e-5, 0]], "one_sided": True}
-    table["boundary"]["another"] = {"on": "bottom", "adhesion": glue}
-    prepared = prepare(read_tables(table))
-    search = Enumeration(problem=scalar_problem(Condensation(prepared.system).problem))
-    search.start()
-    steps = itertools.count()
-    assert search.run(lambda: next(steps) > 4_000, lambda _: None)
-    assert search.points
-
-
-def test_progress_tells_bounds_that_close_on_the_lowest_energy() -> None:
-    case = (3, 6e6, 1e6, paper(3e6), True)
-    problem, unit = problem_of(case)
-    wanted = Wanted(lowest=True, gap=1e-9, energies=Unit(size=unit, name="J/m"))
-    search, told = LowestSearch(problem=problem, gap=1e-9), []
-    search.start()
-    before = search.progress()
-    search.run(lambda: False, told.append)
-    least = oracle(case).stationary()[0].energy / unit
-    for now in (before, *told):
-        assert now.lower <= least * (1 - 1e-12 * np.sign(least))
-        assert now.upper >= least - 1e-9 * abs(least)
-    shares = [now.share for now in told]
-    assert shares == sorted(shares, reverse=True)
-    if told:
-        words = lowest_in_words(told[-1], wanted.energies, Clock(time.monotonic() - 10.0))
-        assert f"{told[-1].lower * unit:.8g} and {told[-1].upper * unit:.8g} J/m" in words
-        assert words.endswith("about 0 s to go")
-
-
-def test_the_shares_of_open_cells_are_what_is_not_done() -> None:
-    problem, _ = problem_of((2, -4e6, 3e5, SAWTOOTH, True))
-    search, shares = Enumeration(problem=problem), []
-    search.start()
-    search.run(lambda: False, lambda now: shares.append(sum(cell.share for cell in now.waiting)))
-    assert shares == sorted(shares, reverse=True)
-    assert shares[-1] == 0.0
-    assert Clock(time.monotonic() - 30.0).to_go(0.25) == ", about 10 s to go"

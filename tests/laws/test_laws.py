@@ -117,17 +117,6 @@ def test_interval_is_the_hull_of_the_one_sided_difference_quotients(law: Superpo
 
 
 @each_law
-def test_distance_is_from_the_nearest_end_of_the_interval(law: Superpotential) -> None:
-    x = around(law)
-    lo, hi = law.interval(x)
-    unit = law.traction_scale
-    assert np.all(law.distance(x, lo) == 0.0)
-    assert np.all(law.distance(x, hi) == 0.0)
-    np.testing.assert_allclose(law.distance(x, hi + unit), unit)
-    np.testing.assert_allclose(law.distance(x, lo - 2 * unit), 2 * unit)
-
-
-@each_law
 def test_split_is_convex_minus_convex(law: Superpotential) -> None:
     x = around(law)
     h, g = law.convex, law.concave
@@ -174,12 +163,6 @@ def test_growth_constants_of_the_paper(law: Superpotential, length: float) -> No
     assert max(opposed, 0.0) >= 0.95 * scaled.c4
 
 
-def test_c4_is_the_papers() -> None:
-    assert MODEL.c4 == 0.0
-    assert LITERAL.c4 == GAMMA2
-    assert laws.Exponential(1.0, 0.5, 1.0).c4 == 0.0
-
-
 @each_law
 def test_the_bounds_for_unknown_laws_agree_with_the_closed_forms(law: Superpotential) -> None:
     if np.isinf(law.peak.plus):
@@ -218,13 +201,6 @@ def test_scaled_is_the_same_law_in_other_units(law: Superpotential) -> None:
     np.testing.assert_array_equal(scaled.branch(x / length), law.branch(x))
     lo, hi = scaled.interval(scaled.kinks)
     assert np.all(hi > lo)
-
-
-@each_law
-def test_even_laws_are_even_to_the_bit(law: Superpotential) -> None:
-    x = np.abs(around(law))
-    alike = np.array_equal(law.value(x), law.value(-x)) and np.array_equal(law.right(x), -law.left(-x))
-    assert law.even == alike
 
 
 def test_model_law_is_the_papers_minimum() -> None:
@@ -367,37 +343,3 @@ def test_refusals(name: str, parameters: dict[str, Any], said: str) -> None:
 def test_a_criterion_of_mixed_mode_is_refused_as_what_it_is(numbers: tuple[float, float], said: str) -> None:
     with pytest.raises(InputError, match=f"^mixity 'power_law': {said}"):
         laws.PowerLaw(*numbers)
-
-
-@pytest.mark.parametrize("value", ["3", True, None, float("nan"), -1.0, 0.0])
-def test_direct_construction_refuses_as_well(value: Any) -> None:
-    with pytest.raises(InputError):
-        laws.Tresca(value)
-
-
-def test_names_are_unique_and_properties_cannot_be_hidden() -> None:
-    with pytest.raises(InputError, match=r"taken by hvi_fenicsx\.laws"):
-        type("Other", (laws.Graph,), {"name": "tresca"})
-    with pytest.raises(InputError, match="'peak' is taken by a property"):
-        type("Hidden", (laws.Graph,), {"name": "hidden", "__annotations__": {"peak": "float"}})
-    with pytest.raises(InputError, match="'kinks' is taken by a property"):
-        type("Hidden", (laws.Graph,), {"name": "hidden", "__annotations__": {"kinks": "float"}})
-    assert "hidden" not in laws.available()
-
-
-def test_scales_of_a_sampled_law_are_not_those_of_its_samples() -> None:
-    @dataclass(frozen=True)
-    class Hump(laws.SampledLaw, register=False):
-        name = "hump"
-        opening: float
-
-        def traction(self, x: Any) -> Any:
-            return x / self.opening * np.exp(1 - x / self.opening)
-
-        def ends(self) -> tuple[float, ...]:
-            return self.opening, 20 * self.opening
-
-    law = Hump(1e-5)
-    assert law.kinks.size == 0
-    assert law.length_scale == 1e-5
-    assert law.energy_scale == pytest.approx(0.5e-5)

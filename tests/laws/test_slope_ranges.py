@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from hvi_fenicsx import laws
 from hvi_fenicsx.laws.smoothing import registered
-from hvi_fenicsx.laws.weakening import WeakeningLaw
 from hvi_fenicsx.typing import Array
 
 MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
@@ -45,15 +42,3 @@ def test_no_slope_is_outside_its_range(law: laws.Superpotential) -> None:
     assert np.all(found.min(axis=1) >= least - size)
     assert np.all(found.max(axis=1) <= most + size)
     assert np.mean(most - least <= 4.0 * np.ptp(found, axis=1) + 1e-9) > 0.5  # the range is not idle
-
-
-def test_of_a_shape_that_is_not_known_to_be_concave_no_range_is_known() -> None:
-    @dataclass(frozen=True)
-    class Wavy(WeakeningLaw, register=False):
-        name = "wavy"
-
-        def shape(self, z: Array) -> tuple[Array, Array, Array]:
-            return z + np.expm1(-z), -np.expm1(-z), np.exp(-z)
-
-    least, most = Wavy(2.0, 0.5, 1.0).slope_range(np.array([1.0]), np.array([2.0]))
-    assert (least[0], most[0]) == (-np.inf, 0.0)

@@ -19,8 +19,6 @@ from hvi_fenicsx.laws.smoothing import (
     LogExp,
     PaperSmoothedLaw,
     PlusFunction,
-    PlusSmoothedLaw,
-    available,
     create,
 )
 
@@ -91,12 +89,6 @@ def test_error_and_decay_of_the_plus_functions(plus: PlusFunction, t: float, e: 
     assert error <= decay[plus.name] * e * (1 + 1e-12) + rounding
 
 
-@each_plus
-def test_kappa_is_attained_at_the_kink(plus: PlusFunction) -> None:
-    assert plus.value(np.zeros(1), 3.0)[0] == pytest.approx(3.0 * plus.kappa, rel=1e-15)
-    assert plus.derivative(np.zeros(1), 3.0)[0] == 0.5
-
-
 @given(
     st.sampled_from(list(LAWS.values())),
     st.sampled_from(list(PLUS_FUNCTIONS.values())),
@@ -160,14 +152,6 @@ def test_gradients_tend_into_the_subdifferential(law: Superpotential, plus: Plus
     assert law.distance(x, smooth.right(x)).max() <= 1e-6 * law.traction_scale
 
 
-def test_the_quadratic_smoothing_leaves_the_law_alone_away_from_the_drop() -> None:
-    smooth = QUADRATIC.relative(MODEL, 0.01)
-    reach = 0.5 * smooth.epsilon_absolute / (GAMMA1 - GAMMA2)
-    x = np.concatenate([np.linspace(0, DELTA - reach, 50), np.linspace(DELTA + reach * 1.001, 5 * DELTA, 50)])
-    np.testing.assert_array_equal(smooth.value(x), MODEL.value(x))
-    np.testing.assert_array_equal(smooth.right(x[:-50]), MODEL.right(x[:-50]))
-
-
 @each_law
 @each_plus
 @each_epsilon
@@ -182,12 +166,6 @@ def test_bounds_of_the_smoothed_law_hold(law: Superpotential, plus: PlusFunction
     assert np.all(-slope * x <= smooth.c4 * np.abs(x) + slack * np.abs(x))
     if np.isfinite(smooth.peak.plus):
         assert smooth.peak.plus <= max(slope.max(), smooth.growth.plus) * 1.05 + slack
-
-
-def test_an_opposing_traction_never_appears_by_smoothing_the_model() -> None:
-    for plus in PLUS_FUNCTIONS.values():
-        assert plus.relative(MODEL, 0.1).c4 == 0.0
-    assert QUADRATIC.relative(LAWS["literal"], 1e-6).c4 == pytest.approx(GAMMA2, rel=1e-5)
 
 
 def papers_s(x: float, epsilon: float) -> float:
@@ -224,51 +202,6 @@ def test_papers_own_data_return_250_at_zero_slip() -> None:
     np.testing.assert_allclose(law.right(x), (GAMMA1 * x / DELTA + GAMMA2) / 2, rtol=0.05)
 
 
-@pytest.mark.parametrize("epsilon", PAPER_EPSILONS)
-def test_papers_smoothing_has_a_false_kink_at_zero_for_every_epsilon(epsilon: float) -> None:
-    law = PaperSmoothedLaw(MODEL, epsilon)
-    (lo,), (hi,) = law.interval(np.zeros(1))
-    assert (lo, hi) == pytest.approx((-GAMMA2 / 2, GAMMA2 / 2))
-    np.testing.assert_array_equal(law.convex.kinks, [0.0])
-    assert law.branch(np.zeros(1))[0] == -1
-    x = around(MODEL)
-    np.testing.assert_array_equal(law.value(x), law.value(-x))
-    np.testing.assert_array_equal(law.right(x), -law.left(-x))
-
-
-@pytest.mark.parametrize("epsilon", [1e-14, *PAPER_EPSILONS])
-def test_papers_split(epsilon: float) -> None:
-    law = PaperSmoothedLaw(MODEL, epsilon)
-    x = np.union1d(around(MODEL), DELTA + epsilon / GAMMA2 * np.linspace(-2, 2, 81))
-    h, g = law.convex, law.concave
-    np.testing.assert_allclose(h.value(x) - g.value(x), law.value(x), atol=1e-12 * (1 + h.value(x).max()))
-    for part in (h, g):
-        slopes = np.column_stack([part.left(x), part.right(x)]).ravel()
-        assert np.all(np.diff(slopes) >= -1e-9 * (np.abs(slopes[1:]) + GAMMA1))
-        assert np.all(part.second(x) >= 0.0)
-        step = 1e-5 * min(epsilon / GAMMA2, DELTA)
-        quotient = (part.right(x + step) - part.right(x - step)) / (2 * step)
-        wrong = np.abs(quotient - part.second(x)) > 1e-2 * part.second(x).max()
-        # breaks of the curvature, and the kink
-        if epsilon >= 1e-8:
-            assert wrong.sum() <= 8
-    np.testing.assert_allclose(
-        np.diff(g.value(x)),
-        0.5 * (g.right(x[1:]) + g.right(x[:-1])) * np.diff(x),
-        atol=2e-2 * law.energy_scale,
-        rtol=0.2,
-    )
-
-
-def test_create() -> None:
-    law = create("chks", MODEL, epsilon=0.01)
-    assert isinstance(law, PlusSmoothedLaw)
-    assert law.epsilon_absolute == pytest.approx(0.01 * GAMMA2 * DELTA)
-    paper = create("paper", MODEL, epsilon_absolute=0.1)
-    assert paper == PaperSmoothedLaw(MODEL, 0.1)
-    assert set(available()) == {"quadratic", "chks", "log_exp", "paper"}
-
-
 @pytest.mark.parametrize(
     ("kind", "given_epsilon", "said"),
     [
@@ -287,8 +220,3 @@ def test_create() -> None:
 def test_refusals(kind: str, given_epsilon: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
         create(kind, MODEL, **given_epsilon)
-
-
-def test_papers_smoothing_refuses_other_laws() -> None:
-    with pytest.raises(InputError, match=r'"quadratic_linear" only.*"log_exp"'):
-        create("paper", laws.Tresca(1.0), epsilon=0.1)

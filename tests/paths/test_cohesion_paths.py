@@ -14,7 +14,6 @@ from test_curved_paths import FINER, events, folds, largest_distance, path, peak
 from test_exact_paths import largest_imbalance
 
 from hvi_fenicsx.effects import Direction
-from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.laws import BenzeggaghKenane, Exponential, Mixity, PowerLaw, Superpotential
 from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.state import End, Event, Follow, PathOptions, PathState
@@ -172,36 +171,6 @@ def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential, mixity: Mix
         assert np.all(np.diff([s.dissipated for s in found]) >= -1e-12 * found[-1].dissipated)
 
 
-@pytest.mark.long
-def test_a_path_goes_on_from_any_of_its_states() -> None:
-    given = strip(graph(SOFTENING), [-0.5, 1.0], closes=True)
-    options: dict[str, Any] = {"programme": (1.2, 0.2, 2.0), "remember": (0,)}
-    _, whole = path(given, **options)
-    for at in range(0, len(whole) - 1, 9):
-        _, rest = path(given, whole[at], **options)
-        assert [s.event for s in rest] == [s.event for s in whole[at + 1 :]]
-        assert [s.factor for s in rest] == pytest.approx([s.factor for s in whole[at + 1 :]], rel=1e-9)
-        assert rest[-1].work == pytest.approx(whole[-1].work, rel=1e-9)
-
-
-def test_contact_with_a_gap_closes_beside_the_law() -> None:
-    """Pressed from a distance: free, then closed; the slip alone is the law's matter."""
-    given = strip(graph(SOFTENING), [1.0, 0.5], closes=True)
-    given.upper[::2] = 0.5
-    follower, states = path(given, programme=(3.0,))
-    assert follower.end is End.REACHED, follower.reason
-    assert Event.CONTACT in [s.event for s in states]
-    assert states[-1].x[::2].max() == pytest.approx(0.5, abs=1e-12)
-    assert largest_distance(given, states) < 1e-9
-
-
-def test_an_opening_that_is_bounded_from_above_is_refused() -> None:
-    given = strip(graph(SOFTENING), [-0.5, 1.0])
-    given.lower[0] = -1.0
-    with pytest.raises(InputError, match="Cohesion beside contact"):
-        path(given)
-
-
 @pytest.mark.parametrize("criterion", [BenzeggaghKenane(3.0, 2.1), PowerLaw(3.0, 1.5)])
 @pytest.mark.parametrize("angle", [0.0, 50.0, 90.0])
 def test_all_of_the_energy_at_a_mixity_is_dissipated(criterion: Mixity, angle: float) -> None:
@@ -229,19 +198,6 @@ def test_with_energies_that_differ_every_state_is_an_equilibrium_of_its_own_mixi
     assert largest_distance(given, states, (0,)) < 1e-8
     assert largest_imbalance(given, states) < 1e-8
     assert np.all(np.diff([s.dissipated for s in states]) > -1e-6 * states[-1].dissipated)
-
-
-def test_bonds_by_mode_that_pass_rest_together_lose_nothing_on_their_first_pieces() -> None:
-    """Below the peak the path is a ray of the load's direction, so the work is half of load times displacement."""
-    given = strip(graph(SOFTENING), [-0.4, 1.0], closes=True)
-    given = replace(given, bonds=(replace(given.bonds[0], mixity=PowerLaw(3.0, 1.5)),))
-    follower, states = path(given, programme=(0.3, -0.3, 0.3), remember=(0,))
-    assert follower.end is End.REACHED, follower.reason
-    assert [s.factor for s in states if s.event is Event.TURN] == [0.3, -0.3]
-    size = max(s.work for s in states)
-    for state in states:
-        assert state.dissipated == pytest.approx(0.0, abs=1e-12 * size)
-        assert state.work == pytest.approx(0.5 * given.load(state.factor) @ state.x, abs=1e-12 * size)
 
 
 @pytest.mark.parametrize("angle", [0.0, 50.0])

@@ -12,18 +12,15 @@ import numpy.typing as npt
 import pytest
 from condensed import bonds, chain, graph, problem
 from curved_follower import CurvedFollower
-from scipy.optimize import brentq
 from test_exact_paths import SOFTENING, bar, largest_imbalance, peeled, random_problem, spring
 
 from hvi_fenicsx.effects import Direction
 from hvi_fenicsx.errors import InputError
-from hvi_fenicsx.laws import Exponential, Superpotential, TractionGraph
+from hvi_fenicsx.laws import Exponential, Superpotential
 from hvi_fenicsx.laws.smoothing import create
-from hvi_fenicsx.paths import segments
 from hvi_fenicsx.paths.distances import Distances
 from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.full_load import at_full_load
-from hvi_fenicsx.paths.motion import Relaxation
 from hvi_fenicsx.paths.state import End, Event, Follow, PathOptions, PathState
 from hvi_fenicsx.paths.thresholds import FollowingThresholds
 from hvi_fenicsx.paths.vertex_laws import is_straight
@@ -176,28 +173,6 @@ def test_a_body_that_rocks_is_in_balance_at_any_inclination(kind: type[Follower]
     assert max(state.factor for state in states) == 1.0
 
 
-@pytest.mark.parametrize("kind", [Follower, CurvedFollower])
-@pytest.mark.parametrize("remember", [(), (0,)])
-@pytest.mark.parametrize("broken", [0.1, 0.3])
-def test_a_body_falls_on_a_point_on_which_it_rocks(
-    kind: type[Follower], remember: Sequence[int], broken: float
-) -> None:
-    """By hand: the beam hangs on bonds of its ends, which break together at 2 λ = 0.05; the middle falls on the floor.
-
-    There its ends sink as those of the beam that rocks, until both are on the floor as well; the bonds' area is lost.
-    """
-    bent, area = np.array([1.0, -2.0, 1.0]), 0.025 * broken
-    law = bonds(graph([(0, 0), (0.1, 0.05), (broken, 0)]), [0, 2])
-    given = problem(np.outer(bent, bent), [-1.0, -2.0, -1.0], law, lower=[-0.7, -0.5, -0.8])
-    follower = kind(given, PathOptions(programme=(1.0,), held=(-9.0, 9.0), remember=remember))
-    states = list(follower.states())
-    assert follower.end is End.REACHED
-    assert next(state.factor for state in states if state.event is Event.JUMP) == pytest.approx(0.025, rel=1e-9)
-    np.testing.assert_allclose(states[-1].x, given.lower, atol=1e-9)
-    assert states[-1].energy == pytest.approx(0.5 * 0.5**2 - 2.5 + (0.0 if remember else 2.0 * area), abs=1e-9)
-    assert states[-1].dissipated == pytest.approx(2.0 * area if remember else 0.0, abs=1e-9)
-
-
 def test_bonds_pull_a_body_off_its_floor_once_they_alone_carry_the_load() -> None:
     """By hand: three bonds at a plateau of 0.03 carry 2 λ = 0.09; with less load the beam leaves the floor and jumps.
 
@@ -212,100 +187,6 @@ def test_bonds_pull_a_body_off_its_floor_once_they_alone_carry_the_load() -> Non
     found = [(state.event, state.factor) for state in states[turn + 1 :]]
     assert [event for event, _ in found] == [Event.RELEASE, Event.FOLD, Event.JUMP, Event.END]
     assert [factor for _, factor in found] == pytest.approx([0.045, 0.045, 0.045, 0.0], abs=1e-9)
-
-
-@pytest.mark.parametrize("remember", [(), (0,)])
-@pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_a_bar_whose_bond_on_a_length_fades_may_turn_about_its_other_end(angle: float, remember: Sequence[int]) -> None:
-    """By hand: a bar of stiffness 1, stretched by λ; the weaker end slides from λ = 0.1 on, and is free from 0.4 on.
-
-    Across its way the bond resists by its traction over its length, and so by nothing at last. It stays broken.
-    """
-    along = np.array([np.cos(angle), np.sin(angle)])
-    stretch = np.r_[along, -along]
-    law = lengths(graph([(0, 0), (0, 0.1), (0.4, 0)]), 2, weights=[1.0, 2.0])
-    given, programme = problem(np.outer(stretch, stretch), stretch, law), (1.0, 0.2) if remember else (1.0,)
-    follower, states = path(given, programme=programme, remember=remember)
-    assert follower.end is End.REACHED
-    for state in states:
-        slides = state.position.leg == 0 and state.factor < 0.4
-        moved = max((state.factor - 0.1) / 0.75, 0.0) if slides else state.factor
-        np.testing.assert_allclose(state.x, np.r_[moved * along, 0.0, 0.0], atol=1e-8)
-        assert state.event in (Event.START, Event.STEP, Event.KINK, Event.TURN, Event.END)
-    assert next(s.energy for s in states if s.factor == 1.0) == pytest.approx(-0.48 - (0.02 if remember else 0.0))
-
-
-@pytest.mark.parametrize("kind", [Follower, CurvedFollower])
-@pytest.mark.parametrize(("aim", "wanted"), [(0.5, (-1.5, -2.0)), (2.0, (-2.0, -2.0)), (-0.5, (3.0, 2.5))])
-def test_loads_in_balance_leave_a_body_free_until_another_presses_it_down(
-    kind: type[Follower], aim: float, wanted: tuple[float, float]
-) -> None:
-    """By hand: a spring of stiffness 1, stretched by 1, between -2 and 3, that a load then drives to one of them."""
-    given = problem(chain(2, 1.0), [-1.0, -1.0], force=[1.0, -1.0], lower=-2.0, upper=3.0)
-    follower = kind(given, PathOptions(programme=(aim,), held=(-9.0, 9.0)))
-    states = list(follower.states())
-    assert follower.end is End.REACHED
-    assert states[0].x[0] - states[0].x[1] == pytest.approx(1.0, abs=1e-9)
-    assert (states[1].event, states[1].factor) == (Event.CONTACT, 0.0)
-    np.testing.assert_allclose(states[-1].x, wanted, atol=1e-9)
-
-
-@pytest.mark.parametrize("kind", [Follower, CurvedFollower])
-def test_a_body_that_a_small_load_takes_away_comes_off(kind: type[Follower]) -> None:
-    follower = kind(problem(chain(3, 1.0), [1.0, 1.0, 1.0], lower=-0.5), PathOptions(programme=(1.0,)))
-    assert list(follower.states()) == []
-    assert follower.end is End.ESCAPES
-
-
-@pytest.mark.parametrize("kind", [Follower, CurvedFollower])
-@pytest.mark.parametrize("rounding", [0.0, 1e-17, -1e-17])
-def test_a_body_that_slides_on_its_floor_comes_off(kind: type[Follower], rounding: float) -> None:
-    """The floor holds all that moves but the sliding, which elasticity resists by nothing, or by rounding."""
-    stiffness = np.block([[np.full((1, 1), rounding), np.zeros((1, 3))], [np.zeros((3, 1)), chain(3, 1.0)]])
-    given = problem(stiffness, [1.0, -1.0, -1.0, -1.0], lower=[-np.inf, 0.0, 0.0, 0.0])
-    follower = kind(given, PathOptions(programme=(1.0,)))
-    assert list(follower.states()) == []
-    assert follower.end is End.ESCAPES
-
-
-@pytest.mark.parametrize("gap", [0.3, 1e3])
-def test_how_far_a_body_is_above_its_floor_does_not_matter(gap: float) -> None:
-    law = Exponential(1.0, 0.2, 0.5)
-    follower, states = path(floating(law, gap, 0), programme=(3.0,))
-    there, wanted = path(floating(law, 0.0, 0), programme=(3.0,))
-    assert follower.end is there.end
-    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
-    np.testing.assert_allclose(states[0].x, wanted[0].x - np.r_[np.full(3, gap), np.zeros(3)], atol=1e-9)
-
-
-@pytest.mark.parametrize("kind", [Follower, CurvedFollower])
-@pytest.mark.parametrize("remember", [None, (), range(3)])
-def test_a_load_that_turns_takes_a_free_body_to_its_other_side(
-    kind: type[Follower], remember: Sequence[int] | None
-) -> None:
-    """By hand: three points on springs of stiffness 1 between -0.5 and 1, free, or on bonds that break before that.
-
-    The outer ones come to rest on a bound, and half of the load on the middle one is how far that is from there.
-    """
-    law = graph([(0, 0), (0.01, 0.01), (0.02, 0)])
-    laws = () if remember is None else (bonds(law, np.arange(3)),)
-    given = problem(chain(3, 1.0), [2.0, -0.5, 2.0], *laws, lower=-0.5, upper=1.0)
-    options = PathOptions(programme=(1.0, -1.0, 0.0, 0.5), held=(-2.0, 2.0), remember=remember or ())
-    follower = kind(given, options)
-    states = list(follower.states())
-    assert follower.end is End.REACHED
-    turns = [state.x for state in states if state.event in (Event.TURN, Event.END)]
-    np.testing.assert_allclose(turns[0], [1.0, 0.75, 1.0], atol=1e-9)
-    np.testing.assert_allclose(turns[1], [-0.5, -0.25, -0.5], atol=1e-9)
-    np.testing.assert_allclose(turns[3], [1.0, 0.875, 1.0], atol=1e-9)
-    if not laws:
-        assert states[-1].work == pytest.approx(0.125**2, abs=1e-9)
-    if remember:
-        assert states[-1].dissipated == pytest.approx(3 * 0.01 * 0.02 / 2, abs=1e-9)
-    for state in states[:-1]:
-        rest = list(kind(given, options, state).states())
-        np.testing.assert_allclose(rest[-1].x, states[-1].x, atol=1e-9)
-        assert rest[-1].work == pytest.approx(states[-1].work, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 36])
@@ -367,33 +248,6 @@ def test_a_strip_that_is_peeled_off_is_the_exact_path(follow: Follow, turned: bo
     assert largest_distance(given, states) < 1e-8
 
 
-@pytest.mark.parametrize(
-    ("law", "turned"),
-    [
-        (graph([(0, 0), (1, 1), (1, 0.4), (3, 0)]), False),
-        pytest.param(Exponential(1.0, 0.0, 0.5), True, marks=pytest.mark.long),
-    ],
-)
-def test_a_body_comes_off_where_its_bonds_break_one_after_the_other(law: Superpotential, turned: bool) -> None:
-    """Along an axis, in either sense of it, and oblique in the plane."""
-    n = 4
-    given = mirrored(line(law, n)) if turned else line(law, n)
-    follower, states = path(given, programme=(100.0,))
-    other, turning = path(plate(law, n, 0.7), programme=(100.0,))
-    assert follower.end is other.end is End.ESCAPES
-    assert peak(turning) == pytest.approx(peak(states), rel=1e-9)
-
-
-def test_a_body_snaps_past_many_bonds() -> None:
-    """Twenty bonds reach their ends one after the other while the body comes off."""
-    law = graph([(0, 0), (1, 1), (1, 0.4), (3, 0)], one_sided=True)
-    given = problem(chain(20, 50.0), np.eye(1, 20, 19)[0], bonds(law, np.arange(20)))
-    wanted = list(Follower(given, PathOptions(programme=(100.0,))).states())
-    follower, states = path(given, programme=(100.0,))
-    assert follower.end is End.ESCAPES
-    assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(40))
 def test_peaks_of_random_paths_are_the_exact_ones(seed: int) -> None:
@@ -419,24 +273,6 @@ def test_a_block_on_friction_bears_the_same_in_each_direction(angle: float) -> N
     assert peak(states) == pytest.approx(peak(wanted), rel=1e-9)
     given = plate(law, 5, angle)
     assert largest_distance(given, states) < 1e-9
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.7, 2.0, 2.5])
-def test_what_sets_out_from_rest_is_held_across_its_way(angle: float) -> None:
-    """By hand: springs of stiffness 0.5, a law that falls by 0.8 from 1; across the way t/s is infinite."""
-    pull = np.array([np.cos(angle), np.sin(angle)])
-    given = problem(0.5 * np.eye(2), pull, lengths(graph([(0, 1), (1, 0.2)]), 1))
-    _, states = path(given, programme=(2.0,), follow=Follow.EXACT)
-    fold = next(state for state in states if state.event is Event.FOLD)
-    assert fold.factor == pytest.approx(1.0, rel=1e-12)
-    assert fold.unstable == 1
-
-
-def test_a_rough_floor_holds_up_to_its_strength_in_each_direction() -> None:
-    """Tresca friction on |u_t|: four vertices at rest, then sliding one after the other; the sum is the strength."""
-    follower, states = path(plate(graph([(0, 0.2)]), 5, 0.7), programme=(2.0,))
-    assert follower.end is End.ESCAPES
-    assert peak(states) == pytest.approx(0.8, rel=1e-12)
 
 
 def test_a_curved_law_softens_as_its_closed_form_says() -> None:
@@ -470,52 +306,6 @@ def test_a_curved_path_has_a_state_at_each_wanted_factor_that_it_comes_to(follow
         assert least[0] - 1e-9 <= state.factor - state.x[0] <= most[0] + 1e-9
 
 
-@pytest.mark.parametrize("excess", [1e-2, 1e-3, 1e-6])
-def test_a_jump_that_is_shorter_than_a_step_is_seen(excess: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bond that falls a little faster than its spring k: k λ = k x + exp(-x) is 1 at rest, and again at 2 excess.
-
-    No motion in time is wanted, which would crawl: hardly any force drives it.
-    """
-    monkeypatch.setattr(Relaxation, "run", lambda *_: pytest.fail("a motion in time"))
-    spring = 1.0 / (1.0 + excess)
-    _, states = path(problem(spring, spring, bonds(Exponential(1.0, 0.0, 1.0), 0)), programme=(1.5,))
-    jump = next(state for state in states if state.event is Event.JUMP)
-    assert jump.factor == pytest.approx(1.0 + excess, rel=1e-12)
-    there = brentq(lambda x: spring * x + np.expm1(-x), excess, 10.0 * excess, xtol=1e-15)
-    assert jump.x[0] == pytest.approx(there, abs=1e-10)  # where the force changes by 1e-10 of the excess
-
-
-def beam(nodes: int, delta: float) -> CondensedProblem:
-    """A beam on a floor, glued to it by bonds that soften exponentially, lifted at its first node."""
-    bending = np.diff(np.eye(nodes + 2), 2, axis=0)
-    stiffness, free = 10.0 * bending.T @ bending, np.arange(1, nodes)
-    glue = bonds(Exponential(1.0, 0.0, delta), np.arange(nodes - 1))
-    return problem(stiffness[np.ix_(free, free)], -stiffness[free, 0], glue, lower=0.0)
-
-
-@pytest.mark.long
-def test_a_motion_rests_where_all_bonds_are_on_their_graphs() -> None:
-    """Near a limit point the last correction may lead far: one bond of this beam was told 0.0075 below its floor."""
-    given, in_time = beam(20, 0.03), FollowingThresholds(many=0, waits=0)
-    _, states = path(given, programme=(20.0,), remember=(0,), thresholds=in_time)
-    assert min(float(np.min(state.x)) for state in states) > -1e-9
-    assert largest_distance(given, states, (0,)) < 1e-8
-
-
-def test_a_jump_goes_on_in_the_sense_in_which_the_energy_falls(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A beam that is peeled off, with memory: many bonds are at ends, and the softest motion leads on out of the cell.
-
-    The other sense leads uphill, and a motion in time would take thousands of steps.
-    """
-    monkeypatch.setattr(Relaxation, "run", lambda *_: pytest.fail("a motion in time"))
-    given = beam(12, 0.1)
-    follower, states = path(given, programme=(20.0,), remember=(0,))
-    assert follower.end is End.REACHED
-    assert sum(state.event is Event.JUMP for state in states) > 5
-    assert min(state.released for state in states) > -1e-12
-    assert largest_distance(given, states, (0,)) < 1e-8
-
-
 def test_smoothed_laws_tend_to_the_law() -> None:
     """The quadratic smoothing of a drop of height c rounds its corner off within ε/c: the peak falls with ε."""
     options = PathOptions(programme=(9.0,), follow=Follow.EXACT)
@@ -525,14 +315,6 @@ def test_smoothed_laws_tend_to_the_law() -> None:
     assert off[1] < 0.2 * off[0]
     assert off[2] < 0.2 * off[1]
     assert off[2] < 1e-3
-
-
-def test_a_path_passes_the_steep_side_of_a_smoothed_peak() -> None:
-    """A bond hardly moves there, but its force does: it must not be taken for one that stands, and the path go back."""
-    law = Exponential(2.0, 1.0, 1.0)
-    steep = create("quadratic", law, epsilon=1e-6)
-    smoothed, plain = (path(line(one, 8), programme=(1e3,))[1] for one in (steep, law))
-    assert peak(smoothed) == pytest.approx(peak(plain), rel=1e-6)
 
 
 @pytest.mark.parametrize("epsilon", [1e-1, 1e-6])
@@ -550,42 +332,6 @@ def test_the_quadratic_smoothing_of_a_polyline_is_one_and_its_path_exact(epsilon
 
 def first_fold(follower: Follower) -> float:
     return next(s.factor for s in follower.states() if s.event is Event.FOLD)
-
-
-@pytest.mark.parametrize("pull", [-0.9, 0.9])
-def test_a_bound_that_is_not_reached_changes_no_path_with_memory(pull: float) -> None:
-    law = create("chks", graph([(0, 0), (0.8, 1), (2, 0.5)]), epsilon=0.1)
-    ends = []
-    for lower in (-0.5, -np.inf):
-        given = problem([[1.0]], [pull], bonds(law, [0]), lower=lower)
-        _, states = path(given, programme=(1.0, 0.3, 1.0), remember=(0,))
-        assert largest_distance(given, states, (0,)) < 1e-8
-        ends.append([(s.factor, s.x[0], s.dissipated) for s in states if s.event in (Event.TURN, Event.END)])
-    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("rounding", [1e-31, -1e-31])
-def test_a_stiffness_that_is_rounding_is_no_unit_of_forces(rounding: float) -> None:
-    """A block rests on a floor and slides on a smoothed bond: what presses it meets no stiffness but the floor's."""
-    law = create("log_exp", graph([(0, 0), (0, 1), (2, 0.5)]), epsilon=0.05)
-    found = []
-    for across in (rounding, 0.0):
-        given = problem(np.diag([1.0, across]), [0.9, -1.0], bonds(law, [0]), lower=[-np.inf, 0])
-        follower, states = path(given)
-        assert follower.end is End.REACHED
-        assert largest_imbalance(given, states) < 1e-8
-        found.append([(s.factor, *s.x) for s in states])
-    np.testing.assert_allclose(*found, rtol=1e-10)
-
-
-def test_nothing_is_dissipated_before_a_smoothed_bond_moves() -> None:
-    """A kink at rest that is smoothed has an energy there, which is no loss; what is lost then balances the work."""
-    law = create("chks", graph([(0, 0), (0, 1), (2, 0)]), epsilon=0.1)
-    given = problem([[1.0]], [1.5], bonds(law, [0]))
-    _, states = path(given, remember=(0,))
-    assert states[0].dissipated == 0.0
-    last = states[-1]
-    assert last.work == pytest.approx(last.energy + last.factor * 1.5 * last.x[0] + last.dissipated, rel=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -650,12 +396,3 @@ def test_an_edge_where_a_law_on_a_length_meets_another_is_refused() -> None:
     given = plate(graph(DROP), 3, 0.0, bonds(graph(DROP), 1))
     with pytest.raises(InputError, match=r"\|u_t\|"):
         CurvedFollower(given, PathOptions())
-
-
-def test_a_piece_ends_where_a_bond_with_memory_has_been_though_its_chord_goes_on() -> None:
-    """The smoothed law rises in proportion at first; unloading from there set out on the fresh piece for ever."""
-    law = TractionGraph(np.array([-2.0, 0.0, 2.0]), *[np.array([-1.0, 0.0, 1.0])] * 2, np.array([0.0, 0.5, 0.5, 0.0]))
-    known = law.remembering(np.array([[-1.0, 1.0, -0.5, 0.5]])).row(0)
-    part = segments.Component(graph=known, weight=1.0, passed=(-1.0, 1.0), curved=True)
-    ends = [s.x + s.high for s in segments.chain([part], 0.0, np.inf) if s.kind is segments.Kind.PIECE]
-    assert ends == [1.0, 2.0, np.inf]

@@ -19,8 +19,6 @@ from hvi_fenicsx.paths.follower import Follower
 from hvi_fenicsx.paths.relations import ContactPoints
 from hvi_fenicsx.paths.segments import Segment
 from hvi_fenicsx.paths.state import End, Event, Follow, PathOptions, PathState
-from hvi_fenicsx.paths.thresholds import FollowingThresholds
-from hvi_fenicsx.paths.vertex_laws import vertex_laws
 from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 
@@ -124,28 +122,6 @@ def peeled() -> CondensedProblem:
     return Condensation(prepare(read_tables(table), MPI.COMM_SELF).system).problem
 
 
-def test_what_hardly_moves_does_not_drive_and_the_path_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As long as the crack drives, the basis keeps its digits; the states are those that each new coordinate drives."""
-    made: list[Array] = []
-    given = peeled()
-    inverse = np.linalg.inv
-
-    def counted(matrix: Array) -> Array:
-        made.append(matrix)
-        return inverse(matrix)
-
-    monkeypatch.setattr(np.linalg, "inv", counted)
-    _, states = path(given, follow=Follow.EXACT)
-    kept = len(made)
-    _, others = path(given, follow=Follow.EXACT, thresholds=FollowingThresholds(small=0.0))
-    assert len(states) == len(others) > 100
-    for one, other in zip(states, others, strict=True):
-        assert (one.event, one.unstable) == (other.event, other.unstable)
-        assert one.factor == pytest.approx(other.factor, rel=1e-8)
-        assert one.x == pytest.approx(other.x, abs=1e-9 * float(np.max(np.abs(other.x))))
-    assert kept < 0.2 * (len(made) - kept)
-
-
 def random_law(generator: np.random.Generator) -> Any:
     """Pieces that rise and fall, drops and teeth, with and without a jump at 0, one- and two-sided."""
     x, points = 0.0, [(0.0, 0.0 if generator.random() < 0.8 else generator.uniform(0.1, 1))]
@@ -215,21 +191,6 @@ def comes_back_to_where_it_was(states: Sequence[PathState]) -> None:
     meets = [np.allclose([s.factor, *s.x], [last.factor, *last.x], rtol=1e-9, atol=1e-9) for s in earlier]
     assert any(meets[:-1])
     assert max(s.factor for s in states) < 5.0
-
-
-def test_a_bond_that_has_moved_by_rounding_remembers_nothing() -> None:
-    table = ContactPoints(problem(1.0, 1.0, bonds(graph(SOFTENING), 0)), (0,))
-    fresh = table.chain(0)
-    table.remember(0, 1e-16, 1.1e-16)
-    assert table.chain(0) == fresh
-    table.remember(0, 1.2, 0.6)
-    assert table.chain(0) != fresh
-
-
-def test_a_bond_that_breaks_at_a_traction_of_rounding_remembers_none() -> None:
-    (bond,) = vertex_laws(problem(1.0, 1.0, bonds(graph(SOFTENING), 0)), (0,))
-    bond.remember(1.5 * (1.0 - 1e-13), 3e-14)
-    assert list(bond.memory) == [-1.5, 1.5, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("follow", Follow)
@@ -348,34 +309,3 @@ def test_states_on_a_small_floor_are_among_all_that_there_are() -> None:
     row = np.rint(x * 3).astype(int) @ [1, 4]
     far = [float(np.max(np.abs(u - p.u[row])) / np.max(np.abs(p.u))) for p in floor.stationary()]
     assert min(far) < 1e-9
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_factor_that_stands_neither_rises_nor_falls(seed: int) -> None:
-    """Points in a row slide off at the sum of the bonds' peaks: no limit point. Where bonds soften after that: one."""
-    random = np.random.default_rng(seed)
-    n, pull, plateau = 5, random.uniform(0.5, 1.5, 5), [(0, 0), (1, 1), (90, 1)]
-    row, weights = chain(n, random.uniform(5.0, 20.0)), random.uniform(0.5, 1.5, n)
-    for points, limits in ((plateau, 0), ([*plateau, (1090, 0)], 1)):
-        given = problem(row, pull, bonds(graph(points), np.arange(n), weights))
-        follower, states = path(given, programme=(10.0,), follow=Follow.EXACT)
-        assert follower.end is End.ESCAPES
-        folds = [s.factor for s in states if s.event is Event.FOLD]
-        assert folds == pytest.approx([weights.sum() / pull.sum()] * limits)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_beam_above_its_floor_comes_to_rest_there_whatever_rounding_makes_of_the_gap(seed: int) -> None:
-    """All contacts end at no load; two of them, which hold the beam, have to stay closed where the path begins."""
-    random = np.random.default_rng(seed)
-    places, n = np.sort(random.uniform(0.0, 1.0, 5)), 5
-    lengths, bending = np.diff(places), np.zeros((n - 2, n))
-    for i, (left, right) in enumerate(itertools.pairwise(lengths)):
-        bending[i, i : i + 3] = 1.0 / left, -1.0 / left - 1.0 / right, 1.0 / right
-    gaps = 0.3 * (1.0 + 1e-12 * random.uniform(-1.0, 1.0, n))
-    given = problem(bending.T @ bending, random.uniform(0.05, 0.15, n), upper=gaps)
-    follower, states = path(given, programme=(1.0,))
-    assert follower.end is End.REACHED, follower.reason
-    for state in states:
-        assert violation(given, state.x, state.factor, 0.1) < 1e-9
-        assert np.count_nonzero(state.x >= gaps - 1e-12) >= 2

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 
 from hvi_fenicsx.runtime import journal
 from hvi_fenicsx.runtime.journal import Journal
@@ -23,16 +22,6 @@ def write(path: Path, identity: str = "this") -> None:
     with closing(Journal(path, identity)) as opened:
         for record in RECORDS:
             opened.append(record)
-
-
-def test_records_come_back_to_the_last_digit(tmp_path: Path) -> None:
-    write(tmp_path / "j")
-    found = journal.read(tmp_path / "j", "this")
-    assert [r["factor"] for r in found] == [0.1 + 0.2, np.inf]
-    assert_array_equal(found[0]["x"], RECORDS[0]["x"])
-    assert_array_equal(found[1]["place"]["point"], np.arange(3.0))
-    assert found[0]["memory"] is None
-    assert found[1]["x"].shape == (0,)
 
 
 def test_another_path_has_no_records_here(tmp_path: Path) -> None:

@@ -57,12 +57,6 @@ def test_its_state_is_certified_under_its_load_and_the_answer_stays_no(last: Mod
     assert not last.certificate.passed
 
 
-def test_below_the_limit_nothing_is_followed() -> None:
-    found = hvi.solve(read_tables(block(CELLS, 0.7 * P, P, quadratic_linear(STRENGTH))))
-    assert found.converged
-    assert found.last_borne is None
-
-
 @pytest.mark.parametrize("method", ["auto", "branch"])
 def test_moved_obstacles_are_scaled_as_on_a_path(method: str) -> None:
     """A plate that goes down presses the block in the place of a load."""

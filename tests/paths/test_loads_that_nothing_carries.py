@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 from scenes import Table
 
@@ -78,14 +77,6 @@ def _pressed() -> dict[str, Any]:
     return {"on": "upper.top", "traction": [0.0, -1e7]}
 
 
-def test_several_loads_together_may_be_scaled_in_both_directions() -> None:
-    found = hvi.follow(
-        on_rails(RUBBING, push=PUSH, back=BACK, press=_pressed()), scaled=["push.traction", "back.traction"], to=-5.0
-    )
-    assert found.end == "escapes"
-    assert np.min(found.factor) == pytest.approx(-1e6 / 3e5, rel=1e-6)
-
-
 def disk(**floor: Table) -> hvi.Model:
     """A disk on a floor, under its weight: it may roll and slide."""
     plane = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
@@ -105,59 +96,3 @@ def test_a_disk_that_rolls_has_a_path_to_its_equilibrium(floor: Table) -> None:
     path = hvi.follow(disk(**floor))
     assert (path.end, path.uncertified) == ("reached", 0)
     assert path.rows[-1].energy == pytest.approx(hvi.solve(disk()).energy, rel=1e-6)
-
-
-GLUE: Table = {"law": "graph", "points": [[0, 0], [1e-3, 9e3], [2e-3, 9e3], [4e-3, 0]]}
-RUB: Table = {"friction": {"law": "graph", "points": [[0, 0], [1e-3, 18e3], [1e-3, 0]]}}
-
-
-def humped(cells: int, **floor: Table) -> hvi.Model:
-    """A block over a hump that is 0.05 m too high, and a load that presses it down."""
-    hump = {"shape": "sphere", "center": [0.7, 0.05 - 4.689], "radius": 4.689, "direction": [0.0, -1.0]}
-    return hvi.read_tables(
-        {
-            "domain": {"shape": "rectangle", "size": [1.4, 1.0], "cells": [cells, 1]},
-            "material": {"model": "plane_strain", "youngs_modulus": 1.1e7, "poisson_ratio": 0.3},
-            "boundary": {
-                "floor": {"on": "bottom", "contact": {"obstacle": hump}, **floor},
-                "load": {"on": "top", "traction": [0.0, -6100.0]},
-            },
-            "solver": {"degree": 2},
-        }
-    )
-
-
-@pytest.mark.parametrize(("cells", "floor"), [(3, {}), (3, RUB), (4, {}), (4, RUB)])
-def test_an_overlap_that_breaks_glue_leaves_a_body_that_nothing_holds(cells: int, floor: Table) -> None:
-    """By hand: no energy is left at no load; the glue loses the area under its law, 22.5 J/m², times 1.4 m in the end.
-
-    Under the load the energy is that of a block without glue.
-    """
-    path = hvi.follow(humped(cells, adhesion=GLUE, **floor))
-    assert (path.end, path.uncertified) == ("reached", 0)
-    assert path.rows[-1].dissipated == pytest.approx(31.5, rel=1e-12)
-    assert path.rows[0].energy == pytest.approx(0.0, abs=1e-8)
-    assert path.rows[-1].energy == pytest.approx(hvi.solve(humped(cells, **floor)).energy, rel=1e-9)
-
-
-@pytest.mark.parametrize(("cells", "degree"), [([2, 1], 2), ([4, 1], 2), ([4, 2], 1), ([4, 2], 2)])
-def test_a_floor_that_lifts_a_body_off_its_glue_as_a_whole_leaves_rounding_that_is_no_load(
-    cells: list[int], degree: int
-) -> None:
-    """By hand as above: 22.5 J/m² on 2 m. The elastic forces of a lifted body are rounding; they took it away."""
-
-    def lifted(**glue: Table) -> hvi.Model:
-        block = {"shape": "rectangle", "size": [2.0, 1.0], "cells": cells}
-        boundary = {
-            "floor": {"on": "bottom", "contact": {"gap": -0.05}, **RUB, **glue},
-            "load": {"on": "top", "traction": [118.0, -6100.0]},
-        }
-        material = {"model": "plane_strain", "youngs_modulus": 1.1e7, "poisson_ratio": 0.3}
-        given = {"domain": block, "material": material, "boundary": boundary, "solver": {"degree": degree}}
-        return hvi.read_tables(given)
-
-    path = hvi.follow(lifted(adhesion=GLUE))
-    assert (path.end, path.uncertified) == ("reached", 0)
-    assert path.rows[0].energy == pytest.approx(0.0, abs=1e-8)
-    assert path.rows[0].dissipated == pytest.approx(45.0, rel=1e-12)
-    assert path.rows[-1].energy == pytest.approx(hvi.solve(lifted()).energy, rel=1e-9)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from condensed import bonds, chain, graph, problem
+from condensed import bonds, chain, problem
 from test_curved_paths import path, peak
 
 from hvi_fenicsx.laws import Exponential
@@ -13,7 +12,6 @@ from hvi_fenicsx.laws.smoothing import create
 from hvi_fenicsx.paths.state import End, Follow
 from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 
-Array = npt.NDArray[np.float64]
 SHARP = create("chks", Exponential(1.0, 0.3, 0.5), epsilon=1e-6)
 
 
@@ -36,21 +34,3 @@ def test_what_is_borne_does_not_depend_on_the_spring_that_a_load_pulls_at(follow
     if follow is Follow.STABLE:
         assert follower.end is End.ESCAPES
         assert np.min(np.diff([s.factor for s in states])) > -1e-12  # a landing on the fold itself would lead back
-
-
-def test_a_body_that_slides_on_for_ever_comes_off_at_the_plateau() -> None:
-    """A free body on bonds that soften to a fifth, pressed against a floor: all slides, and the factor tends to 1/5."""
-    law = create("chks", graph([(0, 0), (1, 1), (4, 0.2)]), epsilon=1e-6)
-    roots = np.random.default_rng(3).standard_normal((5, 6))
-    roots[:, :3] -= roots[:, :3].mean(axis=1)[:, None]  # moving the first three alike strains nothing
-    given = problem(
-        50.0 * roots.T @ roots + 1e3 * np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
-        [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
-        bonds(law, [0, 1, 2], 1.0 / 3.0),
-        force=np.r_[np.zeros(3), np.full(3, -1e3)],
-        lower=np.r_[np.full(3, -np.inf), np.zeros(3)],
-    )
-    follower, states = path(given, programme=(9.0,), follow=Follow.EXACT)
-    assert follower.end is End.ESCAPES
-    assert states[-1].factor == pytest.approx(0.2, rel=1e-6)
-    assert len(states) < 100

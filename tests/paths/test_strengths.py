@@ -55,29 +55,6 @@ def test_a_strip_is_peeled_off_by_the_moment_that_the_area_of_the_law_gives(poin
     assert jumped(path) * 200.0 == pytest.approx(np.sqrt(2 * bending * 50.0), rel=6e-3)
 
 
-def test_a_jump_is_tried_in_another_way_where_its_first_curve_comes_to_singular_equations() -> None:
-    """A strip that is lifted off bonds of two drops; a single run bears 0.99 of the peak, and nothing above it."""
-    adhesion = [[0, 0], [1.27e-06, 18.64], [1.27e-06, 4.565], [3.472e-06, 7.609], [3.472e-06, 0.0]]
-    friction = [[0, 0], [4.105e-07, 54.59], [1.425e-06, 26.47], [1.624e-06, 34.94], [2.258e-06, 50.5]]
-    glue = {
-        "on": "bottom",
-        "adhesion": {"law": "graph", "points": adhesion, "multiplier": "1.253+0.5597*x"},
-        "friction": {"law": "graph", "points": friction},
-        "contact": {"gap": 0.0},
-    }
-    scene = {
-        "domain": {"shape": "rectangle", "size": [1.0, 0.3703], "cells": [3, 1]},
-        "material": {"model": "plane_stress", "youngs_modulus": 1895000.0, "poisson_ratio": 0.3},
-        "boundary": {"glue": glue, "pull": {"on": "top", "traction": [0.567, 13.76]}},
-    }
-    path = hvi.follow(hvi.read_tables(scene), to=1.5, memory=False)
-    assert path.end == "escapes"
-    for part, code in ((0.99, 0), (1.01, 4)):
-        pull = {"on": "top", "traction": [part * path.peak_factor * p for p in (0.567, 13.76)]}
-        loaded = {**scene, "boundary": {"glue": glue, "pull": pull}}
-        assert hvi.solve(hvi.read_tables(loaded), estimate=False).exit_code == code
-
-
 def test_a_block_sinks_where_its_bed_bears_no_more_although_bonds_turn_back_on_the_way() -> None:
     """The bed bears its peak all along at most: 5514 N/m² against 3641 N/m²."""
     friction = {"law": "exponential", "peak_traction": 1838.0, "residual_traction": 0.0, "delta": 1.765e-4}
@@ -101,37 +78,6 @@ def test_a_block_sinks_where_its_bed_bears_no_more_although_bonds_turn_back_on_t
 def jumped(path: Any) -> float:
     """The factor at which most energy is released."""
     return float(max((path.rows[n] for n in path.jumps), key=lambda row: row.released).factor)
-
-
-def test_a_slender_body_comes_off_once_its_bonds_soften_together() -> None:
-    """Sliding bonds all bear what the factor 0.2 asks for: above it nothing holds a body that has jumped that far."""
-    size, drop = {"shape": "rectangle", "size": [1.0, 0.01]}, [[0.0, 0.0], [9.3e-8, 3e6], [3.72e-7, 6e5]]
-    scene = hvi.read_tables(
-        {
-            "domain": {
-                "lower": {**size, "cells": [7, 7], "origin": [0.0, -0.01]},
-                "upper": {**size, "cells": [8, 8]},
-            },
-            "material": {"model": "plane_stress", "youngs_modulus": 2.15e11, "poisson_ratio": 0.29},
-            "boundary": {
-                "pull": {"on": "upper.right", "traction": ["3e8*(4 - 6*y/0.01)", 0.0]},
-                "press": {"on": "upper.top", "traction": [0.0, "-1e6*(1 - 1.4*x)"]},
-                "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
-            },
-            "interface": {
-                "floor": {
-                    "between": ["upper.bottom", "lower.top"],
-                    "contact": {"gap": 0.0},
-                    "friction": {"law": "graph", "points": drop},
-                }
-            },
-            "solver": {"degree": 2},
-        }
-    )
-    path = hvi.follow(scene)
-    assert path.end == "escapes"
-    assert path.converged
-    assert path.peak_factor > 0.2
 
 
 @pytest.mark.parametrize("programme", [2.0, [1.0, -0.5, 2.0]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,7 +12,6 @@ from unformed import difference, figures, path_run, words
 from hvi_fenicsx.load_paths.following import Control
 from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
 from hvi_fenicsx.reduced.factorised_stiffness import FactorisedStiffness
-from hvi_fenicsx.runtime.journal import Record
 
 SOFT: Table = {"law": "graph", "points": [[0, 0], [2e-6, 3e6], [1.6e-5, 0]]}
 TEETH: Table = {"law": "graph", "points": [[0, 0], [4e-6, 1e6], [4e-6, 6e5], [9e-6, 1e6], [9e-6, 6e5]]}
@@ -115,29 +113,6 @@ def test_rows_are_those_with_an_array(name: str) -> None:
     assert other.uncertified == 0
     assert len(one.rows) > 8
     assert difference(figures(one), figures(other)) < 1e-10
-
-
-def test_a_path_goes_on_from_its_records() -> None:
-    """From any state, with columns exchanged or not, the same rows follow."""
-    kept: list[Record] = []
-    table = SCENES[QUICK]
-    whole = path_run(table, formed=False).follow(Control(keep=kept.append))
-    for count in (1, len(kept) // 3, len(kept) - 2):
-        again = path_run(table, formed=False).follow(Control(), kept[:count])
-        assert words(again) == words(whole)
-        assert difference(figures(whole), figures(again)) < 1e-9
-
-
-@pytest.mark.long
-def test_few_columns_beside_the_factors_give_the_same_rows() -> None:
-    """Factorised anew at each second event, or hardly ever."""
-    found = []
-    for most in (1, 10_000):
-        run = path_run(SCENES["peak and snap-back"], formed=False)
-        run.prepared.system.thresholds = replace(run.prepared.system.thresholds, exchanges=most)
-        found.append(run.follow(Control()))
-    assert words(found[0]) == words(found[1])
-    assert difference(*map(figures, found)) < 1e-10
 
 
 @pytest.mark.parametrize("ranks", LONG_RANKS[1:])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from runs import ROOT
@@ -107,54 +105,3 @@ def test_a_path_of_a_slender_body_is_certified() -> None:
     assert path.run.states[-1].memory is not None
     assert len(path.rows) > 20
     assert path.uncertified == 0
-
-
-def test_a_rigid_motion_has_no_condensed_force_and_the_work_of_the_loads() -> None:
-    """Moved upwards, which the wall allows; the press has a resultant of -4e5 N/m."""
-    system = prepare(slender()).system
-    problem = Condensation(system).problem
-    upwards = np.where(np.isfinite(problem.lower), 1.0, 0.0)
-    stiffness = problem.stiffness
-    assert np.max(np.abs(stiffness @ upwards)) < 1e-14 * np.max(np.abs(stiffness))
-    loads = problem.load(1.0) @ upwards * system.problem.scales.force
-    assert loads == pytest.approx(-4e5, rel=1e-12)
-
-
-def test_the_path_of_a_body_on_nothing_ends_at_once() -> None:
-    """No unknown carries anything, and a rigid motion is left."""
-    table = slender().tables()
-    boundary = {name: part for name, part in table["boundary"].items() if name != "floor"}
-    path = hvi.follow(hvi.read_tables(table | {"boundary": boundary}))
-    assert (path.end, len(path.rows), path.uncertified) == ("escapes", 2, 0)
-
-
-def towers() -> hvi.Model:
-    """A tall block on another, hardly compressible: rounding of the stiffness leaves 2e-8 of the loads on Γc."""
-    block = {"shape": "rectangle", "size": [0.1, 1.0]}
-    law = {"law": "exponential", "peak_traction": 3e6, "residual_traction": 1.5e6, "delta": 9.3e-7}
-    table = {
-        "domain": {
-            "lower": {**block, "cells": [31, 31], "origin": [0.0, -1.0]},
-            "upper": {**block, "cells": [32, 32]},
-        },
-        "material": {"model": "plane_strain", "youngs_modulus": 2.15e11, "poisson_ratio": 0.4999},
-        "boundary": {
-            "pull": {"on": "upper.right", "traction": [9.9e3, 0.0]},
-            "press": {"on": "upper.top", "traction": [0.0, -1e6]},
-            "base": {"on": "lower.bottom", "displacement": [0.0, 0.0]},
-        },
-        "interface": {"floor": {"between": ["upper.bottom", "lower.top"], "contact": {"gap": 0.0}, "friction": law}},
-    }
-    return hvi.read_tables(table)
-
-
-def test_rounding_of_the_stiffness_is_taken_out_where_bonds_have_turned_back() -> None:
-    path = hvi.follow(towers())
-    run = path.run
-    corrected = [n for n, verdict in enumerate(run._verdicts) if verdict.corrected and np.any(run.states[n].memory)]
-    assert path.end == "reached"
-    assert path.uncertified == 0
-    assert corrected
-    state, certifier = run.states[corrected[-1]], run._certifier
-    wrong = replace(state, memory=state.memory * [1.0, 1.0, 1.0 + 1e-6, 1.0 + 1e-6])
-    assert not certifier.verdict(wrong, 0).certified

@@ -38,15 +38,3 @@ def test_a_vertex_has_the_colour_of_the_law_that_is_broken(tmp_path: Path) -> No
     (strip,) = fig.axes[1].images
     colours = np.asarray(strip.get_array())[0]
     assert np.allclose(colours, [to_rgb(c) for c in (BLUE, ORANGE, ORANGE, VERMILION)])
-
-
-def test_energies_are_in_a_unit_that_suits_and_the_legend_has_what_is_there(tmp_path: Path) -> None:
-    fig = equilibria.make(search(tmp_path, [-2.0, -1.9993]))
-    assert fig.axes[0].get_xlabel() == "µJ above the lowest found,\n−2 J"
-    assert {text.get_text() for text in fig.legends[0].get_texts()} >= {"minimiser", "saddle", "on a kink or drop"}
-
-
-def test_one_equilibrium_is_at_zero(tmp_path: Path) -> None:
-    fig = equilibria.make(search(tmp_path, [-2.0]))
-    assert [float(tick) for tick in fig.axes[0].get_xticks()] == [0.0]
-    assert "saddle" not in [text.get_text() for text in fig.legends[0].get_texts()]

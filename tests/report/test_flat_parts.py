@@ -63,19 +63,3 @@ def test_where_a_bore_touches_is_in_the_middle_of_its_map(around: int) -> None:
     ends = flat.points[:, 0].min(), flat.points[:, 0].max()
     assert np.ptp(touching) < 0.25 * (ends[1] - ends[0])
     assert abs(touching.mean() - np.mean(ends)) < 0.5 / around * 2.1 * (ends[1] - ends[0])
-
-
-def test_vectors_on_an_unrolled_bore_run_along_its_coordinates() -> None:
-    geometry, body = bore(2.0 * np.pi)
-    normals = -geometry.part.points * [1.0, 0.0, 1.0] / RADIUS
-    flat, around = laid_flat(geometry, body), np.cross([0.0, 1.0, 0.0], normals)
-    assert np.abs(flat.along(around)) == pytest.approx(np.tile([1.0, 0.0], (len(flat.rows), 1)), abs=1e-12)
-    assert flat.along(np.tile([0.0, 1.0, 0.0], (len(normals), 1)))[:, 1] == pytest.approx(np.ones(len(flat.rows)))
-
-
-def test_a_part_that_is_open_is_seen_along_its_axes() -> None:
-    geometry, body = bore(0.5 * np.pi)
-    flat = laid_flat(geometry, body)
-    assert "way" not in flat.names[0]
-    assert flat.how == "seen along x"
-    assert len(flat.rows) == len(geometry.part.points)

@@ -17,7 +17,6 @@ from runs import ROOT, hvi, summary
 
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.report import page as pages
-from hvi_fenicsx.report.units import number
 
 PUSHED = ROOT / "demos" / "pushed_block.toml"
 PIXEL = base64.b64decode(
@@ -135,30 +134,11 @@ def changed(held: Path, folder: Path, **entries: Any) -> Path:
     return pages.write(folder)
 
 
-def test_an_estimate_and_ranks_are_told(held: Path, tmp_path: Path) -> None:
-    estimate = {"relative": 0.0123, "total": 2.46, "discretisation": 2.4, "smoothing": None, "energy_norm": 200.0}
-    text = Page(changed(held, tmp_path / "new", estimate=estimate, ranks=3, petsc="-a b")).text
-    assert "estimated error, as a share of the solution 1.2 %" in text
-    assert "of it by the mesh 1.2 %" in text
-    assert "not estimated" not in text
-    assert "by the smoothing" not in text
-    assert "hvi run scene.toml --out again --np 3 '--petsc=-a b'" in text
-
-
 def test_a_certified_solution_on_a_coarse_mesh_is_not_called_good(held: Path, tmp_path: Path) -> None:
     rough = {"relative": 0.43, "total": 43.0, "discretisation": 43.0, "energy_norm": 100.0, "coarse": True}
     page = Page(changed(held, tmp_path / "new", estimate=rough))
     assert "Certified on a coarse mesh: the estimated error is 43 % of the solution" in page.text
     assert "A solution exists, was found, and is certified." not in page.text
-
-
-def test_numbers_that_rounding_spoils_pass_by_rounding(held: Path, tmp_path: Path) -> None:
-    spoiled = {**summary(held)["certificate"], "inclusion": 3e-8, "rounding": 5e-8}
-    text = Page(changed(held, tmp_path / "new", certificate=spoiled)).text
-    assert "Each number must be at most 5·10⁻⁸" in text
-    assert "failed" not in text
-    spoiled["inclusion"] = 6e-8
-    assert "✗ failed" in Page(changed(held, tmp_path / "newer", certificate=spoiled)).text
 
 
 @pytest.mark.parametrize("name", ["summary.json", "scene.toml"])
@@ -167,14 +147,6 @@ def test_a_damaged_folder_is_refused(held: Path, tmp_path: Path, name: str) -> N
     (folder / name).write_text("{ not", encoding="utf-8")
     with pytest.raises(HviError, match=re.escape(name)):
         pages.write(folder)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(0.0, "0"), (0.29, "0.29"), (2.15e11, "2.15·10¹¹"), (-1e6, "−10⁶"), (9e-6, "9·10⁻⁶"), (16, "16"), (1e-8, "10⁻⁸")],
-)
-def test_numbers_are_written_as_people_do(value: float, text: str) -> None:
-    assert number(value) == text
 
 
 def test_a_study_has_its_page(tmp_path: Path) -> None:

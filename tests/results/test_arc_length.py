@@ -5,7 +5,6 @@ The arc length is held to closed forms: angles on circles, the polygon's own len
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,6 @@ import numpy.typing as npt
 import pytest
 from runs import LONG_RANKS, contact, run_all
 from scenes import STEEL
-
-from hvi_fenicsx.results.contact_parts import along
 
 Array = npt.NDArray[Any]
 R, H = 0.5, 0.1
@@ -80,9 +77,3 @@ def test_at_a_notch_it_goes_down_and_up_again(tables: dict[str, Array]) -> None:
     side = np.hypot(0.2, 0.3)
     assert rows["s"][-1] == pytest.approx(2 * side)
     assert rows["y"] == pytest.approx(1.0 - 0.3 * (1 - np.abs(rows["s"] - side) / side))
-
-
-
-
-
-

@@ -5,21 +5,13 @@ The forces of all places are in balance; what the table says vertex by vertex ad
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import ufl
-from dolfinx import fem
 from runs import ROOT, hvi, summary, table, write_scene
-from scenes import NU, E, P, Q, Table, model, solved
-
-from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.certify import contact_state, placed_forces
-from hvi_fenicsx.effects import Contribution
-from hvi_fenicsx.problem.problem import PlacedContribution
+from scenes import NU, E, P, Q, Table, model
 
 HEADER = "part,x,y,z,u_x,u_y,u_z,traction_x,traction_y,traction_z,reaction_x,reaction_y,reaction_z"
 CELLS = 4
@@ -91,12 +83,6 @@ def test_the_rows_of_a_part_add_up_to_its_resultant_and_all_parts_to_nothing(tmp
     x = rows["x"][rows["part"] == "pull"]
     inside = np.isclose(x, 0.2 / 3) | np.isclose(x, 0.4 / 3)
     np.testing.assert_allclose(traction[inside, 2], 0.6e6 * (1 + (x[inside] - 0.1) / 0.3), rtol=0.05)
-
-
-
-
-
-
 
 
 def test_paraview_is_given_the_whole_stress_and_the_reactions_as_vectors(uniform: Path) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
-import json
 import os
 import signal
 import threading
@@ -75,8 +73,6 @@ def test_only_what_the_manifest_lists_makes_room(tmp_path: Path) -> None:
     assert all((tmp_path / beside / "thesis.txt").exists() for beside in (".r.old", ".r.partial"))
 
 
-
-
 def test_files_put_there_meanwhile_are_kept_and_one_with_a_name_of_ours_gets_another(tmp_path: Path) -> None:
     out = tmp_path / "r"
     out.mkdir()
@@ -117,14 +113,6 @@ def test_a_manifest_of_others_or_one_that_points_outside_is_none(text: str, tmp_
     assert names(tmp_path / "r") == ["manifest.json", "summary.json"]
 
 
-
-
-
-
-
-
-
-
 def test_the_second_writer_is_refused_at_once_and_the_lock_goes_with_the_first(tmp_path: Path) -> None:
     first = OutputFolder(tmp_path / "deep" / "r", "result")
     first.stage()
@@ -134,10 +122,6 @@ def test_the_second_writer_is_refused_at_once_and_the_lock_goes_with_the_first(t
     first.close()
     assert names(tmp_path) == []
     written(tmp_path / "r", summary="1")
-
-
-
-
 
 
 class Killed(BaseException):
@@ -256,10 +240,6 @@ def test_killed_at_any_call_results_within_a_result_are_those_of_one(
     assert seen.count("2") > 6
 
 
-
-
-
-
 def test_a_signal_waits_until_all_is_moved_whichever_thread_gets_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -296,11 +276,3 @@ def test_a_signal_waits_until_all_is_moved_whichever_thread_gets_it(
     assert names(out) == ["a.json", "c.json", "manifest.json", "summary.json"]
     assert intact(out)
     assert names(tmp_path) == ["r"]
-
-
-
-
-
-
-
-

@@ -13,14 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from full_disk import room_for
 from mpi4py import MPI
 from runs import ROOT, hvi
 from scenes import two_blocks
 
 import hvi_fenicsx
-from hvi_fenicsx import InputError
-from hvi_fenicsx.results import vtk_files
 
 pyvista = pytest.importorskip("pyvista")
 MACRO = ROOT / "docs" / "open_result.py"
@@ -136,5 +133,3 @@ def test_both_sides_of_an_interface_are_written(tmp_path: Path) -> None:
     there = ~np.isnan(traction[:, 0])
     assert 8 <= np.count_nonzero(there) <= 9  # the upper block begins at 0.21, in the second facet
     assert np.all(np.sign(traction[there].sum(axis=0)[:2]) == np.sign(sums["seam.second"]))
-
-

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from typing import Any
 
 import pytest
@@ -56,5 +55,3 @@ def test_a_disk_that_is_full_is_told_to_all_ranks_and_leaves_nothing(found: Any,
     assert reasons[0].endswith("make room on the disk")
     assert len(reasons) == ranks
     assert left == []
-
-

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import fcntl
-import json
 import logging
 import os
 import signal
 import subprocess
-import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -21,9 +18,7 @@ from mpi4py import MPI
 from runs import ROOT, command, process, summary, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.runtime import forms, processes
 from hvi_fenicsx.runtime.forms import FormCache
 
 
@@ -49,8 +44,6 @@ def entry(cache: Path) -> Path:
     return next(folder for folder in cache.iterdir() if folder.is_dir())
 
 
-
-
 def test_parts_of_a_boundary_share_a_compiled_form_and_keep_their_own_facets(tmp_path: Path) -> None:
     """70 parts of one facet each along a square's lower side: ∫ v ds is the part's length; and two that overlap."""
     square = mesh.create_unit_square(MPI.COMM_SELF, 70, 1)
@@ -67,8 +60,6 @@ def test_parts_of_a_boundary_share_a_compiled_form_and_keep_their_own_facets(tmp
     both = fem.assemble_vector(cache.compiled(v * ds((8, 5)) + 3.0 * v * ds((5, 31)))).array
     assert both.sum() == pytest.approx((1 + 4 + 3) / 70)
     assert both @ x == pytest.approx((8.5 + 4 * 5.5 + 3 * 31.5) / 70**2)
-
-
 
 
 def test_what_a_killed_run_left_is_removed(kept: Path, tmp_path: Path) -> None:
@@ -92,8 +83,6 @@ def test_a_damaged_form_is_compiled_again(kept: Path, tmp_path: Path) -> None:
     assert min(sizes) > 0
 
 
-
-
 def test_a_cache_that_cannot_be_written_is_replaced_with_a_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -107,15 +96,11 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_a_warning(
     ]
 
 
-
-
 def test_a_form_that_cannot_be_compiled_is_one_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "/no/such/compiler")
     with pytest.raises(HviError, match="cannot be compiled"):
         FormCache(tmp_path).compiled(area())
     assert [f.suffix for f in tmp_path.iterdir()] == [".lock"]
-
-
 
 
 def test_all_forms_are_compiled_in_one_place() -> None:
@@ -153,5 +138,3 @@ def test_a_run_killed_while_forms_compile_does_not_stop_the_next(
     done = process(*run)
     assert (done.returncode, done.stderr) == (0, "")
     assert summary(tmp_path / "r")["converged"]
-
-

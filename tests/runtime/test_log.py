@@ -13,8 +13,6 @@ from runs import command, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import read_tables, solve
-from hvi_fenicsx.errors import NotWrittenError
-from hvi_fenicsx.runtime import log
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 from hvi_fenicsx.workflow import Thresholds
 
@@ -66,10 +64,6 @@ def test_the_log_has_the_lines_of_the_terminal_and_every_newton_step(scene: Path
     assert seconds == sorted(seconds)
 
 
-
-
-
-
 def solve_from_python(caplog: pytest.LogCaptureFixture, level: int, **keys: object) -> list[logging.LogRecord]:
     with caplog.at_level(level, logger="hvi_fenicsx"):
         solve(read_tables(model(32, 3e6, friction=LAW, **keys)), thresholds=NESTED)
@@ -87,13 +81,9 @@ def test_from_python_existence_levels_and_certificate_are_told_at_info(caplog: p
     assert "existence: held, margin 0.333" in records[0].getMessage()
 
 
-
-
 _QUIET = "from hvi_fenicsx import read_scene, solve; solve(read_scene('square.toml'))"
 
 
 def test_python_users_who_configure_nothing_see_nothing(scene: Path) -> None:
     done = subprocess.run([sys.executable, "-c", _QUIET], cwd=scene.parent, capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
-
-

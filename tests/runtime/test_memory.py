@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +33,6 @@ def test_the_limits_of_a_cgroup_and_of_those_around_it_hold(
     (tmp_path / "cgroup" / file).write_text(f"{3 * 2**20}\n")
     (tmp_path / "cgroup" / "cgroup.procs").write_text("max\n")
     assert memory.cgroup_limits(tmp_path / "table", tmp_path / "cgroup") == wanted
-
-
-
-
 
 
 SHAPES: dict[str, tuple[dict[str, Any], int, float]] = {

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -61,10 +60,6 @@ def test_an_mpirun_that_ends_without_a_word_is_told(
     assert "TMPDIR" in done.stderr
 
 
-
-
-
-
 def test_ranks_that_were_interrupted_are_so_when_mpirun_is_ended_without_a_word(scene: Path, tmp_path: Path) -> None:
     """The second signal comes between the last rank's end and mpirun's own."""
     code = "trap 'echo -n 130 > $HVI_EXIT_CODE_FILE; echo written' USR1; trap 'exit 1' TERM"
@@ -74,5 +69,3 @@ def test_ranks_that_were_interrupted_are_so_when_mpirun_is_ended_without_a_word(
         process.send_signal(signal.SIGTERM)
         assert process.wait(60) == 130
         assert process.stderr.read() == ""
-
-

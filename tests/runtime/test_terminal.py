@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
-import sys
 from pathlib import Path
 from typing import TextIO
 
@@ -13,7 +11,7 @@ import pytest
 from runs import ROOT, command, process, summary, write_scene
 from scenes import block, model, quadratic_linear
 
-from hvi_fenicsx.runtime import processes, terminal
+from hvi_fenicsx.runtime import terminal
 
 
 @pytest.fixture
@@ -27,13 +25,9 @@ def broken_pipe() -> TextIO:
     return open(writing, "w", encoding="utf-8")
 
 
-
-
 def test_what_is_not_printable_is_escaped() -> None:
     assert terminal.printable("ε = 1 µm\n") == "ε = 1 µm\n"
     assert terminal.printable("\x1b[31m \x7f \u202e \udce9") == r"\u001b[31m \u007f \u202e \udce9"
-
-
 
 
 @pytest.mark.parametrize(

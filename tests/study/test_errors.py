@@ -13,14 +13,10 @@ from mpi4py import MPI
 from scenes import Table, model, quadratic_linear, two_blocks
 
 from hvi_fenicsx import Solution, prepare, read_tables
-from hvi_fenicsx.mesh.blocks import NestedGridTransfer
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.report.solution_arrays import SolutionArrays
 from hvi_fenicsx.results import gathering
-from hvi_fenicsx.study import transfer
 from hvi_fenicsx.study.errors import NORMS, ReferenceSolution, certainty, stiffness
-from hvi_fenicsx.study.transfer import BodyTransfer
-from hvi_fenicsx.typing import Array
 from hvi_fenicsx.workflow import finish
 
 LAW = quadratic_linear(1.0e6)
@@ -62,62 +58,6 @@ def reference_of(solution: Solution) -> ReferenceSolution:
 def errors(reference: ReferenceSolution, found: SolutionArrays) -> dict[str, float]:
     told = reference.errors(reference.transfer(found))
     return {name: value for name, value in told.items() if value is not None}
-
-
-def of_mesh(space: fem.FunctionSpace) -> SolutionArrays:
-    d = space.mesh.geometry.dim
-    cells = space.dofmap.list.astype(np.int64)
-    return SolutionArrays(points=space.tabulate_dof_coordinates()[:, :d], cells=cells)
-
-
-def quadratic(x: Array) -> Array:
-    return np.column_stack([1.0 + x[:, 0] * (2.0 - x[:, -1]) + 3.0 * x[:, 0] ** 2 - x[:, 1] ** 2, *x[:, 1:].T])
-
-
-@pytest.mark.parametrize("shape", ["rectangle", "box"])
-def test_interpolation_between_nested_meshes_is_the_ladders_prolongation(shape: str) -> None:
-    size, cells = ([1.0, 2.0], [4, 6]) if shape == "rectangle" else ([1.0, 2.0, 0.5], [4, 6, 2])
-    table = in_space(2, 1) if shape == "box" else model(4)
-    fine = read_tables({**table, "domain": {"shape": shape, "size": size, "cells": cells}})
-    coarse, d = fine.with_domain(cells=tuple(n // 2 for n in cells)), len(size)
-    both = [fem.functionspace(s.domain.build(MPI.COMM_SELF, d).mesh, ("Lagrange", 1, (d,))) for s in (fine, coarse)]
-    step = NestedGridTransfer(size, coarse.domain.cells).prolongation(*both)  # type: ignore[attr-defined]
-    target, source = map(of_mesh, both)
-    values = np.random.default_rng(1).normal(size=source.points.shape)
-    coarse_vector, fine_vector = step.createVecs()
-    coarse_vector.array[:] = values.ravel()
-    step.mult(coarse_vector, fine_vector)
-    found = BodyTransfer(source, target)(values)
-    np.testing.assert_allclose(found, fine_vector.array.reshape(-1, d), atol=1e-12)
-
-
-@pytest.mark.parametrize("shape", ["rectangle", "box"])
-def test_where_two_bodies_meet_each_node_takes_the_field_of_its_own(shape: str) -> None:
-    d = {"rectangle": 2, "box": 3}[shape]
-    elasticity = {"rectangle": "plane_strain", "box": "three_dimensional"}[shape]
-
-    def mesh_of(n: int) -> tuple[SolutionArrays, Array]:
-        across = [n] * (d - 1)
-        table = two_blocks(shape, [1.0] * (d - 1), [[*across, n], [*(2 * k for k in across), n]], elasticity)
-        table["domain"]["upper"]["origin"][0] = 0.0
-        arrays = of_mesh(prepare(read_tables(table), MPI.COMM_SELF).problem.space)
-        u = 1.0 + arrays.points
-        u[np.unique(arrays.cells[arrays.points[arrays.cells].mean(axis=1)[:, -1] > 0.5])] *= -2.0
-        return arrays, u
-
-    (source, given), (target, wanted) = mesh_of(2), mesh_of(4)
-    assert len(np.unique(source.points, axis=0)) < len(source.points)
-    np.testing.assert_allclose(BodyTransfer(source, target)(given), wanted, atol=1e-12)
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_quadratic_fields_are_taken_to_finer_meshes_exactly(dimension: int) -> None:
-    source, target = taken(with_law(dimension, 2, 2)), taken(with_law(dimension, 4, 1))
-    found = BodyTransfer(source, target)(quadratic(source.points))
-    np.testing.assert_allclose(found, quadratic(target.points), atol=1e-12)
-    (near,), (far,) = source.parts.values(), target.parts.values()
-    along = transfer.surface(source, near, target.points[far.vertices])
-    np.testing.assert_allclose(along @ source.points[near.vertices], target.points[far.vertices], atol=1e-12)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -185,46 +125,6 @@ def test_the_energy_norm_is_that_of_the_closed_form() -> None:
     assert energy**2 * scales.energy == pytest.approx(12.0, rel=1e-9)
 
 
-def test_near_a_drop_of_the_law_the_largest_error_leaves_vertices_out() -> None:
-    solution = with_law(2, 8)
-    matrix, here = stiffness(solution), taken(solution)
-    assert matrix is not None
-    ((name, part),) = here.parts.items()
-    x = part.columns["x"]
-    slips = {**part.columns, "u_t1": np.where(x < 0.5, 1.0, 3.0)}
-    dropped = replace(part, columns=slips, drops=np.full((len(x), 1), 2.0))
-    reference = ReferenceSolution(replace(here, parts={name: dropped}), matrix)
-    near = reference.near_jump(reference.own)
-    jump = 0.5 - 1 / 16  # the slip passes the drop between the vertices at 3/8 and 1/2
-    np.testing.assert_array_equal(near, np.abs(x - jump) <= 2 / 8)
-    assert reference.left_out(reference.own) == pytest.approx(float(part.weight[near].sum()))
-    wrong = {**slips, "friction_t1": part.columns["friction_t1"] + 1e3 * near}
-    found = errors(reference, replace(here, parts={name: replace(dropped, columns=wrong)}))
-    assert found["friction_max"] == 0.0 < found["friction_l1"]
-
-
-def turning_disk(size: float) -> Table:
-    """A disk that a torque turns against springs all round: the slip is the same everywhere."""
-    spring = {"law": "linear_spring", "stiffness": 1e9}
-    return {
-        "domain": {"shape": "disk", "radius": 1.0, "mesh_size": size},
-        "material": {"model": "plane_strain", "youngs_modulus": 1e9, "poisson_ratio": 0.3},
-        "body": {"force": ["-1e3*(y - 1)", "1e3*x"]},
-        "boundary": {
-            "rim": {"on": ["lower_arc", "upper_arc"], "contact": {"lower": 0.0, "upper": 0.0}, "friction": spring}
-        },
-    }
-
-
-def test_slips_of_a_curved_part_are_compared_as_vectors() -> None:
-    """Its tangents turn their sign four times: between two such nodes a slip along them passes zero."""
-    reference = reference_of(solved(turning_disk(0.1)))
-    found = errors(reference, taken(solved(turning_disk(0.24))))
-    for name in ("u_t_l2", "u_t_max", "friction_l1", "friction_l2", "friction_max"):
-        assert found[name] < 0.035, name
-    assert reference.left_out(reference.own) == 0.0
-
-
 def test_the_slip_of_a_joint_is_that_of_one_body_beside_the_other() -> None:
     """As the contact table has it, where the meshes match."""
     table = two_blocks("rectangle", [1.0], [[4, 2], [4, 2]], "plane_strain")
@@ -248,16 +148,3 @@ def test_the_references_own_error_follows_from_the_coarser_levels(order: float) 
     for found in certainty(below).values():
         assert found.error == pytest.approx(truth)
         assert found.order == pytest.approx(order)
-
-
-@pytest.mark.parametrize("shape", ["rectangle", "box"])
-def test_the_mesh_width_halves_where_a_mesh_is_refined(shape: str) -> None:
-    """Whatever the angles of its cells: an order in h is a slope over it."""
-    size = (1.0, 0.3, 0.7)[: 2 if shape == "rectangle" else 3]
-    widths = []
-    for n in (3, 6):
-        table = in_space(2, 1) if shape == "box" else model(4)
-        scene = read_tables({**table, "domain": {"shape": shape, "size": size, "cells": [n] * len(size)}})
-        mesh = scene.domain.build(MPI.COMM_SELF, len(size)).mesh
-        widths.append(transfer.mesh_width(of_mesh(fem.functionspace(mesh, ("Lagrange", 1)))))
-    assert widths[1] == pytest.approx(widths[0] / 2, rel=1e-9)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import InputError, Model, read_tables
-from hvi_fenicsx.commands.arguments import parser
 from hvi_fenicsx.study import plan
 from hvi_fenicsx.study.errors import NORMS, Certainty
 from hvi_fenicsx.study.table import Row, Study
@@ -40,46 +37,11 @@ def test_a_plan_is_the_product_of_its_axes_with_the_exact_law_on_every_mesh() ->
     assert all(p.scene.solver.smoothing is None for p in made.reference)
 
 
-def test_help_names_axes_that_there_are(capsys: pytest.CaptureFixture[str]) -> None:
-    """Help is instant: it must not load the axes to tell them."""
-    with pytest.raises(SystemExit):
-        parser().parse_args(["study", "--help"])
-    told = " ".join(capsys.readouterr().out.split()).partition("for each VALUE of ")[2].partition(";")[0]
-    names = re.split(r", | or ", told)
-    assert {"mesh", "epsilon", "degree", "method", "accuracy"} <= set(names)
-    value = {"method": "auto", "linear_solver": "lu", "smoothing": "chks", "degree": "2"}
-    assert [plan.read_axis(f"{name}={value.get(name, '0.5')}")[0] for name in names] == names
-
-
 def test_combinations_that_are_no_scene_are_left_out() -> None:
     made = planned(scene(4, friction=LAW), "method=auto,branch", "smoothing=chks", "epsilon=1")
     solvers = {(p.scene.solver.method, p.scene.solver.smoothing) for p in made.points}
     assert solvers == {("auto", None), ("auto", "chks")}
     assert "solves the law without smoothing" in made.left_out[0]
-
-
-def test_every_key_of_the_solver_table_is_an_axis() -> None:
-    made = planned(scene(4, friction=LAW), "max_iterations=7,9")
-    assert {p.scene.solver.max_iterations for p in made.points} >= {7, 9}
-
-
-@pytest.mark.parametrize(("mesh_size", "below"), [(0.02, None), (0.02, 2e-3), (0.01, 2e-3)])
-@pytest.mark.parametrize("shape", ["disk", "half_disk"])
-def test_the_unknowns_of_a_graded_mesh_are_foreseen(shape: str, mesh_size: float, below: float | None) -> None:
-    """What a plan may afford is decided on them; a mesh fine at one point only is not fine everywhere."""
-    table = {"shape": shape, "radius": 0.1, "mesh_size": mesh_size, **({"mesh_size_below": below} if below else {})}
-    made = read_tables({**model(4, 1e6), "domain": table, "boundary": {}})
-    body = made.domain.build(MPI.COMM_SELF, 2)
-    assert 0.6 < plan.Point(made).unknowns / (2 * body.mesh.topology.index_map(0).size_global) < 1.4
-
-
-def test_degrees_are_varied_on_uniform_and_adaptive_meshes() -> None:
-    made = planned(scene(4, friction=LAW), "degree=1,2", "mesh=2,8", "accuracy=0.1")
-    found = {(p.degree, p.mesh) for p in made.points}
-    assert {p for p, mesh in found if mesh == "adaptive to 10 %"} == {1, 2}
-    assert {(1, "2 × 2 cells"), (2, "8 × 8 cells"), (1, "4 × 4 cells")} <= found
-    assert [p.degree for p in made.reference] == [2, 2, 2]
-    assert [p.unknowns for p in made.points] == sorted(p.unknowns for p in made.points)
 
 
 def test_adaptive_meshes_are_added_and_the_reference_stays_finer_than_the_scenes_own_mesh() -> None:
@@ -121,17 +83,6 @@ def test_a_bad_plan_says_how_to_mend_it(given: list[str], words: str) -> None:
     assert words in str(error.value).replace('"', "'")
 
 
-def test_cells_that_do_not_come_out_whole_are_refused_with_those_that_do() -> None:
-    uneven = scene().with_domain(cells=(150, 6))
-    with pytest.raises(InputError, match="300, say, would do"):
-        planned(uneven, "mesh=60")
-
-
-def test_a_scene_without_a_law_has_no_epsilon() -> None:
-    with pytest.raises(InputError, match="no law"):
-        planned(scene(4), "epsilon=1")
-
-
 def study_of(pairs: list[tuple[float, float]], own_error: float = 1e-4, **keys: Any) -> Study:
     """Rows by their seconds and errors; the first is the scene's own setting, the last the exact law."""
     empty = ("accuracy", "h", "smoothing", "epsilon", "epsilon_absolute", "energy", "iterations", "runs", "phases")
@@ -149,12 +100,6 @@ def study_of(pairs: list[tuple[float, float]], own_error: float = 1e-4, **keys: 
     )  # fmt: skip
 
 
-def test_an_unknown_quantity_is_refused_with_those_there_are() -> None:
-    (one,) = study_of([(1.0, 0.1)]).rows
-    with pytest.raises(InputError, match=r'unknown quantity "energy_nrom"; did you mean "energy_norm".*u_t_l2'):
-        one.error("energy_nrom")
-
-
 def test_the_front_holds_what_nothing_cheaper_is_as_accurate_as() -> None:
     pairs = [(10.0**s, 10.0**e) for s, e in np.random.default_rng(5).uniform(-3, 0, (40, 2))]
     found = study_of(pairs).front("energy_norm")
@@ -164,28 +109,9 @@ def test_the_front_holds_what_nothing_cheaper_is_as_accurate_as() -> None:
     assert min(e for _, e in pairs) == pytest.approx(found[-1].errors["energy_norm"], rel=0.06)  # type: ignore[index]
 
 
-def test_a_sentence_names_the_cheapest_setting_for_each_accuracy() -> None:
-    pairs = [(0.1, 0.05), (0.2, 0.004), (0.3, 0.006), (0.4, 0.002)]
-    words = "\n".join(study_of(pairs).sentences)
-    assert "10 % for 0.1 s" in words
-    assert "1 % for 0.2 s" in words
-    assert "0.1 % is not reached here: the best is 0.2 % for 0.4 s" in words
-    unsure = "\n".join(study_of(pairs, 0.02).sentences)
-    assert "1 % cannot be claimed: the reference itself is uncertain by 2 %" in unsure
-
-
 def test_an_order_is_told_from_errors_that_the_reference_resolves() -> None:
     """On the finest mesh half of the error is the reference's: what remains falls too fast."""
     pairs = [(0.1, 0.04), (0.2, 0.02), (0.3, 0.005)]
     for own, order in ((0.005, 1.0), (1e-4, 2.0)):
         study = study_of(pairs, own, h=(0.4, 0.2, 0.1))
         assert study.order("u_t_l2", study.own) == pytest.approx(order)
-
-
-def test_the_share_of_epsilon_is_that_of_its_distance_from_the_exact_law() -> None:
-    part = dict.fromkeys(NORMS, 0.49)
-    study = study_of(
-        [(0.1, 0.5), (0.1, 0.01)], smoothing=("paper", None), epsilon=(1.0, None), epsilon_part=(part, None)
-    )
-    assert study.share_of_epsilon("friction_l1") == pytest.approx(0.98)
-    assert "98 % of it by ε" in study.sentences[0]

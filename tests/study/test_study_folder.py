@@ -18,9 +18,6 @@ from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.errors import ExitCode
-from hvi_fenicsx.report import page
-from hvi_fenicsx.report.errors import ResultError
-from hvi_fenicsx.results.output_folder import OutputFolder
 from hvi_fenicsx.study.errors import NORMS
 from hvi_fenicsx.study.measure import Measurement, NoReferenceError
 
@@ -63,18 +60,6 @@ def test_what_the_study_did_not_write_stays(way: str, copy: Path, monkeypatch: p
     assert names(copy) == sorted(["square.toml", *(f"out/{n}" for n in names(copy / "out"))])
 
 
-def test_a_page_that_cannot_be_written_costs_a_line(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(folder: Path) -> Path:
-        raise ResultError("no page today")
-
-    monkeypatch.setattr(page, "write_study", refused)
-    done = study(copy, "--resume")
-    assert done.returncode == 0
-    assert "warning: no page today" in done.stdout
-    assert (copy / "out" / "study.json").exists()
-    assert not (copy / "out" / "report.html").exists()
-
-
 def test_folders_of_others_are_no_studies(copy: Path, tmp_path: Path) -> None:
     (copy / "out" / "manifest.json").unlink()
     before = names(copy)
@@ -83,20 +68,6 @@ def test_folders_of_others_are_no_studies(copy: Path, tmp_path: Path) -> None:
         assert done.returncode == 2
         assert "holds other files" in done.stderr
     assert names(copy) == before
-
-
-def test_a_run_and_a_study_do_not_replace_each_other(copy: Path) -> None:
-    done = hvi("run", copy / "square.toml", "--out", copy / "out", "--force")
-    assert done.returncode == 2
-    assert "holds a study" in done.stderr
-
-
-def test_a_second_study_is_refused_at_once(copy: Path) -> None:
-    first = OutputFolder(copy / "out", "study")
-    done = study(copy, "--resume")
-    first.close()
-    assert done.returncode == 2
-    assert "another run writes into it just now" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -169,21 +140,6 @@ def test_a_scene_without_a_solution_ends_a_study(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_point_that_takes_too_long_is_given_up_and_run_again_with_a_longer_limit(tmp_path: Path) -> None:
-    """At its next Newton step: what one step solves is there all the same. The reference is never given up."""
-    file = write_scene(tmp_path / "square.toml", model(8, 3e6, friction=quadratic_linear(1e6)))
-    words = ("study", file, "--axis", "epsilon=0.01", "--out", tmp_path / "out", "--repeat", 1)
-    assert hvi(*words, "--limit", 1e-9).returncode == 0
-    told = data(tmp_path / "out")
-    assert told["reference"]["converged"]
-    given_up = [p["reason"] for p in told["points"] if not p["converged"]]
-    assert given_up
-    assert all(reason.startswith("not finished after 1e-09 s; --limit") for reason in given_up)
-    assert hvi(*words, "--resume").returncode == 0
-    assert all(p["converged"] for p in data(tmp_path / "out")["points"])
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_study_keeps_its_points_and_goes_on(tmp_path: Path, number: int) -> None:
     file = write_scene(tmp_path / "square.toml", model(4, friction=LAW))
@@ -201,27 +157,3 @@ def test_an_interrupted_study_keeps_its_points_and_goes_on(tmp_path: Path, numbe
     assert hvi(*words, "--resume").returncode == 0
     assert journal.read_bytes().startswith(kept)
     assert len(data(tmp_path / "out")["points"]) == 5
-
-
-@pytest.mark.long
-def test_each_point_of_a_study_presses_its_obstacle_by_the_force(tmp_path: Path) -> None:
-    """A column without lateral contraction is exact on each mesh: energy F² h/(2 E b), and nothing is off."""
-    force, height, modulus = 2e4, 0.5, 1e9
-    plate = {"point": [0.0, height + 1e-4], "normal": [0.0, -1.0], "force": [0.0, -force]}
-    table = {
-        "domain": {"shape": "rectangle", "size": [1.0, height], "cells": [4, 2]},
-        "material": {"model": "plane_strain", "youngs_modulus": modulus, "poisson_ratio": 0.0},
-        "boundary": {
-            "base": {"on": "bottom", "displacement": [0.0, 0.0]},
-            "lid": {"on": "top", "contact": {"obstacle": plate}},
-        },
-    }
-    file = write_scene(tmp_path / "column.toml", table)
-    done = hvi("study", file, "--axis", "mesh=4,8", "--out", tmp_path / "out", "--repeat", 1)
-    assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader((tmp_path / "out" / "study.csv").open(encoding="utf-8")))
-    assert len(rows) == 2
-    for row in rows:
-        assert row["reason"] == "certified"
-        assert float(row["energy"]) == pytest.approx(force**2 * height / (2 * modulus), rel=1e-7)
-        assert max(float(row[f"error_{name}"]) for name in ("energy_norm", "pressure_l2", "resultant")) < 1e-6

@@ -96,15 +96,6 @@ def test_a_body_that_turns_far_balances(cells: int, slenderness: float) -> None:
     assert record["certificate"]["net_force"] < 1e-9
 
 
-def test_the_list_covers_what_it_promises() -> None:
-    left = TABLE.tuples()
-    for case in LISTED:
-        left -= {t for t in left if all(case[axis] == value for axis, value in t)}
-    assert not left
-    assert len(LISTED) >= 300
-    assert all(TABLE.allowed(c.values) for c in LISTED)
-
-
 AGREED = [
     ("quadratic_linear", "peak", "exact", 4, 0),
     pytest.param("one_sided", "peak", "quadratic", 4, 0, marks=pytest.mark.long),
