@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..model import PathTable
 from ..paths.follower import Follower
 from ..paths.load_path import LoadPath, PathRow
-from ..paths.state import End, Event, Follow, PathOptions, PathState
+from ..paths.state import End, Event, Follow, PathOptions, PathState, Place, Position
 from ..paths.vertex_laws import is_straight
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
@@ -24,7 +24,6 @@ from ..runtime.journal import Record
 from ..solvers import obstacle_force
 from ..system import existence
 from ..workflow import Preparation
-from . import records
 from .certifying import Certifier, Verdict
 from .measures import Measures
 
@@ -76,7 +75,7 @@ class PathRun:
         with prepared.timer("setup"):
             most = prepared.options.thresholds.largest_dense
             self._condensation = Condensation(system, self.scaled, most, interrupted)
-            self._measures = Measures(system, self._condensation, self.scaled)
+            self._measures = Measures(system, self._condensation, self.scaled, remember=wanted.memory)
         self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
         self._factored = FactoredProblem(system.problem, self.scaled)
         tolerance, largest = prepared.options.tolerance, max(wanted.to, key=abs)
@@ -84,7 +83,8 @@ class PathRun:
         self._certifier = Certifier(*parts, largest)
         self.states: list[PathState] = []
         self._verdicts: list[Verdict] = []
-        self._extremes: list[tuple[float, float]] = []
+        self._rows: list[PathRow] = []
+        self._reached = 0.0, 0.0
 
     @property
     def is_straight(self) -> bool:
@@ -108,8 +108,7 @@ class PathRun:
         """
         # why it ends is found again
         for one in itertools.takewhile(lambda record: record["event"] != Event.END, known):
-            self._take(*records.state(one))
-        rows = list(self._rows())
+            self._take(*_state_of(one))
         follower = self._follower(control)
         with self.prepared.timer("solve"):
             for state in _finite(follower.states()):
@@ -118,13 +117,12 @@ class PathRun:
                 with self.prepared.timer("certificate"):
                     verdict = self._certifier.verdict(state, len(self.states))
                 self._take(state, verdict)
-                control.keep(records.record(state, verdict))
-                rows.append(self._row(len(rows)))
-                control.progress(len(rows) - 1, rows[-1])
+                control.keep(_record_of(state, verdict))
+                control.progress(len(self._rows) - 1, self._rows[-1])
         return LoadPath(
             dimension=self.prepared.problem.scales.dimension,
             scaled=self.scaled,
-            rows=tuple(rows),
+            rows=tuple(self._rows),
             end=str(follower.end or End.LOST),
             reason=follower.reason,
             examined=sum(verdict.whole for verdict in self._verdicts),
@@ -158,13 +156,12 @@ class PathRun:
     def _take(self, state: PathState, verdict: Verdict) -> None:
         self.states.append(state)
         self._verdicts.append(verdict)
+        low, high = self._reached
+        self._reached = min(low, state.factor), max(high, state.factor)
+        self._rows.append(self._row(state, verdict))
 
-    def _rows(self) -> Iterator[PathRow]:
-        return (self._row(number) for number in range(len(self.states)))
-
-    def _row(self, number: int) -> PathRow:
-        state, verdict, scales = self.states[number], self._verdicts[number], self.prepared.problem.scales
-        largest = self._reached(number) if self.wanted.memory else None
+    def _row(self, state: PathState, verdict: Verdict) -> PathRow:
+        scales = self.prepared.problem.scales
         place, d = state.place, scales.dimension
         return PathRow(
             factor=state.factor,
@@ -176,17 +173,10 @@ class PathRun:
             dissipated=state.dissipated * scales.energy,
             released=state.released * scales.energy,
             unstable=state.unstable,
-            forces=self._measures.forces(state.x, state.factor, largest),
+            forces=self._measures.forces(state.x, state.factor, self._reached),
             displacements=self._measures.displacements(state.x, state.factor),
             certified=verdict.certified,
         )
-
-    def _reached(self, number: int) -> tuple[float, float]:
-        """The least and the greatest factor up to a row."""
-        for state in self.states[len(self._extremes) : number + 1]:
-            low, high = self._extremes[-1] if self._extremes else (0.0, 0.0)
-            self._extremes.append((min(low, state.factor), max(high, state.factor)))
-        return self._extremes[number]
 
     def displacement(self, number: int) -> fem.Function:
         """The displacement at a row, nondimensional, ghosts updated. Collective.
@@ -233,3 +223,26 @@ class PathRun:
 def _finite(states: Iterator[PathState]) -> Iterator[PathState]:
     """The states up to the first that is no number."""
     return itertools.takewhile(lambda state: np.isfinite(state.factor) and bool(np.all(np.isfinite(state.x))), states)
+
+
+def _record_of(state: PathState, verdict: Verdict) -> Record:
+    """What the journal keeps of a state."""
+    found: dict[str, Any] = {field.name: getattr(state, field.name) for field in fields(state)}
+    found["event"] = str(state.event)
+    for name in ("place", "position", "verdict"):
+        part = verdict if name == "verdict" else found[name]
+        found[name] = None if part is None else {field.name: getattr(part, field.name) for field in fields(part)}
+    return found
+
+
+def _state_of(kept: Record) -> tuple[PathState, Verdict]:
+    """A state and what was found of it, from its record."""
+    values = dict(kept)
+    verdict = Verdict(**values.pop("verdict"))
+    place, position = values.pop("place"), dict(values.pop("position"))
+    numbers = np.asarray(position.pop("numbers")).astype(np.int64)
+    return PathState(
+        **{**values, "event": Event(values["event"])},
+        place=None if place is None else Place(**place),
+        position=Position(numbers=numbers, **position),
+    ), verdict

@@ -6,13 +6,13 @@ Both are affine in them, so that no state needs the displacement of the whole bo
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..effects import Drive, Place
-from ..laws import Superpotential
+from ..laws import VertexLaws
 from ..problem import references
 from ..problem.problem import Problem
 from ..problem.vectors import new_vector, turn
@@ -21,24 +21,6 @@ from ..reduced.condensation import Condensation
 from ..runtime.mpi import agree
 from ..system.system import System
 from ..typing import Array, Integers
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Affine:
-    """Values v = constants + λ rates + rows x.
-
-    Attributes:
-        constants: (k,).
-        rates: (k,).
-        rows: (k, n).
-    """
-
-    constants: Array
-    rates: Array
-    rows: Array
-
-    def at(self, x: Array, factor: float) -> Array:
-        return np.asarray(self.constants + factor * self.rates + self.rows @ x)
 
 
 class Measures:
@@ -51,33 +33,44 @@ class Measures:
         system: the system.
         condensation: its condensation.
         scaled: the names of what the factor multiplies.
+        remember: whether bonds do.
 
     Attributes:
         parts: their names, in the order of the scene.
     """
 
-    def __init__(self, system: System, condensation: Condensation, scaled: tuple[str, ...]) -> None:
-        self._system, self._scaled = system, scaled
+    def __init__(
+        self, system: System, condensation: Condensation, scaled: tuple[str, ...], *, remember: bool = False
+    ) -> None:
+        self._system, self._scaled, self._scales = system, scaled, system.problem.scales
         self.parts = tuple(driven(system.problem))
         held, touched = _attributed(system.problem, self.parts)
-        made = [self._at_part(part, held[part], touched[part], condensation) for part in self.parts]
+        columns, constants = [], []
+        for part in self.parts:
+            for i in range(self._scales.dimension):
+                column, load = self._force(part, held[part], touched[part], i, condensation)
+                columns += [column, self._mean(part, i)]
+                constants += [load, np.zeros(2)]
+        self._constants, self._rows = np.zeros((0, 2)), np.zeros((0, condensation.problem.size))
+        if columns:
+            products, self._rows = condensation.products(np.column_stack(columns))
+            self._constants = products + np.array(constants)
         numbers = {dof: number for number, part in enumerate(self.parts) for dof in map(int, held[part])}
-        self._held = find(system.problem, numbers, loading.make(system, scaled).prescribed)
-        self._forces = _joined([force for force, _ in made], condensation.problem.size)
-        self._means = _joined([mean for _, mean in made], condensation.problem.size)
+        prescribed = loading.make(system, scaled).prescribed
+        self._held = [law.remembering() if remember else law for law in find(system.problem, numbers, prescribed)]
 
-    def forces(self, x: Array, factor: float, largest: tuple[float, float] | None = None) -> dict[str, Array]:
+    def forces(self, x: Array, factor: float, reached: tuple[float, float] = (0.0, 0.0)) -> dict[str, Array]:
         """The resultants by part, N/m or N, (d,) each.
 
         Args:
             x: the condensed unknowns, (n,).
             factor: λ.
-            largest: the least and the greatest factor so far, where bonds remember.
+            reached: the least and the greatest factor so far.
         """
-        found = self._forces.at(x, factor)
+        found = self._values(0, x, factor)
         for law in self._held:
-            found += law.on_supports(factor, largest, len(self.parts)).ravel()
-        return self._by_part(found * self._system.problem.scales.force)
+            np.add.at(found, law.parts, law.on_supports(factor, reached))
+        return dict(zip(self.parts, found * self._scales.force, strict=True))
 
     def displacements(self, x: Array, factor: float) -> dict[str, Array]:
         """The mean displacements by part, m, (d,) each.
@@ -86,80 +79,59 @@ class Measures:
             x: the condensed unknowns, (n,).
             factor: λ.
         """
-        return self._by_part(self._means.at(x, factor) * self._system.problem.scales.displacement)
+        return dict(zip(self.parts, self._values(1, x, factor) * self._scales.displacement, strict=True))
 
-    def _by_part(self, values: Array) -> dict[str, Array]:
-        return dict(zip(self.parts, values.reshape(-1, self._system.problem.scales.dimension), strict=True))
+    def _values(self, first: int, x: Array, factor: float) -> Array:
+        """The forces (0) or means (1) of all parts, (parts, d)."""
+        found = self._constants[first::2] @ np.array([1.0, factor]) + self._rows[first::2] @ x
+        return np.asarray(found.reshape(-1, self._scales.dimension))
 
-    def _at_part(
-        self, part: str, held: Integers, touched: Integers, condensation: Condensation
-    ) -> tuple[_Affine, _Affine]:
-        """Force and mean displacement of a part. Collective."""
-        directions = range(self._system.problem.scales.dimension)
-        supports = [self._support(held, i) for i in directions]
-        contact = [self._contact(touched, i) for i in directions]
-        means = [self._mean(part, i) for i in directions]
-        factors = [*(c for _, c in supports), *(c for _, c in contact), *means]
-        columns = [np.array(v.array_r) for v in factors]
-        products, rows = condensation.products(np.column_stack(columns))
-        d = len(directions)
-        load = self._loads(part) - self._felt(condensation, [e for e, _ in supports], [e for e, _ in contact])
-        forces = products[:d] + products[d : 2 * d] + load
-        for vector in (*factors, *(ones for ones, _ in (*supports, *contact))):
+    def _force(
+        self, part: str, held: Integers, touched: Integers, component: int, condensation: Condensation
+    ) -> tuple[Array, Array]:
+        """What multiplies u in a component of a part's force, and that of its loads alone, (2,). Collective.
+
+        Its unknowns are those that supports hold, Cartesian, and those that contact and laws act on.
+        """
+        system = self._system
+        ones, along = self._ones(held, component), self._ones(touched, component)
+        turn(along, system.rotation)
+        elastic, inner = system.holding.pull(ones), along.duplicate()
+        turn(elastic, system.rotation)
+        system.jacobian.elastic_product(along, inner)
+        elastic.axpy(1.0, inner)
+        constant, whole = condensation.load(0.0), condensation.load(1.0)
+        felt = along.dot(constant)
+        load = self._loads(part, component) - np.array([felt, along.dot(whole) - felt])
+        for name, force in system.forces.items():
+            load[int(name in self._scaled)] -= ones.dot(force)
+        column = np.array(elastic.array_r)
+        for vector in (ones, along, elastic, inner, constant, whole):
             vector.destroy()
-        return (
-            _Affine(constants=forces[:, 0], rates=forces[:, 1], rows=rows[:d] + rows[d : 2 * d]),
-            _Affine(constants=products[2 * d :, 0], rates=products[2 * d :, 1], rows=rows[2 * d :]),
-        )
-
-    def _support(self, held: Integers, component: int) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """Ones at the held unknowns of a component, Cartesian; and what multiplies u in their elastic forces."""
-        ones = self._ones(held, component)
-        forces = self._system.holding.pull(ones)
-        turn(forces, self._system.rotation)
-        return ones, forces
-
-    def _contact(self, touched: Integers, component: int) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """The same of unknowns that contact and laws act on, in the components of the unknowns."""
-        ones = self._ones(touched, component)
-        turn(ones, self._system.rotation)
-        forces = ones.duplicate()
-        self._system.jacobian.elastic_product(ones, forces)
-        return ones, forces
+        return column, load
 
     def _ones(self, unknowns: Integers, component: int) -> PETSc.Vec:
         ones = new_vector(self._system.problem.space)
-        ones.array[unknowns[unknowns % self._system.problem.scales.dimension == component]] = 1.0
+        ones.array[unknowns[unknowns % self._scales.dimension == component]] = 1.0
         return ones
 
-    def _mean(self, part: str, component: int) -> PETSc.Vec:
-        """What multiplies u in the mean of a displacement component over a part."""
+    def _mean(self, part: str, component: int) -> Array:
+        """What multiplies u in the mean of a displacement component over a part. Collective."""
         problem = self._system.problem
         weights, areas = new_vector(problem.space), references.lumped(problem, problem.part_facets[part])
-        weights.array[component :: problem.scales.dimension] = areas / self._system.comm.allreduce(areas.sum())
+        weights.array[component :: self._scales.dimension] = areas / self._system.comm.allreduce(areas.sum())
         turn(weights, self._system.rotation)
-        return weights
+        found = np.array(weights.array_r)
+        weights.destroy()
+        return found
 
-    def _loads(self, part: str) -> Array:
-        """The resultant of a part's loads, constant and with the factor, (d, 2)."""
-        d, found = self._system.problem.scales.dimension, np.zeros((self._system.problem.scales.dimension, 2))
+    def _loads(self, part: str, component: int) -> Array:
+        """A component of the resultant of a part's loads, constant and with the factor, (2,). Collective."""
+        found = np.zeros(2)
         for name, force in self._system.forces.items():
             if name.rpartition(".")[0] == part:
-                found[:, int(name in self._scaled)] += force.array_r.reshape(-1, d).sum(axis=0)
+                found[int(name in self._scaled)] += force.array_r[component :: self._scales.dimension].sum()
         return np.asarray(self._system.comm.allreduce(found))
-
-    def _felt(self, condensation: Condensation, held: list[PETSc.Vec], touched: list[PETSc.Vec]) -> Array:
-        """The loads that supports, contact and laws feel, (d, 2). Collective."""
-        found = np.zeros((len(held), 2))
-        for name, force in self._system.forces.items():
-            found[:, int(name in self._scaled)] += [ones.dot(force) for ones in held]
-        constant = condensation.load(0.0)
-        rate = condensation.load(1.0)
-        rate.axpy(-1.0, constant)
-        found += np.array([[ones.dot(constant), ones.dot(rate)] for ones in touched])
-        for vector in (constant, rate):
-            vector.destroy()
-        return found
 
 
 def driven(problem: Problem) -> Iterator[str]:
@@ -198,61 +170,42 @@ def _arrays(found: dict[str, list[int]]) -> dict[str, Integers]:
     return {part: np.array(dofs, dtype=np.int64) for part, dofs in found.items()}
 
 
-def _joined(parts: list[_Affine], size: int) -> _Affine:
-    if not parts:
-        return _Affine(constants=np.empty(0), rates=np.empty(0), rows=np.empty((0, size)))
-    return _Affine(
-        constants=np.concatenate([one.constants for one in parts]),
-        rates=np.concatenate([one.rates for one in parts]),
-        rows=np.concatenate([one.rows for one in parts]),
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
 class HeldLaw:
     """One law at m such vertices, of all ranks.
 
     Attributes:
-        law: j.
+        laws: over what is prescribed.
         parts: number of the part whose support holds the vertex, (m,).
         forces: on the support for a unit traction, (m, d).
-        constants: what the law acts on, at the factor 0, (m,).
-        rates: how that grows with the factor, (m,).
+        arguments: what the law acts on is the first row plus λ times the second, (2, m).
     """
 
-    law: Superpotential
+    laws: VertexLaws
     parts: Integers
     forces: Array
-    constants: Array
-    rates: Array
+    arguments: Array
 
-    def on_supports(self, factor: float, largest: tuple[float, float] | None, count: int) -> Array:
-        """The forces on the supports of all parts, (count, d).
+    def remembering(self) -> HeldLaw:
+        """The same of bonds that remember."""
+        return replace(self, laws=self.laws.with_memory)
+
+    def on_supports(self, factor: float, reached: tuple[float, float]) -> Array:
+        """The forces on the supports of the vertices, (m, d).
 
         Args:
             factor: λ.
-            largest: the least and the greatest factor so far, for bonds that remember; None for those that do not.
-            count: of parts.
+            reached: the least and the greatest factor so far.
         """
-        x = self.constants + factor * self.rates
-        traction = 0.5 * (self.law.left(x) + self.law.right(x))
-        if largest is not None:
-            traction = self._remembered(x, traction, largest)
-        found = np.zeros((count, self.forces.shape[1]))
-        np.add.at(found, self.parts, self.forces * traction[:, None])
-        return found
+        laws = self.laws
+        for end in reached:
+            laws = laws.remembering(*self._at(laws, end))
+        return np.asarray(self.forces * self._at(laws, factor)[1][:, None])
 
-    def _remembered(self, x: Array, traction: Array, largest: tuple[float, float]) -> Array:
-        """Below the greatest displacement so far: along the secant."""
-        ends = np.array([self.constants + factor * self.rates for factor in largest])
-        if self.law.even:
-            far = np.abs(ends).max(axis=0) * np.sign(x)
-        else:
-            far = np.where(x > 0.0, np.maximum(ends.max(axis=0), 0.0), np.minimum(ends.min(axis=0), 0.0))
-        secant = np.divide(
-            0.5 * (self.law.left(far) + self.law.right(far)), far, out=np.zeros_like(far), where=far != 0
-        )
-        return np.where(np.abs(x) < np.abs(far), secant * x, traction)
+    def _at(self, laws: VertexLaws, factor: float) -> tuple[Array, Array]:
+        """What the laws act on at a factor, and their tractions, at a jump the mean of both limits."""
+        x = self.arguments[0] + factor * self.arguments[1]
+        return x, 0.5 * (laws.traction(x, "left") + laws.traction(x, "right"))
 
 
 def find(problem: Problem, parts: Mapping[int, int], prescribed: Array) -> tuple[HeldLaw, ...]:
@@ -279,14 +232,14 @@ def find(problem: Problem, parts: Mapping[int, int], prescribed: Array) -> tuple
         )
         numbers, forces, arguments = (np.concatenate(agree(problem.domain.mesh.comm, e)) for e in entries)
         known = numbers >= 0
+        ones = np.ones(np.count_nonzero(known))
         if np.any(known):
             found.append(
                 HeldLaw(
-                    law=term.law,
+                    laws=VertexLaws(law=term.law, factors=ones, weights=ones),
                     parts=numbers[known],
                     forces=forces[known],
-                    constants=arguments[known, 0],
-                    rates=arguments[known, 1],
+                    arguments=arguments[known].T,
                 )
             )
     return tuple(found)

@@ -91,13 +91,11 @@ class Branch(ABC):
         points: where all points are; changed.
         trend: the sign of the factor's rate where it last did not stand; 0 before that.
         unstable: number of directions in which the energy falls at constant loads.
-        leader: the point whose passage last made the branch unstable, or stand, and its direction along its graph.
     """
 
     points: ContactPoints
     trend: int
     unstable: int
-    leader: tuple[int, int] = (0, 1)
 
     @property
     @abstractmethod
@@ -125,6 +123,15 @@ class Branch(ABC):
         """How fast the points go along their graphs, (m,)."""
 
     @property
+    @abstractmethod
+    def motion(self) -> Array:
+        """How fast the displacements change along the branch, (n,)."""
+
+    @abstractmethod
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        """Motions in which the energy may fall, (n,) each, and the point that leads it."""
+
+    @property
     def values(self) -> Values:
         """Displacements and forces of all points."""
         return self.points.values(self.z)
@@ -148,6 +155,14 @@ class Branch(ABC):
         Raises:
             Refused: there is no end of passing.
             numpy.linalg.LinAlgError: the factor stands along the branch.
+        """
+
+    def set_out_as(self, other: Branch, check: Callable[[], None]) -> None:  # noqa: B027
+        """Set out from the same state as another branch goes, and let the points pass that have to.
+
+        Args:
+            other: which one.
+            check: is called before each passage; it may raise an error to end them.
         """
 
     @abstractmethod
@@ -203,6 +218,10 @@ class Branch(ABC):
         Args:
             peak: the greatest factor so far.
         """
+
+    @abstractmethod
+    def beyond(self) -> Array:
+        """The coordinates a little farther on, (n,)."""
 
     @abstractmethod
     def balanced(self, factor: float) -> Array:

@@ -3,97 +3,68 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from ..laws import Superpotential
 from ..typing import Array, Integers, Mask
 from .segments import Segment, between
-from .thresholds import FollowingThresholds
+from .thresholds import ROUNDING
 from .vertex_laws import VertexLaw
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Live:
-    """A law at the q vertices where it is on its curve.
-
-    Attributes:
-        points: numbers, (q,).
-        signs: the law's argument is that times the displacement, (q,).
-        weights: lumped areas, (q,).
-        low: least displacement at which the law itself is taken, but for the inset, (q,).
-        high: greatest one, (q,).
-        inset: by how much less on pieces without end, beside 1 + |x|, (q,).
-        chords: x, traction and slope of the present chords, (3, q).
-    """
-
-    points: Integers
-    signs: Array
-    weights: Array
-    low: Array
-    high: Array
-    inset: Array
-    chords: Array
-
-    def lacks(self, law: Superpotential, x: Array) -> tuple[Array, Array]:
-        """What the chords lack, and its slope, (q,) each; beyond a piece continued along its tangent.
-
-        Args:
-            law: j.
-            x: displacements, (q,).
-        """
-        inset = self.inset * (1.0 + np.abs(x))
-        inside = np.clip(x, self.low + inset, self.high - inset)
-        at, start, chord = self.chords
-        traction, slope = law.derivatives(self.signs * inside)
-        lacking = self.signs * traction + slope * (x - inside) - start - chord * (x - at)
-        return self.weights * lacking, self.weights * (slope - chord)
-
-
-@dataclass(kw_only=True)
 class _Group:
-    """One law at r vertices.
+    """One law at r vertices; on which pieces these are is changed.
+
+    Args:
+        at: the vertices' points and laws.
 
     Attributes:
         law: j.
-        points: numbers, (r,).
-        signs: the law's argument is that times the displacement, (r,).
-        weights: lumped areas, (r,).
+        points: numbers of the vertices' points, (r,).
         rows: the vertices' laws.
         live: whether the law is on its curve, (r,).
         chords: x, traction and slope of the present chord, (r, 3).
         ends: of the present piece, (r, 2).
-        at: where the law is on its curve; None: not gathered since a vertex entered another piece.
+        inset: by how much less the law itself is taken: on a piece without end beside 1 + |x|, (r, 2).
     """
 
-    law: Superpotential
-    points: Integers
-    signs: Array
-    weights: Array
-    rows: list[VertexLaw]
-    live: Mask
-    chords: Array
-    ends: Array
-    at: _Live | None = None
+    def __init__(self, at: Sequence[tuple[int, VertexLaw]]) -> None:
+        self.points: Integers = np.array([k for k, _ in at])
+        self.rows = [law for _, law in at]
+        self.law, r = self.rows[0].law, len(at)
+        self._signs, self._weights = (
+            np.array([getattr(law, name) for law in self.rows]) for name in ("sign", "weight")
+        )
+        self.live: Mask = np.zeros(r, dtype=bool)
+        self.chords, self.ends, self.inset = np.zeros((r, 3)), np.zeros((r, 2)), np.zeros((r, 2))
 
-    def gathered(self, share: float) -> _Live:
-        """The vertices where the law is on its curve."""
-        if self.at is None:
-            rows = np.flatnonzero(self.live)
-            low, high = self.ends[rows].T
-            ended = np.isfinite(high - low)
-            inset = np.where(ended, share * np.where(ended, high - low, 0.0), 0.0)
-            self.at = _Live(
-                points=self.points[rows],
-                signs=self.signs[rows],
-                weights=self.weights[rows],
-                low=low + inset,
-                high=high - inset,
-                inset=np.where(ended, 0.0, share),
-                chords=self.chords[rows].T,
-            )
-        return self.at
+    def enter(self, row: int, segment: Segment) -> bool:
+        """Note the segment on which a vertex's point is; whether the law is on its curve there."""
+        law, low, high = self.rows[row], segment.x + segment.low, segment.x + segment.high
+        middle, passed = between(low, high), law.passed or (0.0, 0.0)
+        self.live[row] = not segment.rise and not passed[0] < middle < passed[1]
+        if self.live[row]:
+            graph = law.graph
+            slope = float(graph.slopes[np.searchsorted(graph.breaks, middle)])
+            self.chords[row] = middle, float(graph.traction(np.array([middle]), "right")[0]), slope
+            self.ends[row] = low, high
+            self.inset[row] = (ROUNDING * (high - low), 0.0) if np.isfinite(high - low) else (0.0, ROUNDING)
+        return bool(self.live[row])
+
+    def lacks(self, x: Array) -> tuple[Integers, Array, Array]:
+        """The points where the law is on its curve, (q,), what their chords lack, and its slope, (q,) each.
+
+        Beyond a piece the law is continued along its tangent.
+        """
+        rows = np.flatnonzero(self.live)
+        points, signs, weights = self.points[rows], self._signs[rows], self._weights[rows]
+        (low, high), (at, start, chord), (inset, share) = self.ends[rows].T, self.chords[rows].T, self.inset[rows].T
+        x = x[points]
+        inset = inset + share * (1.0 + np.abs(x))
+        inside = np.clip(x, low + inset, high - inset)
+        traction, slope = self.law.derivatives(signs * inside)
+        lacking = signs * traction + slope * (x - inside) - start - chord * (x - at)
+        return points, weights * lacking, weights * (slope - chord)
 
 
 class Deviations:
@@ -101,15 +72,13 @@ class Deviations:
 
     Args:
         laws: of each point.
-        thresholds: how far inside the ends of pieces the law is taken, and how far steps go.
     """
 
-    def __init__(self, laws: Sequence[Sequence[VertexLaw]], thresholds: FollowingThresholds) -> None:
-        self._thresholds = thresholds
+    def __init__(self, laws: Sequence[Sequence[VertexLaw]]) -> None:
         self._m = len(laws)
         curved = [(k, law) for k, several in enumerate(laws) for law in several if law.curved]
         numbers = sorted({law.group for _, law in curved})
-        self._groups = [_group([(k, law) for k, law in curved if law.group == number]) for number in numbers]
+        self._groups = [_Group([(k, law) for k, law in curved if law.group == number]) for number in numbers]
         self._at: dict[int, list[tuple[_Group, int]]] = {}
         for group in self._groups:
             for row, k in enumerate(group.points):
@@ -122,18 +91,8 @@ class Deviations:
             k: the point.
             segment: the segment.
         """
-        for group, row in self._at.get(k, []):
-            group.at = None
-            law, low, high = group.rows[row], segment.x + segment.low, segment.x + segment.high
-            middle = between(low, high)
-            passed = law.passed or (0.0, 0.0)
-            group.live[row] = not segment.rise and not passed[0] < middle < passed[1]
-            if group.live[row]:
-                graph, at = law.graph, np.array([middle])
-                slope = float(graph.slopes[np.searchsorted(graph.breaks, middle)])
-                group.chords[row] = middle, float(graph.traction(at, "right")[0]), slope
-                group.ends[row] = low, high
-        return any(bool(group.live[row]) for group, row in self._at.get(k, []))
+        curved = [group.enter(row, segment) for group, row in self._at.get(k, [])]
+        return any(curved)
 
     def values(self, x: Array) -> tuple[Array, Array]:
         """What the chords lack, and its slope, by point, (m,) each; beyond a piece continued along its tangent.
@@ -143,35 +102,20 @@ class Deviations:
         """
         found, slopes = np.zeros(self._m), np.zeros(self._m)
         for group in self._groups:
-            live = group.gathered(self._thresholds.rounding)
-            if live.points.size:
-                lacking, steeper = live.lacks(group.law, x[live.points])
-                found += np.bincount(live.points, lacking, minlength=self._m)
-                slopes += np.bincount(live.points, steeper, minlength=self._m)
+            points, lacking, steeper = group.lacks(x)
+            np.add.at(found, points, lacking)
+            np.add.at(slopes, points, steeper)
         return found, slopes
 
-    def reach(self, x: Array) -> Array:
+    def reach(self, x: Array, share: float) -> Array:
         """How far the points may move in one step, (m,).
 
         Args:
             x: the displacements of the points, (m,).
+            share: of the laws' length scales and of the displacements.
         """
         found = np.full(self._m, np.inf)
         for group in self._groups:
-            points = group.gathered(self._thresholds.rounding).points
-            np.minimum.at(found, points, self._thresholds.reach * (group.law.length_scale + np.abs(x[points])))
+            points = group.points[group.live]
+            np.minimum.at(found, points, share * (group.law.length_scale + np.abs(x[points])))
         return found
-
-
-def _group(rows: list[tuple[int, VertexLaw]]) -> _Group:
-    laws = [law for _, law in rows]
-    return _Group(
-        law=laws[0].law,
-        points=np.array([k for k, _ in rows]),
-        signs=np.array([law.sign for law in laws]),
-        weights=np.array([law.weight for law in laws]),
-        rows=laws,
-        live=np.zeros(len(rows), dtype=bool),
-        chords=np.zeros((len(rows), 3)),
-        ends=np.zeros((len(rows), 2)),
-    )

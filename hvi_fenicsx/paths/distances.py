@@ -14,7 +14,7 @@ from .relations import ContactPoints
 from .state import PathState
 from .straight_state import StraightState, coordinates_at
 from .substitutions import factors, multiplied
-from .thresholds import DEFAULT
+from .thresholds import DEFAULT, ROUNDING
 
 
 class Distances:
@@ -156,5 +156,5 @@ class StateOnGraphs:
     def _change(self, load: Array) -> Array:
         if self._points.straight:
             return StraightState(self._points, self._z).inverse().solve(load)
-        matrix, rank = self._points.jacobian(self._points.values(self._z)), self._points.thresholds.rounding
-        return np.asarray(np.linalg.lstsq(matrix, load, rcond=rank)[0])
+        matrix = self._points.jacobian(self._points.values(self._z))
+        return np.asarray(np.linalg.lstsq(matrix, load, rcond=ROUNDING)[0])

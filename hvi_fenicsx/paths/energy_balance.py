@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -150,36 +151,6 @@ class EnergyBalance:
         return 0.5 * float((before + after) @ (self._problem.stiffness @ (after - before)))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Group:
-    """One law at r vertices.
-
-    Attributes:
-        laws: the laws of the vertices.
-        points: their numbers, (r,).
-        shared: the vertices at whose point another law acts, too.
-    """
-
-    laws: list[VertexLaw]
-    points: Integers
-    shared: list[int]
-
-    def tractions(self, points: ContactPoints, lengths: Array, forces: Array) -> Array:
-        """What each vertex has of the force at its point, (r,).
-
-        Args:
-            points: all points.
-            lengths: of the displacements by point, (m,).
-            forces: of all laws of each point, (m,).
-        """
-        found = np.asarray(forces[self.points] / self.laws[0].laws.weights)
-        for row in self.shared:
-            k, law = int(self.points[row]), self.laws[row]
-            shares = points.shares(k, float(lengths[k]), float(forces[k]))
-            found[row] = next(share for other, share in zip(points.laws[k], shares, strict=True) if other is law)
-        return found
-
-
 class BondEnergies:
     """The energies of the bonds with memory, and of those whose energy depends on the mode.
 
@@ -195,7 +166,8 @@ class BondEnergies:
         self._points = points
         remember = {law.group for law in points.vertices if law.laws.memory is not None}
         self.numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
-        self._groups = [_group(n, points) for n in self.numbers]
+        self._laws = [[law for law in points.vertices if law.group == n] for n in self.numbers]
+        self._at: list[Integers] = [points.point_of[[law.unknowns[0] for law in laws]] for laws in self._laws]
 
     def __call__(self, values: Values) -> tuple[float, Array, Array]:
         """What they give back, what each has lost for 1 at its mode, and the scales by mode, (b,).
@@ -203,21 +175,22 @@ class BondEnergies:
         Args:
             values: of the points.
         """
-        back, forces = 0.0, self._points.bond_forces(values)
-        lost: list[Array] = []
-        scales: list[Array] = []
-        for group in self._groups:
-            x, scale = values.lengths[group.points], values.energies[group.points]
-            traction = group.tractions(self._points, values.lengths, forces)
-            laws = group.laws[0].laws
+        back, lost, scales = 0.0, [np.zeros(0)], [np.zeros(0)]
+        for vertices, at in zip(self._laws, self._at, strict=True):
+            x, scale, laws = values.lengths[at], values.energies[at], vertices[0].laws
+            traction = self._tractions(values, vertices, at)
             back += float(scale @ laws.recoverable(x, traction))
             lost.append(laws.dissipated(x, traction))
             scales.append(scale)
-        return back, np.concatenate([np.zeros(0), *lost]), np.concatenate([np.zeros(0), *scales])
+        return back, np.concatenate(lost), np.concatenate(scales)
 
-
-def _group(number: int, points: ContactPoints) -> _Group:
-    laws = [law for law in points.vertices if law.group == number]
-    at = points.point_of[[law.unknowns[0] for law in laws]]
-    shared = [row for row, k in enumerate(at) if len(points.laws[k]) > 1]
-    return _Group(laws=laws, points=at, shared=shared)
+    def _tractions(self, values: Values, vertices: Sequence[VertexLaw], at: Integers) -> Array:
+        """What each vertex has of the force of all laws at its point, (r,)."""
+        forces = self._points.bond_forces(values)
+        found = np.asarray(forces[at] / vertices[0].laws.weights)
+        for row, (law, k) in enumerate(zip(vertices, at, strict=True)):
+            several = self._points.laws[k]
+            if len(several) > 1:
+                shares = self._points.shares(int(k), float(values.lengths[k]), float(forces[k]))
+                found[row] = next(share for other, share in zip(several, shares, strict=True) if other is law)
+        return found

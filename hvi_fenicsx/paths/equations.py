@@ -161,7 +161,7 @@ class CurveEquations(Branch):
             numpy.linalg.LinAlgError: the function stands along the curve.
         """
         found = self._tangent(values, row, sign)
-        for _ in range(self.limits.many):
+        for _ in range(self.limits.corrections):
             setting_out = self.points.setting_out(values, found[:-1])
             if setting_out is None or np.allclose(setting_out.energies, values.energies, rtol=1e-14, atol=0.0):
                 break
@@ -182,7 +182,7 @@ class CurveEquations(Branch):
         """The direction in which the equations stay satisfied, by factors of a point nearby; None: they are too far."""
         found, last, size = factors.along, np.inf, float(np.max(np.abs(factors.along)))
         change_along = self._changes(values)
-        for _ in range(self.limits.refinements):
+        for _ in range(self.limits.corrections):
             step = factors.across(change_along(found))
             change = float(np.max(np.abs(step)))
             if not change <= self.limits.near * last:
@@ -260,21 +260,21 @@ class CurveEquations(Branch):
             k: the point.
             end: the s of that end.
         """
-        unit = np.eye(1, len(self.points), k)[0]
-        return lambda y: float(self.points.s(y[:-1])[k]) - end, lambda y: np.append(self._gradient(y, k, unit), 0.0)
+        return lambda y: float(self.points.s(y[:-1])[k]) - end, lambda y: np.append(self._gradient(y, k), 0.0)
 
-    def _gradient(self, y: Array, k: int, unit: Array) -> Array:
+    def _gradient(self, y: Array, k: int) -> Array:
+        """How the s of a point changes with the coordinates, (n,)."""
         points, found = self.points, np.zeros(len(y) - 1)
         p = points.radial(k)
         if p is None:
-            found[points.unknowns_of(k)] = unit[k]
+            found[points.unknowns_of(k)] = 1.0
         else:
             found[points.vectors.groups[p]] = points.directions(y[:-1])[points.vectors.owner == p]
         return found
 
     def row(self, k: int) -> Array:
         """What the s of a point is as a linear function of the variables, (n + 1,)."""
-        return np.append(self._gradient(self.here.y, k, np.eye(1, len(self.points), k)[0]), 0.0)
+        return np.append(self._gradient(self.here.y, k), 0.0)
 
     def at_factor(self, aim: float) -> Condition:
         """A wanted factor."""
@@ -350,7 +350,7 @@ class Bordered:
     def __init__(self, matrix: Array, thresholds: FollowingThresholds = DEFAULT) -> None:
         self._thresholds, self._row = thresholds, matrix[-1].copy()
         factors, pivots, singular = dgetrf(matrix, overwrite_a=1)
-        self._inverse = ProductInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), thresholds.many)
+        self._inverse = ProductInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), thresholds.waits)
         if singular or not self._has_tangent():
             raise np.linalg.LinAlgError("the equations have no tangent here")
 

@@ -11,11 +11,10 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .branch import Branch, Move, Outcome, Passage, Refused, event_of
-from .branching import Way, chosen, ways_on
 from .curve import Curve
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
-from .jumps import jump_from
+from .jumps import Jump
 from .load_history import Cycle, Cycles, LoadHistory
 from .pivoting import StraightBranch
 from .relations import ContactPoints
@@ -56,7 +55,6 @@ class Follower(LoadHistory):
         self._points = ContactPoints(problem, options.remember, options.thresholds)
         self._empty_jumps = 0
         self._blocked = False
-        self._untried: tuple[Array, list[Way]] = np.empty(0), []
         self._last: PathState
         self._branch: Branch
         self._cycles: Cycles
@@ -212,7 +210,7 @@ class Follower(LoadHistory):
                 return
             self._balance.go(self._branch.values, self.factor, self._branch.driven(move))
             if move.outcome is not Outcome.FACTOR or self.factor != aim:
-                yield self._noted(move, aim)
+                yield self._noted(move)
             if self.end is None:
                 self._watch()
             if self.end is not None:
@@ -274,7 +272,7 @@ class Follower(LoadHistory):
         where = f"at the factor {self.factor:.6g} several bonds are at ends of their pieces"
         self._lose(self.factor, f"{where}, and each way on leads from one of them to the other")
 
-    def _noted(self, move: Move, aim: float) -> PathState:
+    def _noted(self, move: Move) -> PathState:
         """The state after a step, and what happens there."""
         if move.outcome in (Outcome.END, Outcome.TURNED) and not self._points.straight and self._is_adrift():
             return self._state(Event.KINK)  # all bonds are broken at once: nothing is left to pass
@@ -285,35 +283,19 @@ class Follower(LoadHistory):
             return self._state(Event.STEP)
         event = event_of(passages, folds=before * self._branch.trend < 0)
         state = self._state(event, passages, bifurcation=event is Event.FOLD and max(move.tied, len(passages)) > 1)
-        return state if move.outcome is Outcome.FOLD else self._unless_cyclic(state, aim)
-
-    def _unless_cyclic(self, state: PathState, aim: float) -> PathState:
-        """The state; where the path comes back to one, another way is taken, or the path ends."""
-        found = self._cycles.note(state)
-        if self._points.straight and found is Cycle.BLOCKED and self._takes_another_way(aim):
-            return self._state(state.event, place=state.place, bifurcation=True)
-        most = np.inf if self._points.straight else self._options.thresholds.waits + 4 * len(self._points)
-        if found is Cycle.CLOSED or (found is not None and self._points.straight):
-            self._go_round(self.factor, found)
-        elif self._cycles.standing > most:
-            self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
+        if move.outcome is not Outcome.FOLD:
+            self._detect_cycle(state)
         return state
 
-    def _takes_another_way(self, aim: float) -> bool:
-        """On by another of all ways, of those not tried yet; a stable path that has none jumps."""
-        branch, stable = self._branch, self._options.follow is Follow.STABLE
-        assert isinstance(branch, StraightBranch)
-        at, ways = self._untried
-        if not np.array_equal(at, self._cycles.came):
-            ways = ways_on(branch)
-        way = chosen(ways, self._cycles.came, float(np.sign(aim - self.factor)), stable=stable)
-        self._untried = self._cycles.came, [other for other in ways if other is not way]
-        if way is not None:
-            self._points.restore(way.kept)
-            self._follow_from(way.z, self.factor, heading=way.heading)
-            self._branch.unstable, self._branch.leader = way.unstable, way.leader
-        self._blocked = stable and (way is None or way.unstable > 0)
-        return way is not None or stable
+    def _detect_cycle(self, state: PathState) -> None:
+        """Where the path comes back to a state, a stable one jumps, or it ends."""
+        found, straight = self._cycles.note(state), self._points.straight
+        if straight and found is Cycle.BLOCKED and self._options.follow is Follow.STABLE:
+            self._blocked = True
+        elif found is Cycle.CLOSED or (found is not None and straight):
+            self._go_round(self.factor, found)
+        elif not straight and self._cycles.standing > self._options.thresholds.waits + 4 * len(self._points):
+            self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
 
     def _ended(self, outcome: Outcome) -> None:
         """End where no step is short enough, or nothing ends the curve: where the factor stands, a body comes off."""
@@ -330,7 +312,7 @@ class Follower(LoadHistory):
         """On to the next stable equilibrium at the same factor, or off."""
         factor = self.factor
         heading, held = (1 if aim > factor else -1), self._is_held(factor)
-        landing = jump_from(self._problem, self._branch, heading, held=held, step=self._check)
+        landing = Jump(self._problem, self._branch, heading, held=held, step=self._check).landing()
         if landing is not None and landing.z is not None:
             yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
             return
@@ -344,7 +326,7 @@ class Follower(LoadHistory):
         """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""
         yield landed
         self._empty_jumps = 0 if landed.released > 1e-12 * abs(landed.energy) else self._empty_jumps + 1
-        if self._empty_jumps > self._options.thresholds.empty:
+        if self._empty_jumps > self._options.thresholds.waits:
             self._lose(self.factor, f"at the factor {self.factor:.6g} jumps release no energy: rounding alone leads on")
             yield self._state(Event.END)
 

@@ -95,7 +95,7 @@ def settled(
     motion = Relaxation(problem, points, z, problem.load(first), held=held, step=step)
     if not motion.run(np.zeros(len(points))) or motion.escapes:
         return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
-    heading, most = -int(np.sign(first)), limits.many + limits.waits * len(points)
+    heading, most = -int(np.sign(first)), limits.waits * (1 + len(points))
     try:
         branch = branch_from(points, problem.force, problem.force_rate, motion.z, first, heading=heading)
         branch.set_out(heading, step)
@@ -120,9 +120,9 @@ def no_load(problem: CondensedProblem, x: Array, first: float, limits: Following
         limits: what is none.
     """
     stiffest = float(np.max(problem.elastic.diagonal, initial=0.0))
-    rounding = np.finfo(float).eps * stiffest * float(np.max(np.abs(x), initial=0.0))
+    rounding = stiffest * float(np.max(np.abs(x), initial=0.0))
     load = float(np.max(np.abs(problem.force_rate), initial=0.0)) or 1.0
-    return max(limits.none * abs(first), limits.roundings * rounding / load)
+    return max(limits.none * abs(first), limits.digits * rounding / load)
 
 
 def constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> CondensedProblem | None:

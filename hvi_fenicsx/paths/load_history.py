@@ -77,7 +77,7 @@ class Cycle(Enum):
     """How a path came back."""
 
     CLOSED = "its equilibria form a closed curve, which it has gone round: none of them has the wanted factor"
-    BLOCKED = "several bonds are at ends of their pieces at once, and no combination of their directions leads on"
+    BLOCKED = "several bonds are at ends of their pieces at once, and the way on leads back"
 
 
 class Cycles:

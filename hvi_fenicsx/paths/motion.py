@@ -79,7 +79,7 @@ class Relaxation:
             self._points.elastic = elastic
 
     def _moved(self) -> bool:
-        for _ in range(self._limits.times * (1 + len(self._points))):
+        for _ in range(self._limits.waits**2 * (1 + len(self._points))):
             if self._at_rest():
                 return self._settled()
             if self._is_out_of_reach():

@@ -99,7 +99,7 @@ class Crossing:
         """
         cell = self._points.numbers.tobytes(), frozenset(self._turned)
         self._cells[cell] += 1
-        if self._cells[cell] > self._limits.rounds:
+        if self._cells[cell] > self._limits.corrections:
             raise Refused
 
     def _outwards(self, k: int) -> float:

@@ -12,7 +12,7 @@ random: each coordinate then has a part of the order ε as well, which says who 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from typing_extensions import override
@@ -24,6 +24,7 @@ from .relations import ContactPoints
 from .segments import Kind, Segment, piece_at
 from .state import Position
 from .straight_state import FACTOR, Basis, StraightState
+from .thresholds import ROUNDING
 
 
 class StraightBranch(Branch):
@@ -66,6 +67,7 @@ class StraightBranch(Branch):
         self.points, self.state = points, StraightState(points, z)
         self._constant, self.rate, self._factor, self._size = constant, rate, factor, 0.0
         self.heading, self.trend, self.unstable, self._driven = heading, 0, 0, 0.0
+        self._leader = 0
         self._stiffest, self._dead, self._live = map(_largest, (self._stiffness.diagonal, constant, rate))
         self._perturb()
         self.state.hold(rate)
@@ -106,6 +108,23 @@ class StraightBranch(Branch):
     @override
     def directions(self) -> Array:
         return self.rates
+
+    @override
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        k, inverse = self._leader, self.inverse() or self.state.inverse()
+        rise, own = float(self.points.rise[k]), np.eye(1, len(self.z), self._leader)[0]
+        if not rise:
+            found = self.state.softest(inverse, own)
+            yield found * (np.sign(found[k] * self.rates[k]) or 1.0), k
+            return
+        way = np.sign(self.rates[k]) * (rise if rise > 0.0 else 1.0)  # on a drop: it goes on, and all others follow
+        pull = np.where(self.points.moving, -way * self.points.elastic.column(k), 0.0)
+        yield np.where(self.points.moving, inverse.solve(pull), way * own), k
+
+    @property
+    @override
+    def motion(self) -> Array:
+        return np.where(self.points.moving, self.rates, 0.0)
 
     @override
     def position(self, leg: int) -> Position:
@@ -165,7 +184,7 @@ class StraightBranch(Branch):
     def _correct(self, change: Array) -> None:
         """Take a change off, the driving variable held; if that is a slow one, to the nearest point of the branch."""
         if (driver := self._basis.driver) != FACTOR:
-            along = np.where(self.points.moving, self.rates, 0.0)
+            along = self.motion
             scale = _largest(along) or 1.0
             along, rate, own = along / scale, self.factor_rate / scale, float(change[driver])
             change[driver] = 0.0
@@ -280,7 +299,7 @@ class StraightBranch(Branch):
         neutral = stood or self.stands or self.state.held is not held
         self.unstable = self.points.unstable_directions(self.values) if neutral else self.unstable + change
         if change > 0 or neutral:
-            self.leader = i, 1 if forward else -1
+            self._leader = i
         return [Passage(point=i, before=before, after=after)]
 
     def _turn_back(self, i: int, *, forward: bool) -> None:
@@ -288,7 +307,7 @@ class StraightBranch(Branch):
         values = self.values
         force = float(self.points.bond_forces(values)[i])
         x = self.points.remember(i, float(values.x[i]), force)
-        number = piece_at(self.points.chain(i), x, self._thresholds.rounding, forward=forward)
+        number = piece_at(self.points.chain(i), x, ROUNDING, forward=forward)
         self._enter(i, number, self.points.chain(i)[number].coordinate(x, force))
 
     def _enter(self, i: int, number: int, coordinate: float) -> None:
@@ -323,18 +342,14 @@ class StraightBranch(Branch):
     def _factor_stands(self) -> bool:
         points, rates = self.points, self.rates
         forces = _largest(np.where(points.moving, points.slope, points.rise) * rates)
-        size = self._stiffest * _largest(np.where(points.moving, rates, 0.0)) + forces
+        size = self._stiffest * _largest(self.motion) + forces
         return abs(self.factor_rate) * self._live < self._thresholds.reached * size
 
-    def beyond(self, share: float) -> Array:
-        """The coordinates a part of the way farther to the next end, (n,).
-
-        Args:
-            share: of that way.
-        """
+    @override
+    def beyond(self) -> Array:
         found = self._first_end(self._factor)
         length = self.points.scale / (_largest(self.rates) or 1.0) if found is None else found[1]
-        return self.z + share * length * self.rates
+        return self.z + self._thresholds.near * length * self.rates
 
     @override
     def must_leave(self, aim: float) -> bool:

@@ -12,6 +12,7 @@ from ..typing import Array, Mask
 from .contact_points import PointLaws
 from .rigid_motions import Unresisted, unresisted
 from .statuses import PointStatuses
+from .thresholds import ROUNDING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +116,7 @@ class ContactPoints(PointStatuses):
             direction: of the coordinates, (n,).
         """
         vectors, p = self.vectors, self.of_lengths
-        rest = values.s[p] <= self.thresholds.rounding
+        rest = values.s[p] <= ROUNDING
         if not vectors.differ or not np.any(rest):
             return None
         e = np.where(rest[vectors.owner], vectors.directions(direction), values.directions)
@@ -144,7 +145,7 @@ class ContactPoints(PointStatuses):
         limits, size = self.thresholds, 1.0 + np.abs(values.s)
         steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
         steep[np.abs(rates) <= limits.undecided * fastest] = 1.0
-        return np.asarray(np.maximum(limits.reached / steep, limits.left) * size)
+        return np.asarray(np.maximum(limits.reached / steep, limits.digits) * size)
 
     def turning_back(self, values: Values, rates: Array) -> Mask:
         """Which bonds with memory go back, (m,); a vector that has not left 0 passes it instead.
@@ -224,7 +225,7 @@ class ContactPoints(PointStatuses):
         if self.straight:
             resists = ~self.moving | (np.abs(self.slope) > ZERO * self.stiffest)
             return unresisted(self.rigid, self.rigid[:, resists], rate)
-        none = self.thresholds.flat * self.stiffest
+        none = self.thresholds.none * self.stiffest
         stiff = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
         return unresisted(self.rigid, (self._axes(values.directions).sparse[stiff] @ self.rigid.T).T, rate)
 
@@ -333,7 +334,7 @@ class ContactPoints(PointStatuses):
 
     def reach(self, values: Values) -> Array:
         """How far the curved points may move in one step, in units of s, (m,); infinite for the others."""
-        return np.asarray(self._deviations.reach(values.lengths) / self.length)
+        return np.asarray(self._deviations.reach(values.lengths, self.thresholds.reach) / self.length)
 
 
 @dataclass(frozen=True, kw_only=True)

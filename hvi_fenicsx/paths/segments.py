@@ -14,9 +14,8 @@ from enum import Enum
 
 import numpy as np
 
-from ..laws.traction_graph import TractionGraph
-from ..typing import Array
 from .thresholds import ROUNDING
+from .vertex_laws import VertexLaw
 
 _SIDES = ("left", "right")
 
@@ -56,20 +55,6 @@ class Segment:
     low: float
     high: float
     outward: int = 0
-
-    def weighted(self, weight: float) -> Segment:
-        """The segment with all forces multiplied."""
-        stands = self.rise != 0.0
-        return Segment(
-            kind=self.kind,
-            x=self.x,
-            force=self.force * weight,
-            slope=self.slope * weight,
-            rise=self.rise,
-            low=self.low * weight if stands else self.low,
-            high=self.high * weight if stands else self.high,
-            outward=self.outward,
-        )
 
     def displacement(self, coordinate: float) -> float:
         """The displacement at τ."""
@@ -129,80 +114,22 @@ def piece_at(chain: Sequence[Segment], x: float, rounding: float, *, forward: bo
     return near[-1] if forward else near[0]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Component:
-    """One bond's law on an unknown.
-
-    Attributes:
-        graph: traction over the unknown.
-        weight: lumped area.
-        passed: displacements (least, greatest) up to which a bond with memory has been; None without memory.
-        curved: whether the graph has chords of a law: a piece that has been passed ends where the bond has been, even
-            if the chords go on in its direction.
-    """
-
-    graph: TractionGraph
-    weight: float
-    passed: tuple[float, float] | None = None
-    curved: bool = False
-
-    def force(self, x: Array, side: str) -> Array:
-        """The limit of the force from one side, (m,).
-
-        Args:
-            x: displacements, (m,).
-            side: "left" or "right".
-        """
-        return self.weight * self.graph.traction(x, side)
-
-    def slopes(self, x: Array) -> Array:
-        """The slopes of the force off the breaks, (m,).
-
-        Args:
-            x: displacements, (m,).
-        """
-        return self.weight * self.graph.slopes[np.searchsorted(self.graph.breaks, x)]
-
-    def has_passed(self, x: float) -> bool:
-        """Whether it has nothing to remember at a displacement, or has been there."""
-        return self.passed is None or self.passed[0] < x < self.passed[1]
-
-    def returns(self, x: float, slope: float) -> bool:
-        """Whether it returns on a line through 0 as it came.
-
-        Args:
-            x: a displacement where it has not been.
-            slope: of the force there.
-        """
-        line = float(self.force(np.array([x]), "right")[0])
-        return abs(line - slope * x) <= ROUNDING * (abs(line) + abs(slope * x))
-
-    def changes(self, at: float) -> bool:
-        """Whether the graph has another piece from a displacement on."""
-        graph, number = self.graph, int(np.searchsorted(self.graph.breaks, at))
-        if number == len(graph.breaks) or graph.breaks[number] != at:
-            return False
-        if self.curved and self.passed is not None and at != 0.0 and at in self.passed:
-            return True
-        return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
-
-
-def chain(components: Sequence[Component], lower: float, upper: float) -> tuple[Segment, ...]:
+def chain(laws: Sequence[VertexLaw], lower: float, upper: float) -> tuple[Segment, ...]:
     """The segments of an unknown, from the least displacement to the greatest.
 
     Breaks at which nothing changes are left out. A piece has τ = 0 at 0 where that is on it, so that rest is exact.
 
     Args:
-        components: the laws that act on it.
+        laws: those that act on it.
         lower: its lower bound, or -inf.
         upper: its upper bound, or inf.
     """
     if lower == upper:
         return (Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=math.inf),)
-    every = sorted({float(b) for c in components for b in c.graph.breaks if lower < b < upper})
-    ends = [lower, *(b for b in every if any(c.changes(b) for c in components)), upper]
+    every = sorted({float(b) for law in laws for b in law.graph.breaks if lower < b < upper})
+    ends = [lower, *(b for b in every if any(law.changes(b) for law in laws)), upper]
     places = np.unique([x for x in (*ends, 0.0) if math.isfinite(x)])
-    sides = [np.array([c.force(places, side) for c in components]).reshape(-1, len(places)) for side in _SIDES]
+    sides = [np.array([law.force(places, side) for law in laws]).reshape(-1, len(places)) for side in _SIDES]
     left, right, size = (
         dict(zip(places, total, strict=True))
         for total in (*(part.sum(axis=0) for part in sides), np.abs(sides).sum(axis=(0, 1)))
@@ -212,32 +139,31 @@ def chain(components: Sequence[Component], lower: float, upper: float) -> tuple[
         found.append(Segment(kind=Kind.BOUND, x=lower, force=right[lower], rise=1.0, low=-math.inf, high=0.0))
     for start, end in itertools.pairwise(ends):
         if start > lower and abs(right[start] - left[start]) > ROUNDING * size[start]:
-            found.append(_jump(components, start, left[start], right[start]))
+            found.append(_jump(laws, start, left[start], right[start]))
         anchor = 0.0 if start < 0.0 < end else start if math.isfinite(start) else end
-        found.append(_piece(components, start, end, anchor, (left if anchor == end else right)[anchor]))
+        found.append(_piece(laws, start, end, anchor, (left if anchor == end else right)[anchor]))
     if math.isfinite(upper):
         found.append(Segment(kind=Kind.BOUND, x=upper, force=left[upper], rise=1.0, low=0.0, high=math.inf))
     return tuple(found)
 
 
-def _jump(components: Sequence[Component], at: float, left: float, right: float) -> Segment:
-    fresh = at != 0.0 and not all(c.has_passed(at) for c in components)
+def _jump(laws: Sequence[VertexLaw], at: float, left: float, right: float) -> Segment:
+    fresh = at != 0.0 and not all(law.has_passed(at) for law in laws)
     rise, outward = math.copysign(1.0, right - left), int(np.sign(at)) if fresh else 0
     return Segment(kind=Kind.JUMP, x=at, force=left, rise=rise, low=0.0, high=abs(right - left), outward=outward)
 
 
-def _piece(components: Sequence[Component], start: float, end: float, anchor: float, force: float) -> Segment:
+def _piece(laws: Sequence[VertexLaw], start: float, end: float, anchor: float, force: float) -> Segment:
     middle = between(start, end)
-    slopes = [float(c.slopes(np.array([middle]))[0]) for c in components]
     turns = (
-        not c.has_passed(middle) and ((c.curved and not start < 0.0 < end) or not c.returns(middle, slope))
-        for c, slope in zip(components, slopes, strict=True)
+        not law.has_passed(middle) and ((law.curved and not start < 0.0 < end) or not law.returns(middle))
+        for law in laws
     )
     return Segment(
         kind=Kind.PIECE,
         x=anchor,
         force=force,
-        slope=math.fsum(slopes),
+        slope=math.fsum(law.slope(middle) for law in laws),
         low=start - anchor,
         high=end - anchor,
         outward=int(np.sign(middle)) if any(turns) else 0,

@@ -9,8 +9,7 @@ opening has a point of its own beside, without a law: what it does where it is n
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection
 
 import numpy as np
 
@@ -18,26 +17,12 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
 from .contact_points import PointLaws
 from .curved_laws import Deviations
-from .segments import Component, Kind, Segment, beside_opening, chain, from_zero
-from .thresholds import DEFAULT, FollowingThresholds
-from .vertex_laws import VertexLaw, shares
+from .segments import Kind, Segment, beside_opening, chain, from_zero
+from .thresholds import DEFAULT, ROUNDING, FollowingThresholds
+from .vertex_laws import shares
 
-
-@dataclass(frozen=True, kw_only=True)
-class Kept:
-    """Where points were.
-
-    Attributes:
-        numbers: of their segments, (m,).
-        chains: their segments.
-        bases: where s was at the coordinate 0 of each.
-        memory: what their laws remembered, (v, 4).
-    """
-
-    numbers: Integers
-    chains: list[tuple[Segment, ...]]
-    bases: list[Array]
-    memory: Array
+Kept = tuple[Integers, Array]
+"""The numbers of the segments on which all points are, (m,), and what their laws remember, (v, 4)."""
 
 
 class PointStatuses(PointLaws):
@@ -65,10 +50,9 @@ class PointStatuses(PointLaws):
     ) -> None:
         super().__init__(problem, remember, thresholds)
         self.elastic, self.rigid = problem.elastic, problem.elastic.rigid
-        self._made: dict[tuple[object, ...], tuple[Segment, ...]] = {}
         self._groups = list({law.group: law.laws for law in self.vertices}.values())
         self._ends = np.cumsum([len(laws.weights) for laws in self._groups])[:-1]
-        self._deviations = Deviations(self.laws, thresholds)
+        self._deviations = Deviations(self.laws)
         m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)
         self.low, self.high, self.outward = np.zeros(m), np.zeros(m), np.zeros(m)
@@ -97,29 +81,13 @@ class PointStatuses(PointLaws):
         return self.elastic.array
 
     def _segments(self, k: int) -> tuple[Segment, ...]:
-        """The segments of a point; those of one law that remembers nothing yet are made once."""
-        laws, problem = self.laws[k], self._problem
-        if len(laws) != 1 or self.radial(k) is not None or np.any(laws[0].memory):
-            return self._chained(k, laws)
-        law, i = laws[0], int(self.one[k])
-        key = law.group, law.sign, float(problem.lower[i]), float(problem.upper[i])
-        if key not in self._made:
-            self._made[key] = self._chained(k, laws, of_area_one=True)
-        return tuple(segment.weighted(law.weight) for segment in self._made[key])
-
-    def _chained(self, k: int, laws: Sequence[VertexLaw], *, of_area_one: bool = False) -> tuple[Segment, ...]:
         problem, opening = self._problem, self.opening(k)
         if opening is not None:
             return beside_opening(float(problem.lower[self.vectors.opening_unknowns[opening]]))
-        areas = [1.0 if of_area_one else law.weight for law in laws]
-        parts = [
-            Component(graph=law.graph, weight=area, passed=law.passed, curved=law.curved)
-            for law, area in zip(laws, areas, strict=True)
-        ]
         if self.radial(k) is not None:
-            return from_zero(chain(parts, 0.0, np.inf))
+            return from_zero(chain(self.laws[k], 0.0, np.inf))
         i = int(self.one[k])
-        return chain(parts, float(problem.lower[i]), float(problem.upper[i]))
+        return chain(self.laws[k], float(problem.lower[i]), float(problem.upper[i]))
 
     def _based(self, k: int) -> Array:
         """Where s is at the coordinate 0 of each segment."""
@@ -269,7 +237,7 @@ class PointStatuses(PointLaws):
         """
         vectors = self.vectors
         lengths, directions = vectors.polar(z)
-        moved = lengths > self.thresholds.rounding
+        moved = lengths > ROUNDING
         along = np.where(moved, vectors.along(directions, direction), vectors.lengths(direction))
         return np.concatenate([direction[self.one], along, direction[vectors.opening_unknowns]])
 
@@ -312,23 +280,9 @@ class PointStatuses(PointLaws):
         parts = [np.zeros((len(g.weights), 4)) if g.memory is None else g.memory for g in self._groups]
         return np.concatenate([np.zeros((0, 4)), *parts])
 
-    def put(self, numbers: Integers, memory: Array | None) -> None:
-        """Put all points where they were at a state of a path.
-
-        Args:
-            numbers: of their segments, (m,).
-            memory: as :attr:`memory` was.
-        """
-        if memory is not None:
-            self._recall(memory)
-        for k, number in enumerate(numbers):
-            self.rebuild(k)
-            self.enter(k, int(number))
-
     def kept(self) -> Kept:
         """Where all points are and what their laws remember, for :meth:`restore`."""
-        chains, bases, memory = list(self._chains), list(self._bases), self._remembered
-        return Kept(numbers=self.numbers.copy(), chains=chains, bases=bases, memory=memory)
+        return self.numbers.copy(), self._remembered
 
     def restore(self, kept: Kept) -> None:
         """Go back to where all points were.
@@ -336,18 +290,17 @@ class PointStatuses(PointLaws):
         Args:
             kept: as :meth:`kept` found it.
         """
-        self._chains, self._bases = list(kept.chains), list(kept.bases)
-        self._recall(kept.memory)
-        for k, number in enumerate(kept.numbers):
-            self.enter(k, int(number))
-
-    def _recall(self, memory: Array) -> None:
-        """Let the laws remember what they did."""
-        for row in np.flatnonzero(np.any(memory != self._remembered, axis=1)):
-            self.vertices[row].forget_graph()
-        for laws, part in zip(self._groups, np.split(memory, self._ends), strict=True):
+        numbers, memory = kept
+        changed = np.flatnonzero(np.any(memory != self._remembered, axis=1))
+        for laws, part in zip(self._groups, np.split(memory, self._ends), strict=False):  # one part of none
             if laws.memory is not None:
                 laws.memory[:] = part
+        for row in changed:
+            self.vertices[row].forget_graph()
+        for k in np.unique([self.point_of[self.vertices[row].unknowns[0]] for row in changed]):
+            self.rebuild(int(k))
+        for k, number in enumerate(numbers):
+            self.enter(k, int(number))
 
     def remember(self, k: int, x: float, traction: float) -> float:
         """Let a point's laws note where they have been, and take its segments anew.

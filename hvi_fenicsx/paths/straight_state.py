@@ -126,7 +126,7 @@ class StraightState:
             return found
         operator = LinearOperator((free.size, free.size), matvec=response, dtype=np.float64)
         try:
-            accuracy = self.points.thresholds.flat
+            accuracy = self.points.thresholds.none
             found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=accuracy)[1][:, 0]
         except ArpackNoConvergence:
             pass
@@ -141,7 +141,7 @@ def coordinates_at(problem: CondensedProblem, points: ContactPoints, state: Path
         points: its points.
         state: the state.
     """
-    points.put(state.position.numbers, state.memory)
+    points.restore((state.position.numbers, points.kept()[1] if state.memory is None else state.memory))
     if not points.straight:
         return state.position.small.copy()
     return _coordinates(points, state.x, problem.load(state.factor) - problem.elastic @ state.x)

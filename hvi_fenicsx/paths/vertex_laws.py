@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,7 +29,6 @@ class VertexLaw:
         laws: the laws of the group, with what they remember.
         number: of the vertex among them.
         bounds: finite bounds of its coordinate; there chords of a curved law have its traction.
-        plain: a table of its traction without memory, in one row; None of a curved law.
     """
 
     row: int
@@ -38,7 +37,6 @@ class VertexLaw:
     laws: VertexLaws
     number: int
     bounds: tuple[float, ...]
-    plain: TractionGraph | None
     _present: TractionGraph | None = None
 
     @property
@@ -80,20 +78,46 @@ class VertexLaw:
     def graph(self) -> TractionGraph:
         """Traction over the coordinate, with memory; of a curved law the chords between its breaks."""
         if self._present is None:
-            table = self._without_memory
-            self._present = (table if self.passed is None else table.remembering(self.memory[None])).row(0)
+            self._present = self._one.graphs(np.array(self.bounds)).row(0)
         return self._present
-
-    @property
-    def _without_memory(self) -> TractionGraph:
-        """The table of the traction without memory, of a curved law that of its chords, in one row."""
-        if self.plain is not None:
-            return self.plain
-        return replace(self._one, memory=None).graphs(np.array([*self.bounds, *self.memory[:2]]))
 
     @property
     def _one(self) -> VertexLaws:
         return self.laws.at(slice(self.number, self.number + 1))
+
+    def force(self, x: Array, side: str) -> Array:
+        """The limit of the force on the graph from one side, (m,).
+
+        Args:
+            x: coordinates, (m,).
+            side: "left" or "right".
+        """
+        return self.weight * self.graph.traction(x, side)
+
+    def slope(self, x: float) -> float:
+        """The slope of the force on the graph off its breaks."""
+        return self.weight * float(self.graph.slopes[np.searchsorted(self.graph.breaks, x)])
+
+    def has_passed(self, x: float) -> bool:
+        """Whether it has nothing to remember at a coordinate, or has been there."""
+        return self.passed is None or self.passed[0] < x < self.passed[1]
+
+    def returns(self, x: float) -> bool:
+        """Whether it returns on a line through 0 as it came, from a coordinate where it has not been."""
+        line, slope = float(self.force(np.array([x]), "right")[0]), self.slope(x)
+        return abs(line - slope * x) <= ROUNDING * (abs(line) + abs(slope * x))
+
+    def changes(self, at: float) -> bool:
+        """Whether the graph has another piece from a coordinate on.
+
+        A piece of a curved law that has been passed ends where the bond has been, even if its chords go on.
+        """
+        graph, number = self.graph, int(np.searchsorted(self.graph.breaks, at))
+        if number == len(graph.breaks) or graph.breaks[number] != at:
+            return False
+        if self.curved and self.passed is not None and at != 0.0 and at in self.passed:
+            return True
+        return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
 
     def traction(self, x: float, side: str) -> float:
         """The limit of the traction along the coordinate, with memory.
@@ -122,7 +146,7 @@ class VertexLaw:
             traction: along it.
         """
         if self.laws.memory is not None:
-            found = _on_corner(self._without_memory.row(0), x, traction, 1e-11)
+            found = _on_corner(self.graph, x, traction, 1e-11)
             at, there = (np.array([value]) for value in found)
             self.laws.memory[self.number] = self._one.remembering(at, there).memory
         self.forget_graph()
@@ -152,8 +176,7 @@ def vertex_laws(problem: CondensedProblem, remember: Collection[int]) -> list[Ve
     found: list[VertexLaw] = []
     for group, bonds in enumerate(problem.bonds):
         laws = bonds.laws.with_memory if group in remember else bonds.laws
-        first, factors = bonds.unknowns[:, 0], laws.factors
-        plain = {s: bonds.law.graph.at_vertices(np.array([s])) for s in np.unique(factors)} if bonds.law.graph else {}
+        first = bonds.unknowns[:, 0]
         ends = np.column_stack([problem.lower[first], problem.upper[first]])
         found += [
             VertexLaw(
@@ -163,7 +186,6 @@ def vertex_laws(problem: CondensedProblem, remember: Collection[int]) -> list[Ve
                 laws=laws,
                 number=number,
                 bounds=() if bonds.radial else tuple(float(x) for x in ends[number] if np.isfinite(x)),
-                plain=plain.get(factors[number]),
             )
             for number in range(len(bonds.weights))
         ]
