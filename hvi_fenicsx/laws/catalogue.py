@@ -8,13 +8,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from typing_extensions import override
 
 from ..errors import InputError
-from .base import Superpotential
 from .parameter_checks import require_count, require_number, require_ordered, require_positive
 from .polyline import PolylineLaw
 from .traction_bounds import DEFAULT
@@ -47,10 +46,6 @@ class QuadraticLinear(PolylineLaw):
     def build(self) -> TractionGraph:
         return TractionGraph.from_points([(0.0, 0.0), (self.delta, self.gamma1), (self.delta, self.gamma2)])
 
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return QuadraticLinear(self.gamma1 / traction, self.gamma2 / traction, self.delta / length)
-
 
 @dataclass(frozen=True)
 class QuadraticLinearLiteral(PolylineLaw):
@@ -78,10 +73,6 @@ class QuadraticLinearLiteral(PolylineLaw):
             np.array([0.0, slope, 0.0]),
         )
 
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return QuadraticLinearLiteral(self.gamma1 / traction, self.gamma2 / traction, self.delta / length)
-
 
 @dataclass(frozen=True)
 class Tresca(PolylineLaw):
@@ -107,10 +98,6 @@ class Tresca(PolylineLaw):
     def build(self) -> TractionGraph:
         return TractionGraph.from_points([(0.0, self.yield_traction)])
 
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return Tresca(self.yield_traction / traction, self.reference_slip / length)
-
 
 @dataclass(frozen=True)
 class LinearSpring(PolylineLaw):
@@ -132,10 +119,6 @@ class LinearSpring(PolylineLaw):
     def build(self) -> TractionGraph:
         zero = np.zeros(1)
         return TractionGraph(zero, zero, zero, np.full(2, float(self.stiffness)))
-
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return LinearSpring(self.stiffness * length / traction, self.reference_slip / length)
 
 
 @dataclass(frozen=True)
@@ -172,15 +155,6 @@ class Sawtooth(PolylineLaw):
             points += [(k * self.delta, height), (k * self.delta, self.residual_traction)]
         return TractionGraph.from_points(points)
 
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return replace(
-            self,
-            peak_traction=self.peak_traction / traction,
-            delta=self.delta / length,
-            residual_traction=self.residual_traction / traction,
-        )
-
 
 @dataclass(frozen=True)
 class Graph(PolylineLaw):
@@ -205,10 +179,6 @@ class Graph(PolylineLaw):
     @override
     def build(self) -> TractionGraph:
         return TractionGraph.from_points(self.points, self.one_sided)
-
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return replace(self, points=tuple((x / length, t / traction) for x, t in self.points))
 
 
 def _checked_points(owner: str, points: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
