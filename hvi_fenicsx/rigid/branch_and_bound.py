@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .cutting_planes import Functional, Minimum, Programme, Region, ball, faces, idle, without_limit
+from .cutting_planes import Functional, Minimum, Programme, Region, ball, faces, idle
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,10 @@ class GlobalProgramme:
         return best
 
     def ratio(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
-        """The largest λ with λ load·y <= f(y) on the cone, and the motion that limits it, as :meth:`Programme.ratio`.
+        """The largest λ with λ load·y <= f(y) on the cone, and the motion that limits it (None if none does).
+
+        (inf, None): no λ is too large; (-inf, y): none is small enough, for y forbids it. Dinkelbach's iteration: λ
+        only falls, each motion below the current plane lowers it; so the minima stay bounded, and they share cuts.
 
         Args:
             f: the functional, with its cone.
@@ -163,21 +166,23 @@ class GlobalProgramme:
         Raises:
             SolverError: the gap between value and bound does not close.
         """
-        if not np.any(f.factors < 0.0):
-            return self.convex.ratio(f, load, least)
-        start = self.convex.minimise(f.unresisted().minus(load), ball(self.convex.frame))
-        if start is None or -start.value <= least:
-            return without_limit(self.minimise(f, idle(self.convex.frame, load)), least)
-        y, limits = start.y, self.convex.thresholds
-        factor = self.evaluate(f, y) / float(load @ y)
+        limits, frame = self.convex.thresholds, self.convex.frame
+        start = self.convex.minimise(f.unresisted().minus(load), ball(frame))
+        if start is None or -start.value <= least:  # it only ever holds, unless a motion it does no work on escapes
+            idling = self.minimise(f, idle(frame, load))
+            return (np.inf, None) if idling is None or idling.value >= -least else (-np.inf, idling.y)
+        factor, y = self.evaluate(f, start.y) / -start.value, start.y
         for _ in range(limits.max_rounds):
-            found = self.minimise(f.minus(load, factor), ball(self.convex.frame))
-            if found is None or found.value >= -limits.rounding * self.convex.scale:
+            found = self.minimise(f.minus(load, factor), ball(frame))
+            if found is None or found.value >= -limits.tight_gap * self.convex.scale:
                 return factor, y
-            y, work = found.y, float(load @ found.y)
+            work = float(load @ found.y)
             if work <= least:
-                return -np.inf, y
-            factor = self.evaluate(f, y) / work
+                return (factor, y) if found.value >= -limits.rounding * self.convex.scale else (-np.inf, found.y)
+            lower = self.evaluate(f, found.y) / work
+            if lower >= factor:
+                return factor, y
+            factor, y = lower, found.y
         raise SolverError(f"rigid motions: no load factor after {limits.max_rounds} minima")
 
     def _search(self, part: ConcavePart, region: Region, give_up: float) -> Minimum | None:

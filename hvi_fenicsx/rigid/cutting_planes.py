@@ -179,16 +179,6 @@ class Minimum:
     lower: float
 
 
-def without_limit(idling: Minimum | None, least: float) -> tuple[float, Array | None]:
-    """The largest factor of a load that only ever holds: none, unless a motion it does no work on escapes.
-
-    Args:
-        idling: the least of a functional among the motions that the load does no work on; None: there are none.
-        least: values of at most this size for a unit motion count as none.
-    """
-    return (np.inf, None) if idling is None or idling.value >= -least else (-np.inf, idling.y)
-
-
 @dataclass
 class GapHistory:
     """The gaps between value and bound: is the last one small, or at least small enough and stuck in rounding?
@@ -283,39 +273,6 @@ class Programme:
             f"rigid motions: {self.thresholds.max_rounds} cutting planes left a gap of {progress.best:.1e}"
         )
 
-    def ratio(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
-        """The largest λ with λ load·y <= f(y) on the cone, and the motion that limits it (None if none does).
-
-        (inf, None): no λ is too large; (-inf, y): none is small enough, for y forbids it. Dinkelbach's iteration:
-        λ only falls, each motion below the current plane lowers it; so the linear programmes stay bounded, and they
-        share their cuts.
-
-        Args:
-            f: the functional, with its cone.
-            load: its work on the basis motions, (k,).
-            least: works of at most this size for a unit motion count as none.
-
-        Raises:
-            SolverError: the gap between value and bound does not close.
-        """
-        start = self.minimise(f.unresisted().minus(load), ball(self.frame))
-        if start is None or -start.value <= least:
-            return without_limit(self.minimise(f, idle(self.frame, load)), least)
-        factor, limit = self.evaluate(f, start.y) / -start.value, start.y
-        active, progress = _seeds(f.cone), GapHistory(self.scale, self.thresholds)
-        for _ in range(self.thresholds.max_rounds):
-            found = self._solve(f.minus(load, factor), ball(self.frame), active)
-            if found is None or progress.done(-found.lower):
-                return factor, limit
-            if not self._violated(f.cone, found.y, active):
-                value, work = self.evaluate(f, found.y), float(load @ found.y)
-                if work <= least and value - factor * work < -self.thresholds.rounding * self.scale:
-                    return -np.inf, found.y
-                if work > least and value < factor * work:
-                    factor, limit = value / work, found.y
-            self._cut_towards(found.y, limit)
-        raise SolverError(f"rigid motions: no load factor after {self.thresholds.max_rounds} cutting planes")
-
     def _cut(self, y: Array) -> None:
         for integral, cuts in zip(self.integrals, self.cuts, strict=True):
             cuts.append(integral.subgradient(y))
@@ -330,21 +287,17 @@ class Programme:
         self.solved += 1
         if self.frame.shape[1] == 1:
             return self._solve_line(f, region)
-        # Imported here: it takes longer than the whole analysis of a kernel with one motion, that needs none.
-        from scipy.optimize import linprog
-
         c, a_ub, b_ub = self._rows(f, region, active)
         size = float(np.abs(c).max()) or 1.0
         k, a_eq = len(f.linear), np.zeros((len(region.equal), len(c)))
         a_eq[:, :k] = region.equal
         bounds = [(None, None)] * k + [(0.0, None)] * (len(c) - k)
-        for options in self.thresholds.solver_options():
-            result = linprog(c / size, a_ub, b_ub, a_eq, region.value, bounds, "highs-ds", options=options)
-            if result.status == 2:
-                return None
-            if result.status == 0:
-                return Minimum(result.fun * size, np.asarray(result.x[:k]), result.fun * size)
-        raise SolverError(f"HiGHS on the rigid motions: {result.message}")
+        found = self.thresholds.linear_programme(c / size, a_ub, b_ub, a_eq, region.value, bounds)
+        if found.status == 2:
+            return None
+        if found.status != 0:
+            raise SolverError(f"HiGHS on the rigid motions: {found.message}")
+        return Minimum(found.fun * size, np.asarray(found.x[:k]), found.fun * size)
 
     def _rows(self, f: Functional, region: Region, active: list[int]) -> tuple[Array, Array, Array]:
         """Cost and inequality rows of the cut model in (y, one height for each part with factor > 0).

@@ -144,14 +144,8 @@ class _CutModel:
         )
 
     def _solve(self, cost: Array, rows: Array, limits: Array, bounds: list[tuple[float | None, float | None]]) -> Any:
-        # Imported here: it takes longer than the analysis of a scene that needs no linear programme.
-        from scipy.optimize import linprog
-
-        for options in self.thresholds.solver_options():
-            found = linprog(cost, rows, limits, bounds=bounds, method="highs-ds", options=options)
-            if found.status == 0:
-                return found
-        return None
+        found = self.thresholds.linear_programme(cost, rows, limits, None, None, bounds)
+        return found if found.status == 0 else None
 
     def rest(self, a: Array, reactions: Array) -> Rest:
         """The position, and the sides that bear the load: the largest reactions first.

@@ -10,13 +10,14 @@ from typing import TypeVar, cast
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import HviError, InputError, SolverError
+from ..errors import InputError, SolverError
+from ..runtime.mpi import on_root
 from ..typing import Array
 from .branch_and_bound import GlobalProgramme
 from .cutting_planes import Functional, Minimum, Programme, Region, ball, cross, vertices
 from .motions import Mode, mode_of, modes, natural_basis, null_space, triangle
 from .reduction import ReducedProblem, RigidProblem, reduce
-from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to, undecided, unmovable
+from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to, undecided
 from .thresholds import DEFAULT, RigidThresholds
 
 
@@ -247,7 +248,8 @@ def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds =
         problem: the body and what it meets.
         thresholds: what counts as zero, and when to give up.
     """
-    return _judged(comm, problem, thresholds, unmovable(), lambda found: _verdict(problem, found))
+    held = Solvability(state="held", paper=PaperConditions(0.0, None))  # no motion is left: held under any load
+    return _judged(comm, problem, thresholds, held, lambda found: _verdict(problem, found))
 
 
 def gives_way(comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds = DEFAULT) -> bool:
@@ -311,18 +313,6 @@ def _judged(
 ) -> Result:
     """What the work finds of the reduced problem; the given result where no rigid motion is left. Collective."""
     basis, reduced = reduce(comm, problem, thresholds)
-    return unmoved if basis.shape[1] == 0 else _on_root(comm, reduced, work)
-
-
-def _on_root(comm: MPI.Comm, reduced: ReducedProblem | None, work: Callable[[ReducedProblem], Result]) -> Result:
-    """Do the work on the rank that holds the data and send the result, or its error, to all ranks."""
-    outcome: Result | HviError | None = None
-    if reduced is not None:
-        try:
-            outcome = work(reduced)
-        except HviError as error:
-            outcome = error
-    outcome = comm.bcast(outcome, root=0)
-    if isinstance(outcome, HviError):
-        raise outcome
-    return cast(Result, outcome)
+    if basis.shape[1] == 0:
+        return unmoved
+    return on_root(comm, lambda: work(cast(ReducedProblem, reduced)))

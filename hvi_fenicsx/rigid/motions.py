@@ -36,12 +36,6 @@ class RigidBody:
     name: str = ""
     index: int = 0
 
-    def __post_init__(self) -> None:
-        if self.dimension not in (2, 3):
-            raise ValueError(f"a body has 2 or 3 dimensions, not {self.dimension}")
-        if np.shape(self.centre) != (3,):
-            raise ValueError(f"the centre of a body is a point (3,), not an array {np.shape(self.centre)}")
-
     @property
     def motions(self) -> int:
         """Number of rigid motions: 3 in 2D, 6 in 3D."""
@@ -171,16 +165,6 @@ Places = Array | MotionFields
 """Points (m, 3) of one body, nondimensional, or the motions there."""
 
 
-def is_place(places: Places, count: int) -> bool:
-    """Whether these are so many places.
-
-    Args:
-        places: points or motions.
-        count: their number.
-    """
-    return len(places) == count and (isinstance(places, MotionFields) or np.shape(places) == (count, 3))
-
-
 @dataclass(frozen=True)
 class Mode:
     """A rigid motion of one body, or of bodies that meet.
@@ -251,10 +235,6 @@ class FixedDirections:
 
     points: Places
     directions: Array
-
-    def __post_init__(self) -> None:
-        if np.ndim(self.directions) != 2 or not is_place(self.points, len(self.directions)):
-            raise ValueError("FixedDirections needs points (k, 3) and directions (k, d) with the same k")
 
 
 def kernel(

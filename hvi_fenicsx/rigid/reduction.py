@@ -17,7 +17,7 @@ from ..laws import Length
 from ..laws.convex_parts import Directional
 from ..typing import Array
 from .cutting_planes import Functional, SlipIntegral, merged
-from .motions import NEGLIGIBLE, FixedDirections, Mode, MotionFields, Movable, Places, fields_at, is_place, kernel
+from .motions import NEGLIGIBLE, FixedDirections, Mode, MotionFields, Movable, Places, fields_at, kernel
 from .thresholds import DEFAULT, RigidThresholds
 
 
@@ -32,10 +32,6 @@ class ContactCone:
 
     points: Places
     normals: Array
-
-    def __post_init__(self) -> None:
-        if np.ndim(self.normals) != 2 or not is_place(self.points, len(self.normals)):
-            raise ValueError("ContactCone needs points (m, 3) and normals (m, d) with the same m")
 
 
 def _linear_part(law: Directional) -> float:
@@ -74,9 +70,6 @@ class Resistance:
     length: Length | None = None
 
     def __post_init__(self) -> None:
-        m = len(self.weights)
-        if not is_place(self.points, m) or np.ndim(self.directions) != 3 or len(self.directions) != m:
-            raise ValueError("Resistance needs points (m, 3), weights (m,), directions (m, r, d), one m")
         values = (self.growth.minus, self.growth.plus, self.peak.minus, self.peak.plus)
         if not all(value > -np.inf for value in values):  # also refuses nan
             raise InputError(f"growth and peak of a law are numbers or +inf, not {values}")
@@ -111,8 +104,6 @@ class RigidProblem:
 
     def __post_init__(self) -> None:
         for name, work in self.loads.items():
-            if np.shape(work) != (self.body.motions,):
-                raise ValueError(f"load {name!r} needs {self.body.motions} numbers, one for each rigid motion")
             if not np.isfinite(work).all():
                 raise InputError(f"load {name!r}: its work on a rigid motion is not finite")
 

@@ -30,11 +30,6 @@ class PaperConditions:
     tie: float = 0.0
 
     @property
-    def obtuse(self) -> bool:
-        """(A2s)(i) or (ii): the load makes an obtuse angle with every direction of escape."""
-        return self.margin is None or self.margin > 0.0
-
-    @property
     def satisfied(self) -> bool:
         """(A2s)(i) or (iii): the paper's Theorem 1 asserts a solution."""
         return self.margin is None or (self.margin > 0.0 and self.margin > self.c + self.tie)
@@ -105,15 +100,15 @@ class Solvability:
     """
 
     state: ExistenceState
-    margin: float | None
-    lambda_held: float
-    lambda_peak: float
-    direction: Mode | None
-    critical: Mode | None
-    kernel: tuple[Mode, ...]
-    loose: tuple[Mode, ...]
-    free: tuple[Mode, ...]
     paper: PaperConditions
+    margin: float | None = None
+    lambda_held: float = np.inf
+    lambda_peak: float = np.inf
+    direction: Mode | None = None
+    critical: Mode | None = None
+    kernel: tuple[Mode, ...] = ()
+    loose: tuple[Mode, ...] = ()
+    free: tuple[Mode, ...] = ()
     held_from: float = -np.inf
     trouble: str = ""
 
@@ -138,22 +133,6 @@ class Solvability:
         }
 
 
-def unmovable() -> Solvability:
-    """The verdict on a body whose conditions leave no rigid motion: coercive, held under any load."""
-    return Solvability(
-        state="held",
-        margin=None,
-        lambda_held=np.inf,
-        lambda_peak=np.inf,
-        direction=None,
-        critical=None,
-        kernel=(),
-        loose=(),
-        free=(),
-        paper=PaperConditions(0.0, None),
-    )
-
-
 def undecided(kernel: tuple[Mode, ...], c: float, trouble: str) -> Solvability:
     """No verdict. Solving may show more, since a certificate needs no verdict.
 
@@ -164,14 +143,9 @@ def undecided(kernel: tuple[Mode, ...], c: float, trouble: str) -> Solvability:
     """
     return Solvability(
         state="undecided",
-        margin=None,
         lambda_held=np.nan,
         lambda_peak=np.nan,
-        direction=None,
-        critical=None,
         kernel=kernel,
-        loose=(),
-        free=(),
         paper=PaperConditions(c, np.nan),
         trouble=trouble,
     )

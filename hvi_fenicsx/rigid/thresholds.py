@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -50,14 +51,25 @@ class RigidThresholds:
         tenths = round(np.log10(self.dropped / self.rounding))
         return [self.dropped / 10.0**k for k in range(tenths)]
 
-    def solver_options(self) -> list[dict[str, Any]]:
-        """The options of HiGHS, the narrowest first; where rounding leaves it without a verdict, the next."""
+    def linear_programme(self, *problem: Any) -> Any:
+        """What HiGHS finds, its options narrow at first, wider where rounding leaves it without a verdict.
+
+        Args:
+            *problem: as for ``scipy.optimize.linprog``, up to the bounds.
+
+        Returns:
+            Its result: the status is 0 where a minimum was found, 2 where nothing is admissible.
+        """
+        # Imported here: it takes longer than the analysis of a scene that needs no linear programme.
+        from scipy.optimize import linprog
+
         names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
-        return [
-            {"presolve": presolve, **dict.fromkeys(names, tolerance)}
-            for tolerance in (self.exact, self.rounding)
-            for presolve in (False, True)
-        ]
+        for tolerance, presolve in product((self.exact, self.rounding), (False, True)):
+            options = {"presolve": presolve, **dict.fromkeys(names, tolerance)}
+            found = linprog(*problem, method="highs-ds", options=options)
+            if found.status in (0, 2):
+                break
+        return found
 
 
 DEFAULT = RigidThresholds()

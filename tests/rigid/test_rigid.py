@@ -189,7 +189,6 @@ def test_the_papers_condition_is_the_conservative_one() -> None:
     verdict = analyse(ALONE, wall(1.0, (friction,)))
     assert verdict.state == "held"
     assert verdict.paper.c == pytest.approx(1.5, abs=1e-12)
-    assert verdict.paper.obtuse
     assert not verdict.paper.satisfied
     assert analyse(ALONE, wall(2.0, (friction,))).paper.satisfied
 
