@@ -6,7 +6,6 @@ Isotropic, orthotropic by engineering constants along the axes, or by the whole 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -15,7 +14,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..geometry import ROUNDING
-from ..schema import Finite, Positive, refusal
+from ..schema import Finite, Names, Positive, refusal
 from ..typing import Array
 from .base import Effect, FormContext, Place, Sides, from_python
 from .contribution import Averaged, Contribution
@@ -52,10 +51,25 @@ class Elasticity(Effect):
 
     place: ClassVar[Place] = Place.MATERIAL
 
-    model: Plane | None
-    """the kind of elastic problem; the paper uses plane_stress"""
+    region: Annotated[Names | None, Field(exclude=True)] = None
+    """a physical group of cells, or a list of them; required if there are several materials"""
+    model: Plane | None = None
+    """the kind of elastic problem, required in a scene; the paper uses plane_stress"""
     thermal_expansion: Finite = 0.0
     """the coefficient α of thermal expansion, 1/K; used by `temperature` in a body table"""
+
+    @from_python
+    def __init__(self, **keys: Any) -> None:
+        self._make(keys.get("region"), **keys)
+
+    def model_post_init(self, context: Any) -> None:
+        """Its place is its region."""
+        self._where = self.region
+
+    @override
+    def at(self, where: Sides | None, name: str = "") -> Self:
+        placed = super().at(where, name)
+        return placed.model_copy(update={"region": placed.where})
 
     @override
     def fitted(self, dimension: int) -> Self:
@@ -126,19 +140,6 @@ class Isotropic(Elasticity):
     """Young's modulus E, N/m²"""
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
     """Poisson's ratio ν, between -1 and 0.5"""
-
-    @from_python
-    def __init__(
-        self,
-        *,
-        youngs_modulus: float,
-        poisson_ratio: float,
-        model: Plane | None = None,
-        thermal_expansion: float = 0.0,
-        region: Sides | None = None,
-    ) -> None:
-        keys = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio}
-        self._make(region, model=model, thermal_expansion=thermal_expansion, **keys)
 
     def lame(self) -> tuple[float, float]:
         """λ of the trace term and 2μ, N/m²; plane stress uses the paper's Eν/(1-ν²)."""
@@ -247,20 +248,6 @@ class Orthotropic(_ByMatrix):
     shear_moduli: Numbers
     """shear moduli G12, G13, G23, N/m²; plane models have G12 only"""
 
-    @from_python
-    def __init__(
-        self,
-        *,
-        youngs_moduli: Sequence[float],
-        poisson_ratios: Sequence[float],
-        shear_moduli: Sequence[float],
-        model: Plane | None = None,
-        thermal_expansion: float = 0.0,
-        region: Sides | None = None,
-    ) -> None:
-        keys = {"youngs_moduli": youngs_moduli, "poisson_ratios": poisson_ratios, "shear_moduli": shear_moduli}
-        self._make(region, model=model, thermal_expansion=thermal_expansion, **keys)
-
     @model_validator(mode="after")
     def _fits(self) -> Orthotropic:
         if self.model is None:
@@ -316,17 +303,6 @@ class Anisotropic(_ByMatrix):
 
     matrix: Rows
     """C in N/m², a list of rows: 3 rows in 2D (order 11, 22, 12), 6 rows in 3D (order 11, 22, 33, 23, 13, 12)"""
-
-    @from_python
-    def __init__(
-        self,
-        *,
-        matrix: Sequence[Sequence[float]],
-        model: Plane | None = None,
-        thermal_expansion: float = 0.0,
-        region: Sides | None = None,
-    ) -> None:
-        self._make(region, matrix=matrix, model=model, thermal_expansion=thermal_expansion)
 
     @model_validator(mode="after")
     def _fits(self) -> Anisotropic:

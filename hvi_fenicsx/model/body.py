@@ -8,6 +8,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -43,6 +44,9 @@ class Body:
             with facets inside of the body.
     """
 
+    pieces: Mapping[str, BoundaryPart] = MappingProxyType({})
+    interfaces: Mapping[str, InterfaceSides] = MappingProxyType({})
+
     def __init__(
         self,
         mesh: dmesh.Mesh,
@@ -62,12 +66,8 @@ class Body:
         within = None if regions is None else _by_name("regions", regions)
         sides, within = _sorted_out(mesh, facets, cells, named, within)
         domain = given.domain_of(mesh, facets, cells, sides, within)
-        self._set(GivenMesh(shape="given mesh", given=domain), mesh.comm)
-
-    def _set(self, shape: DomainShape, comm: MPI.Comm | None) -> None:
-        self.shape, self.comm = shape, comm
-        self.pieces: Mapping[str, BoundaryPart] = {}
-        self.interfaces: Mapping[str, InterfaceSides] = {}
+        self.shape: DomainShape = GivenMesh(shape="given mesh", given=domain)
+        self.comm: MPI.Comm | None = mesh.comm
 
     @classmethod
     def from_shape(cls, shape: DomainShape, comm: MPI.Comm | None = None) -> Self:
@@ -86,7 +86,7 @@ class Body:
     @classmethod
     def _of(cls, shape: DomainShape, comm: MPI.Comm | None) -> Self:
         body = cls.__new__(cls)
-        body._set(shape, comm)
+        body.shape, body.comm = shape, comm
         return body
 
     @classmethod

@@ -111,7 +111,7 @@ class Model(Content):
             old = changed[position]
             placed = self._placed(one) if not self.from_file else one.fitted(self.dimension)
             changed[position] = placed.at(old.where if self.from_file else placed.where, old.name)
-        return self._copy()._checked(changed)
+        return self._with(changed)
 
     def _position(self, wanted: Effect) -> int:
         """The number of the effect that another one stands for."""
@@ -125,17 +125,12 @@ class Model(Content):
         where = in_words(tuple(sorted(places)))
         raise InputError(f"replace: the model has {count} {wanted.key} on {where}; it has {known}")
 
-    def _copy(self) -> Self:
-        """A model like it, to be changed and checked."""
+    def _with(self, effects: Iterable[Effect], **changes: Any) -> Self:
+        """A model like it with other effects and attributes, checked."""
         model = self.__new__(type(self))
-        model.__dict__.update(self.__dict__)
+        model.__dict__.update(self.__dict__, **changes)
+        model._complete(effects, self.parts)
         return model
-
-    def _checked(self, effects: Iterable[Effect]) -> Self:
-        """Itself with other effects, checked."""
-        own = {name: part for name, part in self.parts.items() if name not in self.body.interfaces}
-        self._complete(effects, own)
-        return self
 
     def changed(
         self,
@@ -150,10 +145,8 @@ class Model(Content):
             solver: how to solve.
             path: the load path.
         """
-        model = self._copy()
-        model.body = self.body if domain is None else self.body.with_shape(domain)
-        model.solver, model.path = solver or self.solver, path or self.path
-        return model._checked(self.effects)
+        body = self.body if domain is None else self.body.with_shape(domain)
+        return self._with(self.effects, body=body, solver=solver or self.solver, path=path or self.path)
 
     def with_domain(self, **values: Any) -> Self:
         """The model with other values in ``[domain]``, validated again. Not collective.
@@ -162,7 +155,7 @@ class Model(Content):
             **values: the new values by their keys.
 
         Raises:
-            ValidationError: the values are not allowed.
+            InputError: the values are not allowed.
         """
         return self.changed(domain=self.domain.changed(**values))
 
@@ -173,7 +166,7 @@ class Model(Content):
             **values: the new values by their keys.
 
         Raises:
-            ValidationError: the values are not allowed, or do not fit the others.
+            InputError: the values are not allowed, or do not fit the others.
         """
         return self.changed(solver=self.solver.changed(**values))
 

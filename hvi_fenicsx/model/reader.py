@@ -133,8 +133,6 @@ class MaterialTable(Table):
 
     place: ClassVar[Place] = Place.MATERIAL
 
-    region: Names | None = None
-    """a physical group of cells, or a list of them; required if there are several materials"""
     elasticity: str = DEFAULT_ELASTICITY
     """the elastic law: its name is one of those below"""
 
@@ -146,13 +144,14 @@ def _material(data: Any, info: ValidationInfo) -> Effect:
     kinds, named = Effect.registry[Place.MATERIAL], data.get("elasticity", DEFAULT_ELASTICITY)
     if not isinstance(named, str) or named not in kinds:
         raise validation_error([Mistake(("elasticity",), unknown("elasticity", named, kinds))])
-    own = [key for key in MaterialTable.model_fields if key in data]
-    rest = {key: value for key, value in data.items() if key not in own}
-    allowed = [*kinds[named].model_fields, *MaterialTable.model_fields]
-    if wrong := [Mistake((key,), unknown("key", key, allowed)) for key in rest if key not in allowed]:
+    allowed = [*kinds[named].model_fields, "elasticity"]
+    if wrong := [Mistake((key,), unknown("key", key, allowed)) for key in data if key not in allowed]:
         raise validation_error(wrong)
-    region = MaterialTable.model_validate({key: data[key] for key in own}).region
-    return kinds[named].model_validate(rest, context=info.context).at(region)
+    rest = {key: value for key, value in data.items() if key != "elasticity"}
+    found = kinds[named].model_validate(rest, context=info.context)
+    if getattr(found, "model", "") is None:
+        raise validation_error([Mistake(("model",), "is missing: the kind of elastic problem, such as plane_stress")])
+    return found
 
 
 def _shape(value: Any, info: ValidationInfo) -> Any:

@@ -71,9 +71,8 @@ REFUSED = {
     "unknown key": (
         "poisson_ratio",
         "colour = 3\npoisson_ratio",
-        's.toml:9: material.colour: unknown key "colour"; allowed: model, thermal_expansion, '
-        "youngs_modulus, poisson_ratio, region, "
-        "elasticity",
+        's.toml:9: material.colour: unknown key "colour"; allowed: region, model, '
+        "thermal_expansion, youngs_modulus, poisson_ratio, elasticity",
     ),
     "misspelt side": (
         '"bottom"',
