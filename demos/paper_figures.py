@@ -154,7 +154,8 @@ def draw_curves(path: Path, wall: str, runs: Runs, numbers: dict[str, float]) ->
     """Figure 4 or 5: (a) u1 and (b) -σ_t on Γc, smoothed on the left, the law itself on the right."""
     from hvi_fenicsx.report.pictures.style import figure, save
 
-    drawing = figure(9.3)
+    drawing = figure(8.35)
+    drawing.set_layout_engine("none")
     panels = drawing.subplots(2, 2, sharex=True, sharey="row")
     drawing.subplots_adjust(left=0.11, right=0.97, top=0.86, bottom=0.285, hspace=0.26, wspace=0.08)
     for column, (solver, title) in enumerate(COLUMNS.items()):
@@ -192,7 +193,8 @@ def draw_bodies(path: Path, wall: str, runs: Runs, numbers: dict[str, float]) ->
     from hvi_fenicsx.report.units import round_below, thousands
 
     factor = round_below(0.1 / max(float(np.abs(run.displacement).max()) for run in runs.values()))
-    drawing = figure(9.9)
+    drawing = figure(8.95)
+    drawing.set_layout_engine("none")
     panels = drawing.subplots(2, 2, sharex=True, sharey=True)
     drawing.subplots_adjust(left=0.095, right=0.98, top=0.9, bottom=0.205, hspace=0.16, wspace=0.06)
     for axes, cells in zip(panels.flat, CELLS, strict=True):

@@ -20,7 +20,7 @@ from ..load_paths.following import Control, PathRun
 from ..model import Model, PathTable, SolverTable
 from ..model.argument_checks import require_path
 from ..paths.load_path import LoadPath
-from ..report.searches import PathResult
+from ..report.reader import PathResult
 from ..results import ResultFolder, path_files
 from ..results.output_folder import existing
 from ..runtime import log

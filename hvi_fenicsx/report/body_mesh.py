@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -48,34 +48,11 @@ class BodyMesh:
     @cached_property
     def volumes(self) -> Array:
         """Area (m²) or volume (m³) of each cell, (c,)."""
-        return np.abs(self._signed_volumes(self.points))
-
-    def kept(self, points: Array) -> Array:
-        """The part of its area or volume that each piece keeps where its vertices are elsewhere.
-
-        Args:
-            points: where they are, m, (n, 3).
-        """
-        moved = np.sign(self._signed_volumes(self.points)) * self._signed_volumes(points)
-        return np.asarray(np.bincount(self.pieces, moved) / np.bincount(self.pieces, self.volumes))
-
-    def _signed_volumes(self, points: Array) -> Array:
-        """Area (m²) or volume (m³) of each cell, (c,); it changes its sign where a cell is turned inside out."""
         first, *others = self.cells.T
-        sides = [points[other] - points[first] for other in others]
-        crossed = np.cross(sides[0], sides[1])
-        return np.asarray(crossed[:, 2] / 2 if self.dimension == 2 else np.sum(crossed * sides[2], axis=1) / 6)
-
-    @cached_property
-    def pieces(self) -> Integers:
-        """The number of the piece that each cell is in, (c,): pieces share no vertex."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        first, *others = self.cells.T
-        ends = np.tile(first, len(others)), np.concatenate(others)
-        graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(self.points),) * 2)
-        return np.unique(connected_components(graph, directed=False)[1][first], return_inverse=True)[1]
+        sides = np.stack([self.points[other] - self.points[first] for other in others], axis=1)
+        if self.dimension == 2:
+            return np.asarray(np.abs(np.cross(sides[:, 0], sides[:, 1])[:, 2]) / 2)
+        return np.asarray(np.abs(np.linalg.det(sides)) / 6)
 
     @property
     def boundary(self) -> Integers:
@@ -151,24 +128,19 @@ class BodyMesh:
         """The body that the escape mode moves, one of several: it leaves a point or an axis at rest, but no cell."""
         assert self.escape_mode is not None
         moves = np.any(self.escape_mode != 0.0, axis=1)
-        cells = self.cells[np.any(moves[self.cells], axis=1)]
-        kept, numbered = np.unique(cells, return_inverse=True)
-        return BodyMesh(
-            points=self.points[kept], cells=numbered.reshape(cells.shape), escape_mode=self.escape_mode[kept]
-        )
+        return replace(self, cells=self.cells[np.any(moves[self.cells], axis=1)])
 
 
 def body_mesh(arrays: SolutionArrays) -> BodyMesh:
     """The body of a solution."""
     fields = (arrays.displacement, arrays.escape_mode)
     displacement, escape_mode = (None if field is None else _in_space(field) for field in fields)
-    stress = None if arrays.von_mises is None else arrays.von_mises.astype(np.float64)
     return BodyMesh(
         points=_in_space(arrays.points),
         cells=arrays.cells,
         displacement=displacement,
         escape_mode=escape_mode,
-        von_mises=stress,
+        von_mises=None if arrays.von_mises is None else arrays.von_mises.astype(np.float64),
     )
 
 

@@ -18,16 +18,18 @@ import numpy as np
 
 from ..errors import ExitCode
 from ..runtime import manifest, writing
-from . import png_file, reader, searches, units
+from . import reader, units
 from .contact_part import ContactPart
 from .errors import ResultError
 from .reader import Result
-from .rounding import unless_noise
+from .units import unless_noise
 
 if TYPE_CHECKING:
     import jinja2
 
 NAME = "report.html"
+CAPTION = "Description"
+"""The keyword of a picture's caption among its file's texts; it is one of the PNG standard's."""
 MOST = 100
 """Equilibria in the table, those of lowest energy."""
 _FIRST = ("escape", "scene", "body", "stress", "work_precision", "error_h", "error_epsilon", "time")
@@ -44,10 +46,10 @@ def write(folder: Path) -> Path:
         NotWrittenError: the page cannot be written.
     """
     result = reader.read(folder)
-    headline = dict(zip(("kind", "words"), _headline(result), strict=True))
+    kind, words = _headline(result)
     contact = [{"name": part.name, "rows": list(contact_rows(part))} for part in result.parts]
-    given = {"verdict": headline, "contact": contact, "forces": _forces(result), "reproduce": _reproduce(result)}
-    return _page("run.html.j2", folder, result=result, **given)
+    given = {"contact": contact, "forces": _forces(result), "reproduce": _reproduce(result)}
+    return _page("run.html.j2", folder, result=result, verdict={"kind": kind, "words": words}, **given)
 
 
 def write_path(folder: Path) -> Path:
@@ -57,7 +59,7 @@ def write_path(folder: Path) -> Path:
         ResultError: no load path is there, or its files are damaged.
         NotWrittenError: the page cannot be written.
     """
-    result = searches.read_path(folder)
+    result = reader.read_path(folder)
     forces = {
         part: {**found, "force": [unless_noise(f, result.largest_force) for f in found["force"]]}
         for part, found in result.path["peak_forces"].items()
@@ -72,7 +74,7 @@ def write_equilibria(folder: Path) -> Path:
         ResultError: no search is there, or its files are damaged.
         NotWrittenError: the page cannot be written.
     """
-    return _page("equilibria.html.j2", folder, result=searches.read_equilibria(folder), most=MOST)
+    return _page("equilibria.html.j2", folder, result=reader.read_equilibria(folder), most=MOST)
 
 
 def write_study(folder: Path) -> Path:
@@ -160,17 +162,20 @@ def _pictures(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def _picture(path: Path) -> dict[str, Any]:
-    raw = path.read_bytes()
-    width, height = png_file.size(raw)
-    data = f"data:image/png;base64,{base64.b64encode(raw).decode()}"
-    return {"caption": png_file.caption(raw) or path.stem, "data": data, "width": width, "height": height}
+    from PIL import Image
+
+    with Image.open(path) as image:
+        (width, height), caption = image.size, image.info.get(CAPTION) or path.stem
+    data = f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"
+    return {"caption": caption, "data": data, "width": width, "height": height}
 
 
 def _headline(result: Result) -> tuple[str, str]:
     """Whether the answer is good news (``good``, ``limited`` or ``bad``), and the answer in one line."""
     code, state = result.summary.get("exit_code"), result.solvability.get("state")
     if result.certified and result.coarse:
-        return "limited", f"Certified on a coarse mesh: {_rough(result.summary['estimate'])}."
+        rough = "its numbers are rough; refine the mesh, or ask `hvi run` for an --accuracy"
+        return "limited", f"Certified on a coarse mesh: the estimated error is large, so {rough}."
     if result.certified and state == "held":
         return "good", "A solution exists, was found, and is certified."
     if result.certified:
@@ -181,15 +186,6 @@ def _headline(result: Result) -> tuple[str, str]:
         return "bad", "The run was interrupted: what is shown is not a solution."
     off = " The body is carried off; `hvi path` finds the last state that is borne." if result.carried_off else ""
     return "bad", f"No certified solution: {result.summary.get('reason')}.{off}"
-
-
-def _rough(found: Mapping[str, Any]) -> str:
-    """The mesh's error in words."""
-    norm, part = found.get("energy_norm"), found.get("discretisation")
-    size = f"{units.percent(part / norm)} of the solution" if norm and part is not None else "as large as the solution"
-    return (
-        f"the estimated error is {size}, so its numbers are rough; refine the mesh, or ask `hvi run` for an --accuracy"
-    )
 
 
 def contact_rows(part: ContactPart) -> Iterator[tuple[str, str]]:

@@ -1,32 +1,32 @@
-"""A finished result folder: the scene, the summary, the body and the parts of Γc. Read from its files alone."""
+"""The finished folders of a result, a load path and a search of all equilibria. Read from their files alone."""
 
 from __future__ import annotations
 
+import csv
 import json
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import HviError
-from ..formula import Formula
-from ..typing import Array, Integers
+from ..typing import Array, Integers, Mask
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
 from .contact_part import ContactPart
 from .errors import ResultError
-from .rounding import without_noise
 from .solution_arrays import SolutionArrays
+from .units import ROUNDING
 
-if TYPE_CHECKING:
-    from ..laws import Superpotential
-
-FAR = 10.0
-"""A body that was not certified, and moved by so many times its size, is on its way off."""
+Row = Mapping[str, str]
+"""The cells of a row by the names of the columns."""
+_WORDS = frozenset({"event", "part"})
+"""Columns of a path that are no numbers."""
+_STRESSES = ("sigma_n", "friction_t1", "friction_t2")
+_DISPLACEMENTS = ("u_n", "u_t1", "u_t2", "gap")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +55,9 @@ class Finished:
         return f"{reason[:1].upper()}{reason[1:]}"
 
 
+F = TypeVar("F", bound=Finished)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Result(Finished):
     """A finished result.
@@ -74,17 +77,17 @@ class Result(Finished):
 
     @cached_property
     def carried_off(self) -> bool:
-        """Whether what was found is a body far away from where it was: no state that anyone wants to see."""
+        """Whether what was found is no equilibrium but a body on its way off, by more than its size."""
         found = self.arrays.displacement
         if self.certified or found is None:
             return False
-        return bool(np.max(np.abs(found)) > FAR * np.max(np.ptp(self.arrays.points, axis=0)))
+        return bool(np.max(np.abs(found)) > np.max(np.ptp(self.arrays.points, axis=0)))
 
     @cached_property
     def parts(self) -> tuple[ContactPart, ...]:
         """The parts of Γc, in the order of ``contact.csv``; none where the body is carried off."""
         found = {} if self.carried_off else self.arrays.parts
-        return tuple(replace(part, columns=without_noise(part.columns, self.body)) for part in found.values())
+        return tuple(map(self._without_noise, found.values()))
 
     @property
     def sides(self) -> Mapping[str, Integers]:
@@ -175,49 +178,125 @@ class Result(Finished):
         """
         return any(self._laws(part, direction) for direction in directions)
 
-    def law(self, part: str, direction: str = "slip") -> Superpotential | None:
-        """The law of a part, not smoothed.
-
-        Args:
-            part: the part's name.
-            direction: the displacement that it acts on: "slip", "opening" or "penetration".
-
-        Returns:
-            The law; None if the part has none or several, or one that only its author's program knows.
-        """
-        from .. import laws  # a tenth of a second, for the picture that asks
-
-        tables = self._laws(part, direction)
-        if len(tables) != 1:
-            return None
-        parameters = {key: value for key, value in tables[0].items() if key != "law"}
-        try:
-            return laws.create(tables[0]["law"], parameters)
-        except HviError:
-            return None
-
-    def multipliers(self, part: ContactPart, direction: str = "slip") -> tuple[Array, Array] | None:
-        """What tractions and lengths of a part's law are multiplied by at its vertices, (m,); None: not known.
-
-        Args:
-            part: the part.
-            direction: the displacement that the law acts on.
-        """
-        found = self._brought(part.name, direction)
-        if len(found) != 1:
-            return None
-        points = part.points.astype(np.float64)
-        try:
-            return Formula(found[0]["multiplier"]).at(points), Formula(found[0]["length_multiplier"]).at(points)
-        except HviError:
-            return None
-
     def _laws(self, part: str, direction: str) -> list[Mapping[str, Any]]:
         """The laws that act on a displacement of a part, as a scene writes them."""
-        return [law["law"] for law in self._brought(part, direction)]
+        laws = [law for role in self.roles(part) for law in role["laws"]]
+        return [law["law"] for law in laws if law["direction"] == direction]
 
-    def _brought(self, part: str, direction: str) -> list[Mapping[str, Any]]:
-        return [law for role in self.roles(part) for law in role["laws"] if law["direction"] == direction]
+    def _without_noise(self, part: ContactPart) -> ContactPart:
+        """A part whose columns are zero where they are rounding beside others, or beside the body's field."""
+        kept = dict(part.columns)
+        for names, field in ((_STRESSES, self.body.von_mises), (_DISPLACEMENTS, self.body.displacement)):
+            own = {name: _largest(kept[name]) for name in names if name in kept}
+            least = ROUNDING * max([*own.values(), 0.0 if field is None else _largest(field)], default=0.0)
+            kept |= {name: 0.0 * kept[name] for name, largest in own.items() if largest <= least}
+        return replace(part, columns=kept)
+
+
+def _largest(values: Array) -> float:
+    return float(np.nanmax(np.abs(values), initial=0.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathResult(Finished):
+    """A finished load path.
+
+    Attributes:
+        columns: the numbers of ``path.csv`` by their names, (rows,) each; NaN where a cell is empty.
+        events: its column ``event``, (rows,).
+    """
+
+    columns: Mapping[str, Array]
+    events: Sequence[str]
+
+    @property
+    def path(self) -> Mapping[str, Any]:
+        """The summary's entry."""
+        return dict(self.summary["path"])
+
+    @cached_property
+    def axes(self) -> str:
+        """The coordinates that the body has, as letters."""
+        return "xyz" if any(name.endswith(".fz") for name in self.columns) else "xy"
+
+    @cached_property
+    def stable(self) -> Mask:
+        """Which rows are stable, (rows,)."""
+        return np.asarray(self.columns["stable"] == 1.0)
+
+    @property
+    def largest_force(self) -> float:
+        """The largest component of a force on any part, N or N/m."""
+        return max((abs(f) for found in self.path["peak_forces"].values() for f in found["force"]), default=0.0)
+
+    @cached_property
+    def driven(self) -> str | None:
+        """The part that is drawn: of those that the factor drives the one whose force goes the longest way.
+
+        Where no force does, as under a moment, the one that moves most.
+        """
+        scaled = {str(name).rpartition(".")[0] for name in self.path["scaled"]}
+        parts = list(self.path["peak_forces"])
+        known = [part for part in parts if part in scaled] or parts
+        ways = {part: [float(np.max(np.abs(values))) for values in self.along(part)] for part in known}
+        largest = [max((way[k] for way in ways.values()), default=0.0) for k in (0, 1)]
+        done = max((u * force for u, force in ways.values()), default=0.0)
+        worked = done > ROUNDING * largest[0] * largest[1]
+        return max(known, key=lambda part: ways[part][0] * (ways[part][1] if worked else 1.0), default=None)
+
+    def along(self, part: str) -> tuple[Array, Array]:
+        """Mean displacement and force of a part in the direction of its largest force, (rows,) each.
+
+        Where no force acts on it, in that of its largest displacement.
+
+        Args:
+            part: its name.
+        """
+        forces, displacements = (
+            np.column_stack([self.columns[f"{part}.{kind}{axis}"] for axis in self.axes]) for kind in "fu"
+        )
+        leading = forces if np.any(forces) else displacements
+        sizes = np.linalg.norm(leading, axis=1)
+        strongest = leading[int(np.argmax(sizes))] / (np.max(sizes) or 1.0)
+        return displacements @ strongest, forces @ strongest
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquilibriaResult(Finished):
+    """A finished search.
+
+    Attributes:
+        rows: of ``equilibria.csv``, by energy.
+    """
+
+    rows: Sequence[Row]
+
+    @property
+    def known(self) -> Mapping[str, Any]:
+        """The summary's entry."""
+        return dict(self.summary["equilibria"])
+
+    @property
+    def energies(self) -> tuple[float, ...]:
+        """The energies of the equilibria, J/m or J."""
+        return tuple(float(row["energy"]) for row in self.rows)
+
+    @property
+    def unit(self) -> str:
+        """The unit of energy: J in space, where forces have three components."""
+        if not self.rows:
+            return "J/m"
+        own = _parsed(self.folder / self.rows[0]["folder"] / "summary.json", json.loads)["resultants"]
+        return "J" if any(len(force) > 2 for force in own.values()) else "J/m"
+
+    def state(self, row: Row) -> list[Row]:
+        """The rows of ``contact.csv`` of an equilibrium; none where there is neither contact nor law.
+
+        Args:
+            row: of :attr:`rows`.
+        """
+        file = self.folder / row["folder"] / "contact.csv"
+        return _rows(file) if file.exists() else []
 
 
 def read(folder: Path) -> Result:
@@ -226,26 +305,53 @@ def read(folder: Path) -> Result:
     Raises:
         ResultError: no result is there, or its files are damaged.
     """
-    scene, summary = _told(folder / "scene.toml", read_toml), _told(folder / "summary.json", read_json)
-    arrays = solution_arrays.load(folder / solution_arrays.FILE)
-    return Result(folder=folder, scene=scene, summary=summary, arrays=arrays)
+    return _read(folder, lambda words: Result(**words, arrays=solution_arrays.load(folder / solution_arrays.FILE)))
 
 
-def read_json(path: Path) -> dict[str, Any]:
-    """The entries of a file."""
-    return dict(json.loads(path.read_text(encoding="utf-8")))
+def read_path(folder: Path) -> PathResult:
+    """Read the folder of a load path.
+
+    Raises:
+        ResultError: no load path is there, or its files are damaged.
+    """
+
+    def made(words: dict[str, Any]) -> PathResult:
+        rows = _rows(folder / "path.csv")
+        numbers = [name for name in rows[0] if name not in _WORDS]
+        columns = {name: np.array([float(row[name] or "nan") for row in rows]) for name in numbers}
+        return PathResult(**words, columns=columns, events=[row["event"] for row in rows])
+
+    return _read(folder, made)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a file."""
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+def read_equilibria(folder: Path) -> EquilibriaResult:
+    """Read the folder of a search.
+
+    Raises:
+        ResultError: no search is there, or its files are damaged.
+    """
+    return _read(folder, lambda words: EquilibriaResult(**words, rows=_rows(folder / "equilibria.csv")))
 
 
-def _told(path: Path, read: Callable[[Path], dict[str, Any]]) -> dict[str, Any]:
-    """Read a file, or say in one line why it cannot be read."""
+def _parsed(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
+    """The entries of a file; an error that names it."""
     try:
-        return read(path)
+        return dict(parse(path.read_text(encoding="utf-8")))
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
+
+
+def _rows(path: Path) -> list[Row]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _read(folder: Path, make: Callable[[dict[str, Any]], F]) -> F:
+    """What is made of the words in a folder and of its other files, or one line on why that cannot be read."""
+    try:
+        scene, summary = _parsed(folder / "scene.toml", tomllib.loads), _parsed(folder / "summary.json", json.loads)
+        return make({"folder": folder, "scene": scene, "summary": summary})
     except OSError as error:
-        raise ResultError(f"{path}: {error.strerror or error}; this is no finished result folder") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise ResultError(f"{path}: damaged ({error})") from None
+        raise ResultError(f"{error.filename}: {error.strerror}; this is no finished result folder") from None
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise ResultError(f"{folder}: damaged ({error})") from None

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
+ROUNDING = 1e-9
+"""Values whose largest is so small a part of what is beside them are rounding."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,16 @@ def number(value: float, digits: int = 6) -> str:
     mantissa = (mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa).replace("-", "−")
     power = _power(int(exponent))
     return mantissa.replace("1", power) if mantissa in ("1", "−1") else f"{mantissa}·{power}"
+
+
+def unless_noise(value: float, beside: float) -> float:
+    """A value; zero where it is rounding.
+
+    Args:
+        value: it.
+        beside: the largest size of what is beside it.
+    """
+    return value if abs(value) > ROUNDING * beside else 0.0
 
 
 def percent(share: float) -> str:

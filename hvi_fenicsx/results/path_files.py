@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from dolfinx import fem
 
 from ..certify import certificate
@@ -39,21 +40,13 @@ def shown_rows(path: LoadPath, most: int) -> list[int]:
     """
     if not path.rows:
         return []
-    last = len(path.rows) - 1
+    last, chosen = len(path.rows) - 1, list[int]()
     marked = [n for n, row in enumerate(path.rows) if row.event in _SHOWN]
-    chosen = set(_evenly([*{*marked, path.peak, 0, last}], most))
-    for others in (path.folds, range(last + 1)):
-        rest = sorted(set(others) - chosen)
-        chosen.update(_evenly(rest, min(most - len(chosen), max(most // 2, 1) if others is path.folds else most)))
+    for rows in ([0, last, path.peak, *marked], path.folds, range(last + 1)):
+        rest, room = np.array(sorted({*rows} - {*chosen}), dtype=np.int64), most - len(chosen)
+        places = np.linspace(0, len(rest) - 1, min(len(rest), room)).round().astype(int)
+        chosen += rest[places].tolist()
     return sorted(chosen)
-
-
-def _evenly(rows: Sequence[int], most: int) -> list[int]:
-    """At most so many of some rows, evenly among them."""
-    ordered = sorted(rows)
-    if len(ordered) <= most:
-        return ordered
-    return [] if most < 1 else [ordered[round(i * (len(ordered) - 1) / max(most - 1, 1))] for i in range(most)]
 
 
 def write(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -27,8 +26,6 @@ from .vtk_files import Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
 _STRESSES = ("stress", "von_mises", "sigma_n", "friction_t1", "friction_t2", "inclusion_distance", "traction")
-_AT_ONCE = 16_384
-"""Rows that are rounded at a time: what fits a cache takes a third of the time."""
 _UNITS = dict.fromkeys(_LENGTHS, "m") | dict.fromkeys(_STRESSES, "N/m²")
 
 
@@ -69,11 +66,9 @@ def _strain_of_parts(problem: Problem, u: Array) -> Array:
     slopes: Array = np.asarray(lagrange.tabulate(1, nodes.middles_of_parts(space)[:, 1:]))[1:, :, :, 0]
     cells = nodes.owned_cells(space)
     found = np.zeros((len(cells), slopes.shape[1], 3, 3))
-    for start in range(0, len(cells), _AT_ONCE):
-        own = cells[start : start + _AT_ONCE]
-        positions, rises = (np.einsum("kpn,cni->cpki", slopes, v[own, :d]) for v in (problem.positions, u))
-        gradient = np.linalg.solve(positions, rises)
-        found[start : start + _AT_ONCE, :, :d, :d] = (gradient + gradient.swapaxes(2, 3)) / 2
+    positions, rises = (np.einsum("kpn,cni->cpki", slopes, v[cells, :d]) for v in (problem.positions, u))
+    gradient = np.linalg.solve(positions, rises)
+    found[:, :, :d, :d] = (gradient + gradient.swapaxes(2, 3)) / 2
     return found.reshape(-1, 3, 3)
 
 
@@ -95,10 +90,7 @@ def _in_parts(problem: Problem, values: npt.NDArray[Any]) -> Array:
 
 
 def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> None:
-    """Write fields at all local nodes and in the parts of the owned cells. Collective.
-
-    More than seven digits of the latter say nothing.
-    """
+    """Write fields at all local nodes and, in single precision, in the parts of the owned cells. Collective."""
     vtk_files.write(path, problem.domain.mesh.comm, _grid(problem, at_points, in_cells))
 
 
@@ -109,7 +101,7 @@ def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[st
         points=problem.positions[used],
         cells=cells,
         at_points={name: _spatial(values[used]) for name, values in at_points.items()},
-        in_cells={name: _rounded(values, 7) for name, values in in_cells.items()},
+        in_cells={name: _in_rows(values).astype(np.float32) for name, values in in_cells.items()},
         units=_units(problem),
     )
 
@@ -155,24 +147,9 @@ def _spatial(vectors: Array) -> Array:
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
-def _rounded(values: Array, digits: int) -> npt.NDArray[np.float32]:
-    """Values with so many digits beside the largest entry of their row, (c, ...), so that rounding is no value.
-
-    Tensors become rows of components, (c, k). The digits are binary, which takes half the time.
-    """
-    rows = values if values.ndim == 1 else values.reshape(len(values), math.prod(values.shape[1:]))
-    found = np.empty(rows.shape, dtype=np.float32)
-    for start in range(0, len(rows), _AT_ONCE):
-        own = slice(start, start + _AT_ONCE)
-        found[own] = _with_digits(rows[own], digits)
-    return found
-
-
-def _with_digits(rows: Array, digits: int) -> Array:
-    largest = functools.reduce(np.maximum, np.abs(rows).reshape(len(rows), -1).T)
-    size = np.where(largest > 0.0, largest, 1.0).reshape(-1, *[1] * (rows.ndim - 1))
-    unit = np.ldexp(1.0, math.ceil(digits * math.log2(10)) - np.frexp(size)[1])
-    return np.asarray(np.rint(rows * unit) / unit)
+def _in_rows(values: Array) -> Array:
+    """Values by cell, tensors as rows of components, (c, k)."""
+    return values.reshape(len(values), math.prod(values.shape[1:]))
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:

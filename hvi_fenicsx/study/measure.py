@@ -37,7 +37,7 @@ from .transfer import mesh_width
 
 PHASES = ("mesh", "assembly", "setup", "solve", "certificate")
 """What a point costs: compilation is paid once for all, and a study writes no results."""
-PATIENCE = 15
+PATIENCE = 15.0
 """Seconds after which no further repetition of a point begins."""
 _RECORDED = ("dofs", "converged", "reason", "exit_code", "energy", "epsilon", "iterations")
 """What is kept of a point's summary."""

@@ -15,8 +15,6 @@ from ..report.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, VERM
 from .errors import NORMS
 from .table import Row, Study, duration
 
-LEAST = 1e-6
-"""A smaller error is drawn on it."""
 _COLOURS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
 _PICTURES: Mapping[str, tuple[str, str]] = {
     "work_precision": ("seconds", "time to solution, without compilation and output"),
@@ -45,10 +43,9 @@ def _page(study: Study, along: str, label: str) -> Figure | None:
     drawn = study.headlines()[::-1]
     if not lines or not drawn:
         return None
-    fig = figure(1.4 + 2.9 * len(drawn))
+    fig = figure(0.5 + 2.9 * len(drawn))
     titled(fig, study.title or "untitled", f"error over {label}")
     panels = fig.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
-    fig.subplots_adjust(left=0.13, right=0.7, top=1 - 1.25 / fig.get_figheight(), bottom=0.75 / fig.get_figheight())
     for axes, quantity in zip(panels, drawn, strict=True):
         axes.set(xscale="log", yscale="log")
         for name, rows in lines.items():
@@ -57,8 +54,7 @@ def _page(study: Study, along: str, label: str) -> Figure | None:
         _dress(axes, study, quantity)
     _label(panels[-1].xaxis, duration if along == "seconds" else _decimal)
     handles = {text: line for axes in panels for line, text in zip(*axes.get_legend_handles_labels(), strict=True)}
-    place = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "frameon": False, "fontsize": 10}
-    panels[0].legend(handles.values(), handles.keys(), **place)
+    fig.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize=10)
     panels[-1].set_xlabel(label)
     return fig
 
@@ -81,7 +77,7 @@ def _lines(study: Study, along: str) -> dict[str, list[Row]]:
 
 def _line(axes: Axes, rows: list[Row], along: str, quantity: str, name: str) -> None:
     """Errors in the colour of the smoothing and with the marker of the degree; over time they are points alone."""
-    known = sorted((getattr(r, along), max(e, LEAST)) for r in rows if (e := r.error(quantity)) is not None)
+    known = sorted((getattr(r, along), e) for r in rows if (e := r.error(quantity)) is not None)
     marker = "D" if rows[0].method != "auto" else "o" if rows[0].degree == 1 else "s"
     (line,) = axes.plot([x for x, _ in known], [e for _, e in known], marker + ("" if along == "seconds" else "-"))
     line.set(color=_COLOURS.get(rows[0].smoothing, GREY), markersize=6, markeredgecolor="white", label=name)
@@ -91,12 +87,12 @@ def _beside(axes: Axes, study: Study, along: str, quantity: str) -> None:
     """The scene's own setting, a star; over time the front, over ε the exact law on the same mesh."""
     own, x, exact = study.own.error(quantity), getattr(study.own, along), study.exact.error(quantity)
     if own is not None and x:
-        axes.plot(x, max(own, LEAST), "*", ms=18, mfc="none", mec=INK, mew=1.5, zorder=6, label="the scene's own")
+        axes.plot(x, own, "*", ms=18, mfc="none", mec=INK, mew=1.5, zorder=6, label="the scene's own")
     if along == "seconds" and (front := study.front(quantity)):
-        points = [(r.seconds, max(r.error(quantity) or 0.0, LEAST)) for r in front]
+        points = [(r.seconds, r.error(quantity)) for r in front]
         axes.plot(*zip(*points, strict=True), color=INK, lw=1.6, zorder=1, drawstyle="steps-post", label="the front")
     if along == "epsilon" and exact is not None:
-        axes.axhline(max(exact, LEAST), color=GREEN, ls="--", lw=2, label="exact law")
+        axes.axhline(exact, color=GREEN, ls="--", lw=2, label="exact law")
 
 
 def _dress(axes: Axes, study: Study, quantity: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -229,16 +229,16 @@ class Study:
         return text.getvalue()
 
 
+_ITERATIONS = ("newton", "linear", "levels", "branch")
+_NESTED = {"phases": PHASES, "iterations": _ITERATIONS, "errors": tuple(NORMS), "epsilon_part": tuple(NORMS)}
+"""The columns that a column of a row becomes."""
+
+
 def _flat(row: Row) -> dict[str, Any]:
-    nested = {
-        "phases": ("phases", PHASES),
-        "iterations": ("iterations", ("newton", "linear", "levels", "branch")),
-        "errors": ("error", tuple(NORMS)),
-        "epsilon_part": ("epsilon_part", tuple(NORMS)),
-    }
     data = asdict(row)
-    plain = {key: value for key, value in data.items() if key not in nested}
-    for name, (prefix, keys) in nested.items():
+    plain = {key: value for key, value in data.items() if key not in _NESTED}
+    for name, keys in _NESTED.items():
+        prefix = "error" if name == "errors" else name
         plain |= {f"{prefix}_{key}": (data[name] or {}).get(key) for key in keys}
     return {**plain, "beyond_reference": " ".join(row.beyond_reference)}
 
@@ -296,7 +296,11 @@ def _sentences(study: Study) -> Iterator[str]:
     quantities = study.headlines()
     yield _own(study, quantities[-1] if quantities else "energy_norm")
     yield from (_targets(study, quantity) for quantity in reversed(quantities))
-    yield from _orders(study, quantities)
+    exact = {r.degree: r for r in study.rows if r.converged and r.smoothing is None}
+    for degree, like in sorted(exact.items()):
+        found = [(q, study.order(q, like)) for q in quantities]
+        if parts := [f"h^{value:.2f} in {NORMS[q][1]}" for q, value in found if value is not None]:
+            yield f"With the exact law the error at degree {degree} falls as {', '.join(parts)}, by two finest meshes."
     bad = [r for r in study.rows if not r.converged and r.exit_code != ExitCode.BAD_INPUT]
     if bad:
         yield f"{len(bad)} of {len(study.rows)} points ended without a certified solution; study.csv says why."
@@ -320,39 +324,22 @@ def _own(study: Study, quantity: str) -> str:
 
 
 def _targets(study: Study, quantity: str) -> str:
-    """What each accuracy costs."""
-    best, name = study.front(quantity), NORMS[quantity][1]
-    reached: dict[str, tuple[Row, list[str]]] = {}
-    missed = []
+    """What each accuracy costs, up to the first that is not reached."""
+    best, parts, unsure = study.front(quantity), [], study.certain[quantity].error or 0.0
     for target in _TARGETS:
-        cheapest = next((r for r in best if (study.claimed(r, quantity) or 0.0) <= target), None)
-        if cheapest is None:
-            missed = [_missed(study, quantity, target)]
-            break
-        reached.setdefault(cheapest.point, (cheapest, []))[1].append(_of_error(target))
-    parts = [f"{', '.join(targets)} for {duration(r.seconds)} ({r.text})" for r, targets in reached.values()]
-    return f"In {name}: {'; '.join([*parts, *missed])}."
-
-
-def _missed(study: Study, quantity: str, target: float) -> str:
-    own = study.certain[quantity].error
-    if own is not None and own > target:
-        return f"{_of_error(target)} cannot be claimed: the reference itself is uncertain by {_of_error(own)}"
-    errors = [(e, r) for r in study.rows if (e := r.error(quantity)) is not None]
-    best, at = min(errors, key=lambda pair: pair[0])
-    return (
-        f"{_of_error(target)} is not reached here: the best is {_of_error(best)} for {duration(at.seconds)} ({at.text})"
-    )
-
-
-def _orders(study: Study, quantities: Sequence[str]) -> Iterator[str]:
-    exact = {r.degree: r for r in study.rows if r.converged and r.smoothing is None}
-    for degree, like in sorted(exact.items()):
-        found = [(q, study.order(q, like)) for q in quantities]
-        parts = [f"h^{value:.2f} in {NORMS[q][1]}" for q, value in found if value is not None]
-        if parts:
-            which = "two finest meshes whose errors the reference resolves"
-            yield f"With the exact law the error at degree {degree} falls as {', '.join(parts)} ({which})."
+        row = next((r for r in best if (study.claimed(r, quantity) or 0.0) <= target), None)
+        if row is not None:
+            parts.append(f"{_of_error(target)} for {duration(row.seconds)} ({row.text})")
+            continue
+        if unsure > target:
+            missed = f"cannot be claimed: the reference itself is uncertain by {_of_error(unsure)}"
+        else:
+            errors = [(e, r) for r in study.rows if (e := r.error(quantity)) is not None]
+            least, at = min(errors, key=lambda pair: pair[0])
+            missed = f"is not reached here: the best is {_of_error(least)} for {duration(at.seconds)} ({at.text})"
+        parts.append(f"{_of_error(target)} {missed}")
+        break
+    return f"In {NORMS[quantity][1]}: {'; '.join(parts)}."
 
 
 def _of_error(value: float) -> str:

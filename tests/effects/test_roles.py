@@ -13,7 +13,6 @@ import tomli_w
 from runs import process, summary
 from scenes import model
 
-from hvi_fenicsx.laws import Exponential
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.pictures import sides
 from hvi_fenicsx.report.pictures.sides import touches
@@ -146,9 +145,6 @@ def test_the_users_effects_are_drawn(folder: Path) -> None:
     assert {name for name in found.sides if touches(found.roles(name))} == {"floor", "press"}
     assert found.resists("floor", "slip")
     assert not found.resists("floor", "opening")
-    law = found.law("floor", "slip")
-    assert isinstance(law, Exponential)
-    assert law.delta == GLUED["delta"]
     assert found.within == ["a centrifugal force"]
     assert {"scene.png", "contact_floor.png", "body.png"} <= {file.name for file in (folder / "r").iterdir()}
     page = (folder / "r" / "report.html").read_text(encoding="utf-8")

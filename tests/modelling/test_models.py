@@ -20,7 +20,7 @@ from scenes import quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.report.pictures import sides
-from hvi_fenicsx.report.pictures.regions import regions
+from hvi_fenicsx.report.pictures.sides import regions
 from hvi_fenicsx.report.reader import Result
 from hvi_fenicsx.results import gathering
 from hvi_fenicsx.results.summary import summary

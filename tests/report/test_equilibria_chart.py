@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 
 from hvi_fenicsx.report.pictures import equilibria
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, VERMILION
-from hvi_fenicsx.report.searches import EquilibriaResult
+from hvi_fenicsx.report.reader import EquilibriaResult
 
 
 def search(folder: Path, energies: list[float]) -> EquilibriaResult:

@@ -59,7 +59,7 @@ def test_an_unrolled_bore_has_the_area_of_its_shell_but_for_the_facets_across_it
 def test_where_a_bore_touches_is_in_the_middle_of_its_map(around: int) -> None:
     points, _ = shell(2.0 * np.pi, around)
     flat = laid_flat(*bore(2.0 * np.pi, points[:, 0] > -0.8 * RADIUS, around))
-    touching = flat.points[points[flat.rows, 0] <= -0.8 * RADIUS, 0]
+    touching = flat.points[points[:, 0] <= -0.8 * RADIUS, 0]
     ends = flat.points[:, 0].min(), flat.points[:, 0].max()
     assert np.ptp(touching) < 0.25 * (ends[1] - ends[0])
     assert abs(touching.mean() - np.mean(ends)) < 0.5 / around * 2.1 * (ends[1] - ends[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hvi_fenicsx.report import rounding, units
+from hvi_fenicsx.report import units
 
 
 @pytest.mark.parametrize(
@@ -23,4 +23,4 @@ def test_a_percentage_has_two_digits_or_all_before_the_point(share: float, text:
 
 
 def test_a_force_that_is_rounding_beside_the_largest_is_zero() -> None:
-    assert [rounding.unless_noise(value, 1.5e4) for value in (-83e-9, -2.0e-5, 3.0)] == [0.0, -2.0e-5, 3.0]
+    assert [units.unless_noise(value, 1.5e4) for value in (-83e-9, -2.0e-5, 3.0)] == [0.0, -2.0e-5, 3.0]

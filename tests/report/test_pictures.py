@@ -23,12 +23,13 @@ import tomli_w
 from dolfinx import mesh
 from matplotlib.text import Text
 from mpi4py import MPI
+from PIL import Image
 from runs import hvi, write_scene
 from scenes import model
 
 from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.report import png_file, reader
+from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
 from hvi_fenicsx.report.contact_part import ContactPart
 from hvi_fenicsx.report.pictures import bodies, draw, sides
@@ -256,7 +257,7 @@ def test_each_part_has_its_picture_and_a_scene_without_contact_has_its_body(tmp_
     ("damage", "words"),
     [
         (lambda f: (f / "summary.json").unlink(), "summary.json: No such file"),
-        (lambda f: (f / "summary.json").write_text("{"), "summary.json: damaged"),
+        (lambda f: (f / "summary.json").write_text("{"), "r: damaged"),
         (lambda f: (f / FILE).unlink(), "solution.npz: there is no such file"),
         (lambda f: (f / FILE).write_text("<x/>"), "solution.npz: damaged"),
         (lambda f: (f / FILE).write_bytes((f / FILE).read_bytes()[:-40]), "solution.npz: damaged"),
@@ -374,7 +375,7 @@ def test_a_result_that_is_written_is_read_as_it_was(tmp_path: Path) -> None:
 def test_a_picture_carries_its_caption(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), pressed)
     change(folder, parts={"a": floor(square(4), peeled), "“b”": floor(square(4), pressed)})
-    captions = {path.name: png_file.caption(path.read_bytes()) for path in draw.draw(folder)}
+    captions = {path.name: Image.open(path).info["Description"] for path in draw.draw(folder)}
     assert captions["body.png"] == "The deformed body, its displacements magnified, with what acts on it."
     assert captions["contact_“b”.png"] == "Along ““b””: displacement, friction and pressure."
 
@@ -393,10 +394,11 @@ def test_the_extremes_that_pictures_name_are_those_of_all_cells(tmp_path: Path) 
     change(folder, displacement=moved, von_mises=stress)
     found = reader.read(folder)
     for make, words in (
-        (bodies.stress, "von Mises stress, peak 7 MPa"),
-        (bodies.body, "displacement |u|, up to 33 µm"),
+        (bodies.stress, "von Mises stress, peak 7 MPa; "),
+        (bodies.body, "displacement |u|, up to 33 µm; "),
     ):
-        assert words in [text.get_text().replace("\u202f", " ") for text in make(found).findobj(Text)]
+        said = [text.get_text().replace("\u202f", " ") for text in make(found).findobj(Text)]
+        assert any(text.startswith(words) for text in said)
 
 
 def test_a_column_that_is_not_there_is_nothing_and_not_zero(tmp_path: Path) -> None:

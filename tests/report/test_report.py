@@ -137,7 +137,7 @@ def changed(held: Path, folder: Path, **entries: Any) -> Path:
 def test_a_certified_solution_on_a_coarse_mesh_is_not_called_good(held: Path, tmp_path: Path) -> None:
     rough = {"relative": 0.43, "total": 43.0, "discretisation": 43.0, "energy_norm": 100.0, "coarse": True}
     page = Page(changed(held, tmp_path / "new", estimate=rough))
-    assert "Certified on a coarse mesh: the estimated error is 43 % of the solution" in page.text
+    assert "Certified on a coarse mesh: the estimated error is large" in page.text
     assert "A solution exists, was found, and is certified." not in page.text
 
 

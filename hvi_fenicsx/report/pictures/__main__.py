@@ -15,7 +15,6 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -27,9 +26,6 @@ from .xserver import x_server
 
 if TYPE_CHECKING:
     from .drawings import Drawing
-
-Running = tuple["Drawing", BaseProcess, Connection]
-"""A drawing, the process that makes it, and what this says in the end: None, or why it failed."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -85,19 +81,25 @@ def draw_all(folder: Path) -> list[HviError]:
     """
     from .drawings import drawings_of  # loads the plotting library
 
-    found = drawings_of(folder)
+    found, at_once = drawings_of(folder), os.cpu_count() or 1
     with x_server(wanted=any(drawing.rendered for drawing in found)):
         gc.freeze()  # the processes share what is there; a collection in one of them would copy it
-        at_once = os.cpu_count() or 1
         batches = (found[start : start + at_once] for start in range(0, len(found), at_once))
         return [failure for batch in batches for failure in _drawn(batch)]
 
 
 def _drawn(batch: Sequence[Drawing]) -> Iterator[HviError]:
-    """Draw pictures side by side; what went wrong with them."""
-    for drawing, process, connection in [_started(drawing) for drawing in batch]:
+    """Draw pictures side by side, each in a process of its own; what went wrong with them."""
+    context, running = multiprocessing.get_context("fork"), []
+    for drawing in batch:
+        receiving, sending = context.Pipe(duplex=False)
+        process = context.Process(target=_draw, args=(drawing, sending), daemon=True)
+        process.start()
+        sending.close()
+        running.append((drawing, process, receiving))
+    for drawing, process, receiving in running:
         try:
-            failure = connection.recv()
+            failure = receiving.recv()
         except EOFError:
             process.join()
             code = process.exitcode or 0
@@ -108,15 +110,6 @@ def _drawn(batch: Sequence[Drawing]) -> Iterator[HviError]:
             print(drawing.path.name, flush=True)
         else:
             yield failure
-
-
-def _started(drawing: Drawing) -> Running:
-    context = multiprocessing.get_context("fork")
-    receiving, sending = context.Pipe(duplex=False)
-    process = context.Process(target=_draw, args=(drawing, sending), daemon=True)
-    process.start()
-    sending.close()
-    return drawing, process, receiving
 
 
 def _draw(drawing: Drawing, connection: Connection) -> None:

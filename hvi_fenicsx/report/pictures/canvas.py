@@ -10,21 +10,21 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.path import Path
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FixedLocator, MaxNLocator
-from matplotlib.transforms import Bbox, BboxBase
+from matplotlib.transforms import Bbox
 
 from ...typing import Array
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from .shape import DeformedBody, PartGeometry
-from .sides import HeldSide, LoadedSide, Side
-from .style import GREY, HEADING, INK, VERMILION, WIDTH, area, figure, heading
+from .sides import HeldSide, LoadedSide, Region, Side
+from .style import INK, VERMILION, WIDTH, figure, heading, resize
 
-MARGIN = 0.3
-"""Inches: left and right of the body."""
 LETTERS = 12
 """Points: the size of a label's letters."""
 _WAYS = np.array([[0, 1], [1, 0], [-1, 0], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
@@ -47,30 +47,6 @@ class Label:
     way: Array
     colour: str = INK
 
-    @property
-    def beyond(self) -> Array:
-        """About how far it reaches beyond its point along each axis, and before it where negative, inches, (2,)."""
-        return np.round(self.way) * np.array([0.7 * len(self.words), 1.6]) * LETTERS / 72
-
-
-@dataclass(frozen=True)
-class Scale:
-    """A scale of colours with a bar.
-
-    Attributes:
-        colours: of the scale.
-        low: its lowest value.
-        high: its largest value.
-        words: what it shows, in which unit.
-        remark: below it.
-    """
-
-    colours: Colormap
-    low: float
-    high: float
-    words: str
-    remark: str = ""
-
 
 @dataclass
 class Canvas(ABC):
@@ -82,8 +58,7 @@ class Canvas(ABC):
         reached: points of the picture's plane that what is drawn reaches, m, (n, 2) each.
         labels: the words in it.
         keys: the lines of the legend by their words.
-        scales: those with bars.
-        remarks: lines beside the legend with their colours; what is bad is bold.
+        tallest: the largest height of the axes, inches.
     """
 
     result: Result
@@ -91,14 +66,38 @@ class Canvas(ABC):
     reached: list[Array] = field(default_factory=list)
     labels: list[Label] = field(default_factory=list)
     keys: dict[str, Artist] = field(default_factory=dict)
-    scales: list[Scale] = field(default_factory=list)
-    remarks: list[tuple[str, str]] = field(default_factory=list)
+    tallest: float = 6.4
 
     def __post_init__(self) -> None:
         """Make the figure; its height is known in the end."""
-        self.fig = figure(HEADING)
-        self.axes = area(self.fig, MARGIN, 0.0, WIDTH - 2 * MARGIN, HEADING)
+        self.fig = figure(self.tallest)
+        self.axes = self.fig.add_subplot()
         self.axes.set_axis_off()
+        self._bars = 0
+
+    @abstractmethod
+    def paint(
+        self, shape: DeformedBody, values: Array, colours: Colormap, end: float, *, by_cell: bool = False
+    ) -> None:
+        """Draw the deformed body over the undeformed one, in the colours of values.
+
+        Args:
+            shape: the deformed body.
+            values: by vertex, (n,), or by cell, (c,).
+            colours: of the values, from zero.
+            end: the value at the end of the colours.
+            by_cell: whether they are by cell.
+        """
+
+    @abstractmethod
+    def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
+        """Draw the body at rest, its regions in their tints.
+
+        Args:
+            shape: the body.
+            areas: its regions.
+            fill: the colour of a body without regions.
+        """
 
     @abstractmethod
     def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
@@ -130,13 +129,12 @@ class Canvas(ABC):
         """
 
     @abstractmethod
-    def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry], *, pressure: bool) -> None:
-        """Draw the obstacles and the pressure on the parts.
+    def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry]) -> None:
+        """Draw the pressure on the parts, and the obstacles where there is room.
 
         Args:
             shape: the body as it is drawn.
             parts: those with contact or a law.
-            pressure: whether the body is painted with it where its parts are hidden.
         """
 
     @abstractmethod
@@ -145,76 +143,71 @@ class Canvas(ABC):
 
         Args:
             body: the body.
-            points: its points there, m, (n, d).
-            ways: m, (j, k, d).
+            points: its points there, m, (n, 3).
+            ways: m, (j, k, 3).
         """
+
+    @abstractmethod
+    def finish(self) -> Figure:
+        """Lay out the picture and write its labels; the figure."""
 
     def key(self, *artists: Artist) -> None:
         """Add lines to the legend, each words once."""
         for artist in artists:
             self.keys.setdefault(str(artist.get_label()), artist)
 
-    def lay_out(self, tallest: float = 6.4, flattest: float = 2.0) -> None:
-        """Give the picture its height and the axes their limits; write what is around them.
+    def remark(self, words: str, colour: str = INK) -> None:
+        """Add words to the legend; what is bad is in vermilion."""
+        self.key(Line2D([], [], color="none", mec=colour, label=words))
+
+    def bar(self, colours: Colormap, low: float, high: float, words: str) -> None:
+        """Add a bar below the body with its scale of colours.
 
         Args:
-            tallest: the largest height of the axes, inches.
-            flattest: the smallest one.
+            colours: of the scale.
+            low: its lowest value.
+            high: its largest value.
+            words: what it shows, in which unit.
         """
+        mappable = ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
+        ticks = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
+        bar = self.fig.colorbar(mappable, ax=self.axes, location="bottom", ticks=ticks, aspect=45, pad=0.03)
+        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.set_label(words, size=12.5)
+        self._bars += 1
+
+    def extent(self) -> tuple[Array, Array]:
+        """The lowest and the highest point of what is drawn, with a margin, m, (2,) each."""
         points = np.concatenate(self.reached)
         low, high = points.min(axis=0), points.max(axis=0)
-        before, behind = self._room()
-        wide, extent = WIDTH - 2 * MARGIN, np.maximum(high - low, 1e-9 * float(np.ptp(points, axis=0).max() or 1.0))
-        scale = float(np.min((np.array([wide, tallest]) - before - behind) / extent))
-        tall = max(flattest, float((scale * extent + before + behind)[1]))
-        lines = sum(words.count("\n") + 1 for words in self.keys)
-        foot = max(1.5, 0.3 + 0.24 * lines)
-        height = HEADING + tall + foot
-        self.fig.set_figheight(height)
-        self.axes.set_position((MARGIN / WIDTH, foot / height, wide / WIDTH, tall / height))
-        middle, half = (low + high + (behind - before) / scale) / 2, np.array([wide, tall]) / scale / 2
-        self.axes.set(xlim=(middle[0] - half[0], middle[0] + half[0]), ylim=(middle[1] - half[1], middle[1] + half[1]))
+        margin = 0.015 * float((high - low).max() or 1.0)
+        return low - margin, high + margin
+
+    def lay_out(self) -> None:
+        """Give the picture its height and the axes their limits; write what is around them."""
+        low, high = self.extent()
+        wide, tall = (float(side) for side in high - low)
+        columns = 1 if max(map(len, self.keys), default=0) > 34 else 2
+        foot = 0.9 * self._bars + 0.27 * sum(words.count("\n") + 1 for words in self.keys) / columns
+        resize(self.fig, min(self.tallest, 0.6 + WIDTH * tall / wide) + foot + 0.2)
+        self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         heading(self.fig, self.result, self.subject)
-        self._foot(foot)
+        for artist in self.axes.get_children():
+            artist.set_in_layout(False)  # all are within the limits, and labels come after
+        if self.keys:
+            handles = list(self.keys.values())
+            legend = self.fig.legend(handles=handles, loc="outside lower center", ncols=columns)
+            for text, handle in zip(legend.get_texts(), handles, strict=True):
+                if isinstance(handle, Line2D) and handle.get_color() == "none":
+                    text.set_color(str(handle.get_markeredgecolor()))
 
     def follow(self, ways: Array) -> None:
         """Draw arrows along ways in the picture's plane, m, (j, k, 2)."""
         for way in ways:
             style = "-|>,head_length=9,head_width=5"
             arrow = FancyArrowPatch(path=Path(way), arrowstyle=style, color=VERMILION, lw=3.2, zorder=7, shrinkB=0)
-            arrow.set_clip_on(False)
             self.axes.add_patch(arrow)
             self.reached.append(way)
-
-    def _room(self) -> tuple[Array, Array]:
-        """What labels may take left of the points and below them, and right of them and above, inches, (2,) each."""
-        beyond = np.array([np.zeros(2), *(label.beyond for label in self.labels)])
-        return 0.08 - beyond.min(axis=0), 0.08 + beyond.max(axis=0)
-
-    def _foot(self, foot: float) -> None:
-        """Write bars, remarks and legend."""
-        for place, scale in enumerate(self.scales):
-            bar, spread = area(self.fig, 0.42 + 3.75 * place, foot - 0.68, 3.2, 0.2), scale.high > scale.low
-            mappable = ScalarMappable(Normalize(scale.low, scale.high if spread else scale.low + 1.0), scale.colours)
-            ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]) if spread else FixedLocator([scale.low])
-            self.fig.colorbar(mappable, cax=bar, orientation="horizontal", ticks=ticks)
-            bar.spines[:].set_visible(False)
-            bar.set_title(scale.words, loc="left", size=12.5)
-            bar.set_xlabel(scale.remark, loc="left", labelpad=7, size=12.5, weight="bold", color=GREY)
-        for line, (words, colour) in enumerate(self.remarks):
-            up = (foot - 0.4 - 0.34 * line) / self.fig.get_figheight()
-            weight = "bold" if colour == VERMILION else "normal"
-            self.fig.text(MARGIN / WIDTH, up, words, size=12.5, color=colour, weight=weight, va="center")
-        if self.keys and len(self.scales) < 2:
-            centre = (4.05 / WIDTH, foot / 2 / self.fig.get_figheight())
-            self.fig.legend(
-                handles=list(self.keys.values()),
-                loc="center left",
-                bbox_to_anchor=centre,
-                frameon=False,
-                fontsize=11.5,
-                labelspacing=0.3,
-            )
 
     def write(self, drawn: Array) -> None:
         """Write the labels, each where it covers no other one, and as little as possible of what is drawn.
@@ -222,19 +215,22 @@ class Canvas(ABC):
         Args:
             drawn: points that are better not covered, m, (n, 2).
         """
-        vertices, taken = self.axes.transData.transform(drawn), list[Bbox]()
-        for label in self.labels:
-            text = self._written(label)
-            text.get_window_extent()  # which puts it in its place
-            box = Text.get_window_extent(text)  # without the line that leads to it
-            places = _places(label, np.array(box.size) * 36 / self.fig.dpi)
-            boxes = [box.translated(*(place * self.fig.dpi / 72)) for place in places]
-            costs = [_cost(one, taken, vertices, self.fig.bbox) for one in boxes]
-            best = costs.index(min(costs))
-            text.xyann = (float(places[best][0]), float(places[best][1]))
-            assert text.arrow_patch is not None
-            text.arrow_patch.set_visible(float(np.abs(places[best] - places[0]).max()) > 0.0)
-            taken.append(boxes[best])
+        texts = [self._written(label) for label in self.labels]
+        for _ in range(2):  # labels that reach out of the axes make these smaller
+            self.fig.draw_without_rendering()
+            vertices, taken, dots = self.axes.transData.transform(drawn), list[Bbox](), self.fig.dpi / 72
+            for label, text in zip(self.labels, texts, strict=True):
+                text.xyann = (0.0, 0.0)
+                text.get_window_extent()  # which puts it in its place
+                box = Text.get_window_extent(text)  # without the line that leads to it
+                places = _places(label, np.array(box.size) / dots / 2)
+                boxes = [box.translated(*(place * dots)) for place in places]
+                costs = [(one.count_overlaps(taken), one.count_contains(vertices)) for one in boxes]
+                best = costs.index(min(costs))
+                text.xyann = (float(places[best][0]), float(places[best][1]))
+                assert text.arrow_patch is not None
+                text.arrow_patch.set_visible(best > 0)
+                taken.append(boxes[best])
 
     def _written(self, label: Label) -> Annotation:
         """A label on its point, with a line that leads there once it is moved."""
@@ -266,9 +262,3 @@ def _places(label: Label, half: Array) -> list[Array]:
     wanted = label.way / length if length > 0.0 else label.way
     near, far = half + LETTERS / 3, half + 2 * LETTERS
     return [wanted * near, *(way * room for room in (near, far, far + 2 * LETTERS) for way in _WAYS)]
-
-
-def _cost(box: Bbox, taken: Sequence[Bbox], vertices: Array, window: BboxBase) -> tuple[int, int]:
-    """How many labels a box covers, where one that leaves the picture counts as well; and how many points."""
-    leaves = not (window.contains(*box.min) and window.contains(*box.max))
-    return box.count_overlaps(taken) + leaves, box.count_contains(vertices)

@@ -1,4 +1,4 @@
-"""What there is to draw of a finished folder: its pictures, each with its file."""
+"""What there is to draw of a finished folder: its pictures, each with its file. A new one is a row of `PICTURES`."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from .. import searches
+from .. import reader
 from ..errors import PictureError
-from ..reader import Result, read
-from . import bodies, contact, equilibria  # noqa: F401 (the first two register pictures)
+from ..reader import Result
+from . import bodies, contact, equilibria
 from . import path as path_picture
-from .registry import PICTURES
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,36 @@ class Drawing:
     rendered: bool = False
 
 
+Kind = tuple[str, str, Callable[[Result], bool], Callable[[Result], Figure]]
+PICTURES: list[Kind] = [
+    (
+        "body",
+        "The deformed body, its displacements magnified, with what acts on it.",
+        lambda result: result.body.displacement is not None,
+        bodies.body,
+    ),
+    (
+        "escape",
+        "The rigid motion along which the load carries the body away.",
+        lambda result: result.body.escape_mode is not None,
+        bodies.escape,
+    ),
+    (
+        "scene",
+        "The scene: the undeformed body with its supports, loads and contact parts.",
+        lambda result: bool(result.sides),
+        bodies.scene,
+    ),
+    (
+        "stress",
+        "Stress in the body (von Mises), constant in each cell; the scale may end below a peak in a corner.",
+        lambda result: result.body.von_mises is not None,
+        bodies.stress,
+    ),
+]
+"""The pictures of a body: name of the file, caption, whether a result has what is drawn, and what draws it."""
+
+
 def drawings_of(folder: Path) -> list[Drawing]:
     """What there is to draw of a finished folder, of whatever kind it is.
 
@@ -42,13 +71,13 @@ def drawings_of(folder: Path) -> list[Drawing]:
         PictureError: there is nothing to draw.
     """
     if (folder / "equilibria.csv").exists():
-        search = searches.read_equilibria(folder)
+        search = reader.read_equilibria(folder)
         return [Drawing(folder / equilibria.NAME, equilibria.CAPTION, partial(equilibria.make, search))]
     if (folder / "path.csv").exists():
-        path = searches.read_path(folder)
+        path = reader.read_path(folder)
         drawn = path.driven is not None
         return [Drawing(folder / path_picture.NAME, path_picture.CAPTION, partial(path_picture.make, path))] * drawn
-    result = read(folder)
+    result = reader.read(folder)
     arrays = result.arrays
     if arrays.displacement is None and arrays.escape_mode is None and not arrays.parts:
         raise PictureError(f"{folder}: there is nothing to draw, neither a displacement nor a part of Γc")
@@ -58,15 +87,11 @@ def drawings_of(folder: Path) -> list[Drawing]:
 
 def drawings(result: Result) -> Iterator[Drawing]:
     """What there is to draw of a result."""
-    for kind in sorted(PICTURES, key=lambda kind: kind.name):
-        if not kind.wanted(result):
-            continue
-        if not kind.of_part:
-            rendered = result.body.dimension == 3
-            yield Drawing(result.folder / f"{kind.name}.png", kind.caption, partial(kind.make, result), rendered)
-            continue
-        alone = len(result.parts) == 1
-        for part in result.parts:
-            path = result.folder / f"{kind.name if alone else f'{kind.name}_{part.name}'}.png"
-            caption = kind.caption.replace("{part}", "the contact part" if alone else f"“{part.name}”")
-            yield Drawing(path, caption, partial(kind.make, result, part))
+    alone = len(result.parts) == 1
+    for name, caption, wanted, make in PICTURES:
+        if wanted(result):
+            yield Drawing(result.folder / f"{name}.png", caption, partial(make, result), result.body.dimension == 3)
+    for part in result.parts:
+        name, words = ("contact", "the contact part") if alone else (f"contact_{part.name}", f"“{part.name}”")
+        caption = f"Along {words}: displacement, friction and pressure."
+        yield Drawing(result.folder / f"{name}.png", caption, partial(contact.contact, result, part))

@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
-from ..searches import EquilibriaResult, Row
+from ..reader import EquilibriaResult, Row
 from ..units import number, unit_for
-from .style import BLUE, GREEN, GREY, HEADING, INK, ORANGE, PALE, PURPLE, VERMILION, area, figure, titled
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, VERMILION, figure, titled
 
 NAME = "equilibria.png"
 MOST = 16
@@ -23,8 +23,6 @@ CAPTION = (
     "The equilibria that were found, the lowest at the top. Left: the energy above the lowest found. Right: the state "
     "of each along the contact parts, vertex by vertex."
 )
-ROW = 0.62
-"""Height of a row, inches."""
 _PIECES = (BLUE, ORANGE, GREEN, PURPLE)
 _KINDS, _OTHER = {"minimiser": ("o", INK), "saddle": ("^", "white")}, ("s", "white")
 """The mark of each kind of equilibrium, and its face."""
@@ -38,10 +36,9 @@ def make(result: EquilibriaResult) -> Figure:
     """
     rows = result.rows[:MOST]
     states = [result.state(row) for row in rows]
-    tall = ROW * len(rows)
-    fig = figure(HEADING + tall + 1.75)
+    fig = figure(1.8 + 0.62 * len(rows))
     titled(fig, result.title, *_subject(result, len(rows)))
-    energies, strips = area(fig, 0.5, 1.35, 2.2, tall), area(fig, 4.15, 1.35, 3.55, tall)
+    energies, strips = fig.subplots(1, 2, width_ratios=(2, 3))
     _energies(energies, result, rows)
     _strips(strips, rows, states)
     _legend(fig, sorted({row["kind"] for row in rows}), states)
@@ -79,22 +76,22 @@ def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) ->
     for i, (row, vertices) in enumerate(zip(rows, states, strict=True)):
         colours = np.array([[to_rgb(_colour(v)) for v in vertices]])
         axes.imshow(colours, extent=(-0.5, len(vertices) - 0.5, i + 0.26, i - 0.26), aspect="auto", zorder=1)
-        for k, vertex in enumerate(vertices):
-            if k:
-                axes.plot([k - 0.5] * 2, [i - 0.26, i + 0.26], color="white", lw=0.8 if longest < 80 else 0.2)
-            if vertex["contact"] in ("0", "false", "False"):
-                axes.plot([k - 0.5, k + 0.5], [i + 0.34] * 2, color=INK, lw=3.0, solid_capstyle="butt")
-        axes.text(-0.02, i - 0.12, row["kind"], transform=axes.get_yaxis_transform(), ha="right", va="center", size=11)
-        words = f"{row['broken']} broken"
-        axes.text(
-            -0.02, i + 0.2, words, transform=axes.get_yaxis_transform(), ha="right", va="center", size=9.5, color=GREY
-        )
+        edges = np.arange(len(vertices) - 1) + 0.5
+        axes.vlines(edges, i - 0.26, i + 0.26, color="white", lw=0.8 if longest < 80 else 0.2)
+        lifted = np.flatnonzero([_is_lifted(vertex) for vertex in vertices])
+        axes.hlines(np.full(len(lifted), i + 0.34), lifted - 0.5, lifted + 0.5, color=INK, lw=3.0)
+        words = f"{row['kind']}, {row['broken']} broken"
+        axes.text(0.0, i - 0.3, words, transform=axes.get_yaxis_transform(), va="bottom", size=10, color=GREY)
     axes.set_xlim(-0.5, longest - 0.5)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_yticks([])
     axes.spines[["left"]].set_visible(False)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("vertex along the contact parts")
+
+
+def _is_lifted(vertex: Row) -> bool:
+    return vertex["contact"] in ("0", "false", "False")
 
 
 def _branch(vertex: Row) -> str:
@@ -119,6 +116,6 @@ def _legend(fig: Figure, kinds: Sequence[str], states: Sequence[Sequence[Row]]) 
     handles += [Patch(color=_PIECES[int(b) % len(_PIECES)], label=f"piece {int(b) + 1} of the law") for b in found[:4]]
     if any(_branch(v) == "-1" for vertices in states for v in vertices):
         handles.append(Patch(color=VERMILION, label="on a kink or drop"))
-    if any(v["contact"] in ("0", "false", "False") for vertices in states for v in vertices):
+    if any(_is_lifted(v) for vertices in states for v in vertices):
         handles.append(Line2D([], [], color=INK, lw=3.0, label="lifted off"))
-    fig.legend(handles=handles, loc="lower center", ncols=4, frameon=False, fontsize=10, handlelength=1.2)
+    fig.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=10, handlelength=1.2)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from matplotlib.tri import Triangulation
 
 from ...typing import Array, Integers, Mask
 from ..body_mesh import BodyMesh
@@ -23,7 +21,6 @@ class FlatPart:
 
     Attributes:
         points: its vertices, m, (m, 2).
-        rows: of each of them its row in the part's table, (m,).
         facets: its facets by its vertices, (k, 3); none across the cut of one that was unrolled.
         ways: the unit vectors along which the two coordinates grow at each vertex, (m, 2, 3).
         names: of the coordinates.
@@ -31,7 +28,6 @@ class FlatPart:
     """
 
     points: Array
-    rows: Integers
     facets: Integers
     ways: Array
     names: tuple[str, str]
@@ -42,14 +38,9 @@ class FlatPart:
         """The unit of the coordinates."""
         return unit_for(float(np.abs(self.points).max()), "m")
 
-    @cached_property
-    def triangulation(self) -> Triangulation:
-        """The facets as matplotlib's."""
-        return Triangulation(self.points[:, 0], self.points[:, 1], self.facets)
-
     def along(self, vectors: Array) -> Array:
         """The components of vectors (m, 3) along the coordinates, (m, 2)."""
-        return np.asarray(np.einsum("md,mwd->mw", vectors[self.rows], self.ways))
+        return np.asarray(np.einsum("md,mwd->mw", vectors, self.ways))
 
 
 def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
@@ -67,7 +58,6 @@ def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
     kept = [i for i in range(3) if i != seen]
     return FlatPart(
         points=points[:, kept],
-        rows=np.arange(len(points)),
         facets=triangles,
         ways=np.broadcast_to(np.eye(3)[kept], (len(points), 2, 3)),
         names=("xyz"[kept[0]], "xyz"[kept[1]]),
@@ -94,7 +84,6 @@ def _unrolled(points: Array, triangles: Integers, normals: Array, touches: Mask)
     name = "xyz"[largest] if straight else ""
     return FlatPart(
         points=np.column_stack([radius * angles, points @ axis]),
-        rows=np.arange(len(points)),
         facets=triangles[np.ptp(angles[triangles], axis=1) < np.pi],
         ways=np.stack([onward, np.broadcast_to(axis, onward.shape)], axis=1),
         names=(f"way round, 0 towards +{'xyz'[towards]},", name or "way along,"),

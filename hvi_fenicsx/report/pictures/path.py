@@ -8,26 +8,20 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.transforms import ScaledTranslation
+from matplotlib.markers import CARETDOWN
 
 from ...typing import Array, Mask
-from ..searches import PathResult
+from ..reader import PathResult
 from ..units import Unit, number, unit_for
-from .style import BLUE, GREEN, GREY, HEADING, INK, PURPLE, VERMILION, area, figure, titled
+from .style import BLUE, GREEN, GREY, INK, PURPLE, VERMILION, figure, titled
 
 NAME = "path.png"
 CAPTION = (
     "The load path: force (under a moment the load factor) over mean displacement of the driven part. Solid: stable; "
     "dashed: unstable, which a test cannot hold; dotted: jumps; dots: events on the way, some where they are many."
 )
-_ENTRIES = 0.35
-"""Room for the second line of the legend, inches."""
 _DOTS = 40
 """So many events have a dot at most."""
-_SHORT = 1e-3
-"""Stretches that are shorter, in parts of the picture, are not seen."""
-_ABOVE = 11.0
-"""Points: the peak's mark stands so high above its point, which a turn or the end may have, too."""
 
 
 def make(result: PathResult) -> Figure:
@@ -41,9 +35,9 @@ def make(result: PathResult) -> Figure:
     pulled = bool(np.any(force))
     load = force if pulled else result.columns["factor"]
     units = unit_for(float(np.max(np.abs(u))), "m"), _unit(result, load) if pulled else Unit(1.0, "")
-    fig = figure(HEADING + 5.4 + _ENTRIES)
+    fig = figure(5.8)
     titled(fig, result.title, _subject(result), *_verdict(result))
-    axes = area(fig, 1.15, 0.85, 6.5, 4.45)
+    axes = fig.add_subplot()
     x, y = np.asarray(u / units[0].size), np.asarray(load / units[1].size)
     _stretches(axes, result, x, y)
     _marks(axes, result, x, y, units)
@@ -52,16 +46,8 @@ def make(result: PathResult) -> Figure:
     axes.set_xlabel(f"mean displacement of “{result.driven}”{direction} ({units[0].name})")
     axes.set_ylabel(f"force on “{result.driven}” ({units[1].name})" if pulled else "load factor")
     axes.margins(0.06, 0.10)
-    _explain(axes)
+    fig.legend(loc="outside lower center", ncols=4, fontsize=11, handlelength=1.6, columnspacing=0.9)
     return fig
-
-
-def _explain(axes: Axes) -> None:
-    """The legend above the curve, in two lines where it has more than four entries."""
-    count = len(axes.get_legend_handles_labels()[0])
-    columns = count if count <= 4 else -(-count // 2)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.015, 1.0), ncols=columns, frameon=False, fontsize=11,
-                borderaxespad=0.0, handlelength=1.6, columnspacing=0.9)  # fmt: skip
 
 
 def _unit(result: PathResult, force: Array) -> Unit:
@@ -95,15 +81,8 @@ def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
         (jump, "jump", {"color": GREY, "ls": ":", "lw": 2.2, "zorder": 2}),
     )
     for kind, name, look in kinds:
-        chosen = kind & _visible(x, y)
-        if np.any(chosen):
-            axes.plot(*_with_gaps(x, y, chosen), label=name, **look)
-
-
-def _visible(x: Array, y: Array) -> Mask:
-    """Which stretches between neighbouring rows have a length in the picture."""
-    shares = [np.abs(np.diff(values)) / (float(np.ptp(values)) or 1.0) for values in (x, y)]
-    return np.asarray(np.hypot(*shares) > _SHORT)
+        if np.any(kind):
+            axes.plot(*_with_gaps(x, y, kind), label=name, **look)
 
 
 def _with_gaps(x: Array, y: Array, chosen: Mask) -> tuple[Array, Array]:
@@ -121,19 +100,12 @@ def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: tuple[Unit
     if len(shown):
         axes.plot(x[shown], y[shown], "o", color=INK, ms=3.4, alpha=0.8, mew=0, zorder=4, label="event")
     look: dict[str, Any] = {"ls": "", "ms": 9, "mec": "white", "mew": 0.8, "zorder": 6}
-    _peak(axes, x, y, units, look)
-    for row, marker, colour, text in _named(result):
-        axes.plot(x[row], y[row], marker=marker, color=colour, label=text, **look)
-
-
-def _peak(axes: Axes, x: Array, y: Array, units: tuple[Unit, Unit], look: dict[str, Any]) -> None:
-    """A triangle that points down at the largest force from above."""
     peak = int(np.argmax(y))
     load = f"{number(y[peak], 4)} {units[1].name}".rstrip()
     words = f"peak {load} at {number(x[peak], 4)} {units[0].name}"
-    assert isinstance(axes.figure, Figure)
-    raised = axes.transData + ScaledTranslation(0.0, _ABOVE / 72, axes.figure.dpi_scale_trans)
-    axes.plot(x[peak], y[peak], marker="v", color=PURPLE, transform=raised, label=words, **look)
+    axes.plot(x[peak], y[peak], marker=CARETDOWN, color=PURPLE, label=words, **{**look, "ms": 12})
+    for row, marker, colour, text in _named(result):
+        axes.plot(x[row], y[row], marker=marker, color=colour, label=text, **look)
 
 
 def _named(result: PathResult) -> Iterator[tuple[int, str, str, str | None]]:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import EllipseCollection, PolyCollection
-from matplotlib.colors import Colormap
+from matplotlib.collections import EllipseCollection
+from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Polygon
@@ -20,16 +20,13 @@ from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..units import quantity
 from .canvas import Canvas, Label
-from .regions import Region
-from .shape import DeformedBody, PartGeometry
-from .sides import HeldSide, LoadedSide, Side
+from .shape import ARROW, DeformedBody, PartGeometry
+from .sides import HeldSide, LoadedSide, Region, Side
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, VERMILION
 
-ARROW = 0.13
-"""Part of the body's size: the longest arrow of a load, and the highest pressure."""
 LEGIBLE = 5000
 """Cells up to which their edges are drawn, in a square body."""
-NOTHING = 1e-6
+_NOTHING = 1e-6
 """So small a part of the largest stress, or of the body's size, is none."""
 _HALO = [withStroke(linewidth=3.2, foreground="white")]
 _ALONG: dict[str, Any] = {"clip_on": False, "solid_capstyle": "butt"}
@@ -41,22 +38,9 @@ class PlaneCanvas(Canvas):
     def paint(
         self, shape: DeformedBody, values: Array, colours: Colormap, end: float, *, by_cell: bool = False
     ) -> None:
-        """Draw the deformed body over its undeformed outline, in the colours of values.
-
-        Args:
-            shape: the deformed body.
-            values: by vertex, (n,), or by cell, (c,).
-            colours: of the values, from zero.
-            end: the value at the end of the colours.
-            by_cell: whether they are by cell.
-        """
+        """See :meth:`.Canvas.paint`; with the edges of cells where they are legible."""
         cells, points = shape.body.cells, shape.points[:, :2]
-        look: dict[str, Any] = {"cmap": colours, "vmin": 0.0, "vmax": end or 1.0, "zorder": 1}
-        corners, triangles = (
-            (points[cells].reshape(-1, 2), np.arange(cells.size).reshape(-1, 3)) if by_cell else (points, cells)
-        )
-        at = np.repeat(values, 3) if by_cell else values  # vertices of its own for each cell
-        self.axes.tripcolor(Triangulation(corners[:, 0], corners[:, 1], triangles), at, shading="gouraud", **look)
+        self._fill(points, cells, np.repeat(values, 3) if by_cell else values, cmap=colours, vmax=end or 1.0)
         if len(cells) * shape.body.size**2 <= LEGIBLE * shape.body.volumes.sum():
             self.axes.triplot(*points.T, cells, color="white", lw=0.6, alpha=0.5, zorder=2)
         dashed: dict[str, Any] = {"ls": (0, (5, 4)), "lw": 1.3}
@@ -64,17 +48,21 @@ class PlaneCanvas(Canvas):
         self._outline(points, shape.body.outline, ec=INK, lw=1.6, zorder=4)
         self.key(Line2D([], [], color=GREY, label="undeformed outline", **dashed))
 
-    def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
-        """Draw the body at rest, its regions in their tints.
+    def _fill(self, points: Array, cells: Integers, values: Array, **look: Any) -> None:
+        """Fill cells in the colours of values by vertex, or by corner of each cell: matplotlib's quickest way."""
+        if len(values) == cells.size:
+            points, cells = points[cells].reshape(-1, 2), np.arange(cells.size).reshape(-1, 3)
+        self.axes.tripcolor(Triangulation(*points.T, cells), values, shading="gouraud", vmin=0.0, zorder=1, **look)
 
-        Args:
-            shape: the body.
-            areas: its regions.
-            fill: the colour of a body without regions.
-        """
-        for area in areas:
-            corners = shape.at_rest[shape.body.cells[area.cells], :2]
-            self.axes.add_collection(PolyCollection(list(corners), fc=area.tint, ec=area.tint, lw=0.3, zorder=0.5))
+    def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
+        """See :meth:`.Canvas.show`."""
+        if areas:
+            number = np.zeros(len(shape.body.cells))
+            for i, area in enumerate(areas):
+                number[area.cells] = i
+            tints = ListedColormap([area.tint for area in areas])
+            corners = np.repeat(number + 0.5, 3)
+            self._fill(shape.at_rest[:, :2], shape.body.cells, corners, cmap=tints, vmax=float(len(areas)))
         self._outline(shape.at_rest, shape.body.outline, fc="none" if areas else fill, ec=INK, lw=1.6, zorder=1)
 
     def _outline(self, points: Array, loops: Sequence[Integers], *, fc: str = "none", **look: Any) -> None:
@@ -84,7 +72,7 @@ class PlaneCanvas(Canvas):
         self.reached.append(points[np.concatenate(loops), :2])
 
     def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
-        """Name the parts, and mark those where contact or a law acts; supports are drawn."""
+        """See :meth:`.Canvas.sides`; supports are drawn."""
         for side in sides:
             line = shape.at_rest[side.vertices, :2]
             middle = _at(line, np.hstack([line, side.normals[:, :2]]), np.array([_lengths(line)[-1] / 2]))[0]
@@ -101,24 +89,21 @@ class PlaneCanvas(Canvas):
             wall = line + width * outward
             strokes = TickedStroke(angle=-135, spacing=8, length=1.0, linewidth=0.9, foreground=GREY)
             self.axes.plot(*wall.T, color=INK, lw=2.2, zorder=3, path_effects=[strokes, Normal()], **_ALONG)
-            if support.rolling:
-                places = _at(line, line + width / 2 * outward, _spread(line, np.ones(len(line)), size, apart=width))
-                rollers = EllipseCollection(
-                    [width], [width], [0.0], units="xy", offsets=places, offset_transform=self.axes.transData,
-                    fc="white", ec=INK, lw=1.2, clip_on=False, zorder=5,
-                )  # fmt: skip
-                self.axes.add_collection(rollers)
-                free: dict[str, Any] = {"marker": "o", "mfc": "white", "ms": 7, "label": "support, free to slide"}
-                self.key(Line2D([], [], color=INK, lw=2.2, **free))
-            else:
-                self.key(Patch(fc="white", ec=GREY, hatch="/////", lw=0.0, label="support"))
             self.reached.append(wall + ARROW / 5 * size * outward)
+            if not support.rolling:
+                self.key(Patch(fc="white", ec=GREY, hatch="/////", lw=0.0, label="support"))
+                continue
+            places = _at(line, line + width / 2 * outward, _spread(line, np.ones(len(line)), size, apart=width))
+            rollers = EllipseCollection(
+                [width], [width], [0.0], units="xy", offsets=places, offset_transform=self.axes.transData,
+                fc="white", ec=INK, lw=1.2, clip_on=False, zorder=5,
+            )  # fmt: skip
+            self.axes.add_collection(rollers)
+            free: dict[str, Any] = {"marker": "o", "mfc": "white", "ms": 7, "label": "support, free to slide"}
+            self.key(Line2D([], [], color=INK, lw=2.2, **free))
 
     def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
-        """Arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
-
-        Each load has its own scale and value.
-        """
+        """See :meth:`.Canvas.loads`; each load has its own scale and value."""
         size = shape.body.size
         for load in found:
             line, amount = shape.points[load.side.vertices, :2], np.linalg.norm(load.traction, axis=1)
@@ -126,15 +111,10 @@ class PlaneCanvas(Canvas):
             at = _spread(line, amount, size, apart=ARROW * size * (1.4 if beside else 0.25), long=ARROW * size * beside)
             arrows = _at(line, load.traction[:, :2], at) * float(ARROW * size / load.largest)
             feet, outward = _at(line, line, at), _at(line, load.side.normals[:, :2], at)
-            pushed = np.einsum("ki,ki->k", arrows, outward) < -NOTHING * size
-            tails = (
-                feet + ARROW / 4 * size * outward - arrows / 2
-                if beside
-                else feet - np.where(pushed[:, None], arrows, 0.0)
-            )
-            self._arrows(tails, arrows, INK)
-            ends = np.concatenate([tails, tails + arrows])
-            middle = len(at) // 2
+            pushed = np.einsum("ki,ki->k", arrows, outward) < -_NOTHING * size
+            off = ARROW / 4 * size * outward - arrows / 2 if beside else np.where(pushed[:, None], -arrows, 0.0)
+            self._arrows(feet + off, arrows, INK)
+            ends, middle = np.concatenate([feet + off, feet + off + arrows]), len(at) // 2
             far = float(((ends - feet[middle]) @ outward[middle]).max(initial=0.0))
             self.labels.append(Label(load.value, feet[middle] + far * outward[middle], outward[middle]))
             self.key(Line2D([0, 1], [0, 0], color=INK, marker=">", ms=7, markevery=(1, 1), lw=1.6, label="load"))
@@ -147,9 +127,8 @@ class PlaneCanvas(Canvas):
         )  # fmt: skip
         self.reached += [tails, tails + arrows]
 
-    def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry], *, pressure: bool) -> None:
+    def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry]) -> None:
         """The obstacle of each part, where the part is off it, and the pressure on it as arrows that end there."""
-        del pressure  # there is room for it beside the body
         stress = np.nan_to_num(np.concatenate([[0.0], *(geometry.part.pressure for geometry in parts)]))
         gap = quantity(max((geometry.part.largest_gap for geometry in parts), default=0.0), "m")
         for geometry in parts:
@@ -172,7 +151,7 @@ class PlaneCanvas(Canvas):
         kinds = (1, VERMILION, "contact pressure"), (-1, PURPLE, "contact tension")
         for sign, colour, words in kinds:
             values = np.maximum(sign * np.nan_to_num(part.pressure[rows]), 0.0) / (float(np.abs(stress).max()) or 1.0)
-            if values.max() > NOTHING:
+            if values.max() > _NOTHING:
                 self._profile(base, outward, values, shape.body.size, sign, colour)
                 most = quantity(float((sign * stress).max()), "Pa")
                 self.key(Patch(fc=colour, alpha=0.5, ec=colour, label=f"{words}, up to {most}"))
@@ -186,7 +165,7 @@ class PlaneCanvas(Canvas):
         """Values along a line as an area beside it, with arrows onto the line; from it where the sign is negative."""
         tips = base + ARROW * size * values[:, None] * outward
         self.axes.add_patch(Polygon(np.concatenate([base, tips[::-1]]), color=colour, alpha=0.16, lw=0, clip_on=False))
-        shown = np.where(np.convolve(values > NOTHING, [1, 1, 1])[1:-1, None] > 0, tips, np.nan)
+        shown = np.where(np.convolve(values > _NOTHING, [1, 1, 1])[1:-1, None] > 0, tips, np.nan)
         self.axes.plot(*shown.T, color=colour, lw=1.8, zorder=5, path_effects=_HALO, clip_on=False)
         at = _spread(base, values, size, fewest=5)
         feet, ends = _at(base, base, at), _at(base, tips, at)
@@ -194,13 +173,13 @@ class PlaneCanvas(Canvas):
         self.reached.append(tips)
 
     def ghost(self, body: BodyMesh, points: Array, ways: Array) -> None:
-        """Draw a body where a motion brings it, and the ways of some of its points, (j, k, 3)."""
+        """See :meth:`.Canvas.ghost`."""
         self._outline(points, body.outline, ec=VERMILION, lw=2, ls=(0, (5, 3)), zorder=4)
         self._outline(points, body.outline, fc=VERMILION, alpha=0.12, zorder=3)
         self.follow(ways[:, :, :2])
 
     def finish(self) -> Figure:
-        """Lay out the picture and write its labels."""
+        """See :meth:`.Canvas.finish`."""
         self.lay_out()
         self.write(np.concatenate(self.reached))
         return self.fig

@@ -16,10 +16,8 @@ from ..units import round_below, times
 
 VISIBLE = 0.1
 """The largest displacement is drawn up to this part of the body's size, and the way of an escape three times as far."""
-KEPT = 0.75
-"""A small body beside a large one is drawn with this part of its area or volume, at least."""
-DRAWN = 1 / 15
-"""A plane body whose height is a smaller part of its length is drawn higher (or wider), up to this part."""
+ARROW = 0.14
+"""Part of the body's size: the longest arrow of a load, and the highest pressure."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,7 @@ def part_geometries(result: Result) -> list[PartGeometry]:
 
 
 def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
-    """The body with a round factor that makes its displacement seen, and crushes none of its pieces.
+    """The body with a round factor that makes its displacement seen.
 
     Where a part leaves its obstacle by its own shape, as a disk does a floor, the factor is 1: magnified, displacements
     would push the body through the obstacle.
@@ -122,8 +120,6 @@ def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
     u, stretch = np.nan_to_num(body.displacement), _stretch(body)
     largest = float(np.linalg.norm(u * stretch, axis=1).max(initial=0.0))
     factor = max(1.0, round_below(VISIBLE * body.size / largest)) if largest > 0.0 else 1.0
-    while factor > 1.0 and body.kept(body.points + factor * u).min() < KEPT:
-        factor = round_below(factor / 1.5)
     gap = max((float(np.nanmax(geometry.part["gap"], initial=0.0)) for geometry in parts), default=0.0)
     own_shape = factor * gap * stretch.max() > 3 * VISIBLE * body.size
     return DeformedBody(body, u, 1.0 if own_shape else factor, stretch)
@@ -139,67 +135,43 @@ def _stretch(body: BodyMesh) -> Array:
     stretch, extents = np.ones(3), body.extents[: body.dimension]
     thin = int(np.argmin(extents))
     if body.dimension == 2 and extents[thin] > 0.0:
-        stretch[thin] = max(1.0, round_below(DRAWN * body.size / float(extents[thin])))
+        stretch[thin] = max(1.0, round_below(ARROW / 2 * body.size / float(extents[thin])))
     return stretch
 
 
 @dataclass(frozen=True)
 class Motion:
-    """x → pole + rotation(x - pole) + shift: a screw, a rotation, or a translation (spin zero).
+    """A finite rigid motion, x → exp(t A) x in homogeneous coordinates.
 
     Attributes:
-        pole: a point of the axis, m, (3,).
-        shift: along the axis, or the translation, m, (3,).
-        spin: the axis times the angle, (3,).
+        generator: A, (4, 4): the velocity at x is A x.
     """
 
-    pole: Array
-    shift: Array
-    spin: Array
+    generator: Array
 
     def at(self, points: Array, part: float = 1.0) -> Array:
-        """Where points are after a part of the motion, m, (n, 3).
+        """Where points (n, 3) are after a part of the motion, m, (n, 3)."""
+        from scipy.linalg import expm
 
-        Args:
-            points: at rest, m, (n, 3).
-            part: of the motion, 0 to 1.
-        """
-        from scipy.spatial.transform import Rotation
-
-        turned = Rotation.from_rotvec(part * self.spin).apply(points - self.pole)
-        return np.asarray(self.pole + turned + part * self.shift)
+        way = expm(part * self.generator)
+        return np.asarray(points @ way[:3, :3].T + way[:3, 3])
 
 
 def escaping(body: BodyMesh) -> Motion:
-    """The finite motion whose velocity is the body's escape mode, so that a ghost keeps the body's shape.
-
-    The field is a + w × (x - c); its pole is the point of the screw's axis that is nearest to c.
-    """
+    """The motion whose velocity is the body's escape mode: unlike that, it keeps the body's shape."""
     assert body.escape_mode is not None
-    mode = body.escape_mode
+    used = np.unique(body.cells)
+    points, mode = np.column_stack([body.points[used], np.ones(len(used))]), body.escape_mode[used]
     reach = 3 * VISIBLE * body.size / (float(np.linalg.norm(mode, axis=1).max()) or 1.0)
-    middle, shift = body.points.mean(axis=0), mode.mean(axis=0)
-    arms, field = body.points - middle, mode - shift
-    inertia = np.eye(3) * np.sum(arms**2) - arms.T @ arms
-    spin = np.linalg.lstsq(inertia, np.cross(arms, field).sum(axis=0), rcond=1e-12)[0]
-    square = float(spin @ spin)
-    if square * body.size**2 < 1e-12 * float(np.max(np.sum(mode**2, axis=1))):
-        return Motion(middle, reach * shift, np.zeros(3))
-    along = float(shift @ spin) / square * spin
-    return Motion(middle + np.cross(spin, shift) / square, reach * along, reach * spin)
+    generator = np.zeros((4, 4))
+    generator[:3] = reach * np.linalg.lstsq(points, mode)[0].T
+    return Motion(generator)
 
 
 def followed(body: BodyMesh, motion: Motion) -> Array:
-    """Points to follow on their way: the middle in a translation, else one far out in each diagonal direction; (j, 3).
-
-    Args:
-        body: the body at rest.
-        motion: that it makes.
-    """
-    middle = (body.points.min(axis=0) + body.points.max(axis=0)) / 2
-    if not motion.spin.any():
-        return middle[None]
+    """Points to follow on their way: one far out in each diagonal direction that moves, (j, 3)."""
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * body.dimension)).reshape(body.dimension, -1).T
-    far = body.points[np.unique(np.argmax((body.points - middle)[:, : body.dimension] @ signs.T, axis=0))]
+    points = body.points[body.outermost]
+    far = points[np.unique(np.argmax((points - points.mean(axis=0))[:, : body.dimension] @ signs.T, axis=0))]
     way = np.linalg.norm(motion.at(far) - far, axis=1)
     return np.asarray(far[way > VISIBLE * way.max()])  # not the one that the body turns about

@@ -1,9 +1,9 @@
-"""What acts on the body's sides, from a result: loads and supports, on any shape or mesh."""
+"""What a body is made of and what acts on its sides, from a result: regions, loads and supports, on any mesh."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,35 @@ from ..units import quantity
 
 SHEAR = 0.2
 """A load is along its side where the part across it is smaller than this part of it."""
+
+
+TINTS = ("#eef2f5", "#dbe3d3", "#e6dccb", "#d9d5e3", "#d3dfe6", "#e8d9d6")
+"""Of regions: pale, since marks and names stand on them; with more regions they come again."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A region of the body.
+
+    Attributes:
+        name: its name.
+        cells: its cells, (k,).
+        tint: its colour.
+    """
+
+    name: str
+    cells: Integers
+    tint: str
+
+
+def regions(result: Result) -> list[Region]:
+    """The regions with cells, the largest first, so that one is drawn on what it is a part of; cells of none lead."""
+    named = sorted(result.arrays.regions.items(), key=lambda region: -len(region[1]))
+    cells = [np.arange(len(result.body.cells)), *(own for _, own in named)]
+    others = np.setdiff1d(cells[0], np.concatenate(cells[1:] or cells))
+    found = [("no named region", others), *named]
+    shown = [(name, own) for name, own in found if len(own)]
+    return [Region(name, own, TINTS[place % len(TINTS)]) for place, (name, own) in enumerate(shown)]
 
 
 @dataclass(frozen=True)
@@ -75,10 +104,6 @@ class LoadedSide:
         across = np.abs(np.einsum("ki,ki->k", self.traction, self.side.normals))
         return np.asarray(across <= SHEAR * np.linalg.norm(self.traction, axis=1))
 
-    def times(self, factor: float) -> LoadedSide:
-        """A multiple of the load."""
-        return replace(self, traction=factor * self.traction, total=None if self.total is None else factor * self.total)
-
 
 @dataclass(frozen=True)
 class HeldSide:
@@ -98,26 +123,25 @@ def touches(roles: Iterable[Mapping[str, Any]]) -> bool:
     return any(role["bounded"] or role["laws"] for role in roles)
 
 
-def loaded_sides(result: Result) -> list[LoadedSide]:
-    """The tractions that are not zero, and the forces that are spread over their parts."""
+def loaded_sides(result: Result, factor: float = 1.0) -> list[LoadedSide]:
+    """The tractions that are not zero, and the forces that are spread over their parts.
+
+    Args:
+        result: the result.
+        factor: by which they are multiplied.
+    """
     found, forces = [], {part: np.array([*value, 0.0][:3]) for part, key, value in result.driven if key == "force"}
     for side, roles in roles_by_side(result):
         points = result.body.points[side.vertices]
         traction = sum((_traction(role, points, side.normals) for role in roles), np.zeros(points.shape))
         traction = traction + _given(result.arrays.loads.get(side.part), side)
         if np.any(traction):
-            found.append(LoadedSide(side, traction))
+            found.append(LoadedSide(side, factor * traction))
         if np.any(force := forces.get(side.part, np.zeros(3))):
             measure = float(result.body.sizes(result.body.oriented(result.sides[side.part])).sum())
-            spread = np.broadcast_to(force / measure, side.normals.shape)
-            found.append(LoadedSide(side, spread, float(np.linalg.norm(force))))
+            spread = np.broadcast_to(factor * force / measure, side.normals.shape)
+            found.append(LoadedSide(side, spread, factor * float(np.linalg.norm(force))))
     return found
-
-
-def borne_loads(result: Result) -> list[LoadedSide]:
-    """The tractions under which the state that is shown is in equilibrium: the scene's, or the part that is borne."""
-    factor = 1.0 if result.last_borne is None else float(result.last_borne["factor"])
-    return [load.times(factor) for load in loaded_sides(result)]
 
 
 def held_sides(result: Result) -> list[HeldSide]:

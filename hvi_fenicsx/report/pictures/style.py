@@ -1,7 +1,7 @@
 """How pictures look, and how they are saved: one width, one palette, one heading, large letters.
 
 Colours are Okabe and Ito's, which colour-blind eyes can distinguish. A picture is 1200 pixels wide, and its letters are
-sized to be read on a telephone, where it is shown at a third of that.
+sized to be read on a telephone, where it is shown at a third of that. Below the heading matplotlib lays out.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -23,17 +22,15 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from ...runtime import writing
-from ..png_file import CAPTION
+from ..page import CAPTION
 from ..reader import Result
 from ..units import thousands
 from .draw import UNFINISHED
 
-WIDTH, DPI = 8.0, 150
-"""In inches, and pixels per inch."""
+WIDTH, DPI, HEADING = 8.0, 150, 0.95
+"""Width and height of the heading in inches, and pixels per inch."""
 INK, GREY, PALE = "#222222", "#6b6b6b", "#c9c9c9"
 BLUE, GREEN, VERMILION, PURPLE, ORANGE = "#0072B2", "#009E73", "#D55E00", "#AA4499", "#E69F00"
-HEADING = 0.95
-"""Height of the heading, inches."""
 _LINE = 50
 """Letters of a title in one line."""
 
@@ -50,28 +47,25 @@ matplotlib.rcParams.update(
         "text.color": INK,
         "text.parse_math": False,  # a title may hold a dollar
         "axes.unicode_minus": True,
+        "axes.formatter.useoffset": False,
         "lines.linewidth": 2.2,
         "lines.solid_capstyle": "round",
+        "legend.frameon": False,
+        "legend.fontsize": 11.5,
+        "legend.labelspacing": 0.3,
     }
 )
 
 
-def shades(dark: str, light: str = "#f4f4f1") -> LinearSegmentedColormap:
-    """A muted scale of colours.
-
-    Args:
-        dark: its end.
-        light: its beginning.
-    """
-    return LinearSegmentedColormap.from_list(dark, [light, dark])
+def shades(*colours: str) -> LinearSegmentedColormap:
+    """A muted scale of colours, from its lowest value on."""
+    return LinearSegmentedColormap.from_list("".join(colours), list(colours))
 
 
-SLATE = shades("#54799a", "#eef2f5")
+SLATE = shades("#eef2f5", "#54799a")
 """For |u|: quiet, so that what acts on the boundary stands out."""
-EMBER = LinearSegmentedColormap.from_list("ember", ["#f8f6ee", "#f2c46d", VERMILION, "#55170a"])
+EMBER = shades("#f8f6ee", "#f2c46d", VERMILION, "#55170a")
 """For the stress inside the body."""
-_PRESSED = shades(VERMILION, "#fdf3ec")
-_BOTH = LinearSegmentedColormap.from_list("both", [PURPLE, "#fdfaf7", VERMILION])
 
 
 def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColormap, float, float]:
@@ -85,30 +79,24 @@ def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColorm
         The colours, and the values at their ends, N/m².
     """
     if lowest < -1e-6 * largest:
-        return _BOTH, -largest, largest
-    return _PRESSED, 0.0, largest
+        return shades(PURPLE, "#fdfaf7", VERMILION), -largest, largest
+    return shades("#fdf3ec", VERMILION), 0.0, largest
 
 
 def figure(height: float) -> Figure:
-    """An empty picture of the common width, its height in inches."""
-    fig = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    """An empty picture of the common width, with room for its heading above a height in inches."""
+    fig = Figure(figsize=(WIDTH, HEADING + height), dpi=DPI, facecolor="white", layout="constrained")
     FigureCanvasAgg(fig)
+    resize(fig, height)
     return fig
 
 
-def area(fig: Figure, left: float, bottom: float, width: float, height: float, **keys: Any) -> Axes:
-    """Axes at a place given in inches.
-
-    Args:
-        fig: the picture.
-        left: of the axes.
-        bottom: of the axes.
-        width: of the axes.
-        height: of the axes.
-        keys: of matplotlib's ``add_axes``.
-    """
-    tall = fig.get_figheight()
-    return fig.add_axes((left / WIDTH, bottom / tall, width / WIDTH, height / tall), **keys)
+def resize(fig: Figure, height: float) -> None:
+    """Give a picture another height below its heading, inches."""
+    fig.set_figheight(HEADING + height)
+    engine = fig.get_layout_engine()
+    assert engine is not None
+    engine.set(rect=(0.01, 0.0, 0.98, height / (HEADING + height)), w_pad=0.1, h_pad=0.08)  # type: ignore[call-arg]
 
 
 def heading(fig: Figure, result: Result, subject: str) -> None:
@@ -136,12 +124,17 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
     title = textwrap.shorten(title, 2 * _LINE, placeholder=" …")
     lines = textwrap.wrap(title, _LINE) if len(title) > _LINE else [title]
     size, top, second = (17, 0.19, 0.76) if len(lines) == 1 else (13.5, 0.12, 0.85)
-    fig.text(0.3 / WIDTH, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
-    at = 1 - second / tall
-    left = fig.text(0.3 / WIDTH, at, below, size=12, color=GREY, va="baseline")
-    right = fig.text(1 - 0.3 / WIDTH, at, words, size=12, weight="bold", color=colour, ha="right", va="baseline")
-    wide, other = (text.get_window_extent().width / fig.dpi for text in (left, right))
-    left.set_fontsize(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
+    left, right, at = 0.3 / WIDTH, 1 - 0.3 / WIDTH, 1 - second / tall
+    fig.text(left, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
+    grey = fig.text(left, at, below, size=12, color=GREY)
+    bold = fig.text(right, at, words, size=12, weight="bold", color=colour, ha="right")
+    wide, other = (text.get_window_extent().width / fig.dpi for text in (grey, bold))
+    grey.set_fontsize(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
+
+
+def few_ticks(axes: Axes, axis: str, most: int = 4) -> None:
+    """Number an axis ("x" or "y") at a few round values."""
+    axes.locator_params(axis=axis, nbins=most, steps=[1, 2, 2.5, 5, 10])
 
 
 def _facts(result: Result) -> str:
@@ -177,8 +170,6 @@ def unfinished(path: Path) -> Iterator[Path]:
 def save(fig: Figure, path: Path, caption: str = "") -> None:
     """Write a picture, whole or not at all; without an alpha channel, which nothing needs, it is a quarter smaller.
 
-    More compression takes half as long again for a tenth of the size.
-
     Args:
         fig: the picture.
         path: its file.
@@ -189,9 +180,8 @@ def save(fig: Figure, path: Path, caption: str = "") -> None:
     """
     canvas = FigureCanvasAgg(fig)
     canvas.draw()
-    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    words = PngInfo()
+    image, words = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"), PngInfo()
     if caption:
         words.add_itxt(CAPTION, caption)
-    with unfinished(path) as aside:
+    with unfinished(path) as aside:  # more compression takes half as long again for a tenth of the size
         image.save(aside, dpi=(DPI, DPI), compress_level=4, pnginfo=words)
