@@ -1,170 +1,237 @@
-"""Convex programmes with laws of lengths: the objective, the points that are allowed, and forces at a point.
+"""Convex programmes with laws ψ of lengths, by cuts: as ψ never falls, ψ(δ) is at least ψ(u·v) for any unit vector u.
 
-They are solved by Newton's method (:mod:`.length_newton`).
+In a frame along u such a cut is a law of one component, and the programme one of :mod:`.convex_programme`, whose bound
+holds for all directions. Nothing is lost where u is the direction of the minimiser's vector, or of the force on it
+where it is zero. Directions come from the same programme with the stiffness ψ'/δ that a length has across the vector.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ..typing import Array, Mask
-from .arcs import ArcTable
-from .convex_programme import minimise
-from .lengths import Lengths, left_out, unknowns_of
+from .arcs import ROUNDING, ArcTable
+from .convex_programme import Optimum, minimise, never
+from .lengths import Frames, left_out, parts, unknowns_of
 from .scalar_problem import ScalarProblem
-from .thresholds import ProgrammeThresholds
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Frame:
+    """The vectors at a point: their frames, components that do not count, which are at zero, and what the laws do.
+
+    Attributes:
+        frames: along the vectors.
+        way: in which these are, (m, 3).
+        out: components that do not count, (m, 3).
+        held: whether forces hold a vector at zero, (m,).
+        start: what a law holds there before the vector moves, (m,).
+        across: stiffness across the vector, (m,).
+    """
+
+    frames: Frames
+    way: Array
+    out: Mask
+    held: Mask
+    start: Array
+    across: Array
 
 
 @dataclass(frozen=True, kw_only=True)
 class LengthProgramme:
-    """Minimise ½ xᵀAx - bᵀx + Σ ψᵢ + Σ ½ d ⟨-opening⟩², ψ being convex; those of lengths do not fall.
+    """Minimise ½ xᵀAx - bᵀx + Σ ψᵢ + Σ ½ d ⟨-opening⟩² on a box, ψ being convex; those of lengths do not fall.
 
     Attributes:
+        problem: whose vectors these are.
         a: A (n, n), symmetric, positive semidefinite.
         b: (n,).
-        chains: ψ as arcs (k, 6), n of the unknowns and m of the lengths, these from zero on.
-        lengths: of the vectors.
-        lower: bounds of the vectors' unknowns, (n,).
-        upper: bounds of them, (n,).
+        laws: ψ, n of the unknowns and m of the lengths, these from zero on.
         shut: d, (m,).
-        thresholds: how many steps, and what is rounding.
+        low: of the box, (n + m,).
+        high: of the box, (n + m,).
+        cut: whether to end with the point that is there, since the search stops.
     """
 
+    problem: ScalarProblem
     a: Array
     b: Array
-    chains: Sequence[Array]
-    lengths: Lengths
-    lower: Array
-    upper: Array
+    laws: ArcTable
     shut: Array
-    thresholds: ProgrammeThresholds
+    low: Array
+    high: Array
+    cut: Callable[[], bool] = never
 
-    @classmethod
-    def of(cls, problem: ScalarProblem, a: Array, b: Array, chains: Sequence[Array], shut: Array) -> LengthProgramme:
-        """A programme on the vectors and bounds of a problem.
+    def minimiser(self, start: Array) -> Array:
+        """A point of the box at which no step lowers the objective.
 
         Args:
-            problem: the problem.
-            a: A.
-            b: b.
-            chains: ψ.
-            shut: d.
+            start: where to begin, (n,).
         """
-        return cls(
-            a=a,
-            b=b,
-            chains=chains,
-            lengths=problem.lengths,
-            lower=problem.lower,
-            upper=problem.upper,
-            shut=shut,
-            thresholds=problem.thresholds.programmes,
-        )
+        x = self._admissible(start)
+        value = self._value(x)
+        for _ in range(self.problem.thresholds.programmes.most_steps):
+            found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
+            if found is None or self.cut():
+                break
+            x, value = found
+        return x
+
+    def bound(self, x: Array) -> Optimum:
+        """The minimum of the programme with cuts, which is no higher.
+
+        Args:
+            x: where directions are taken from, (n,).
+        """
+        return self._solved(x, self._frame(x, near_zero=False), bounding=True)
+
+    def _value(self, x: Array) -> float:
+        laws = self.laws.energy(self.problem.arguments(x)).sum()
+        lengths = self.problem.lengths
+        behind = np.where(lengths.opens, np.minimum(lengths.vectors(x)[:, 0], 0.0), 0.0)
+        return float(0.5 * x @ (self.a @ x) - self.b @ x + laws + 0.5 * self.shut @ behind**2)
+
+    def _better(self, x: Array, value: float, *, near_zero: bool) -> tuple[Array, float] | None:
+        """A point of lower objective on the way to the solution in the frames; vectors may be held at zero already."""
+        goal = self._solved(x, self._frame(x, near_zero=near_zero), bounding=False).x
+        least = ROUNDING * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
+        for halvings in range(8):
+            trial = self._admissible(x + 0.5**halvings * (goal - x))
+            after = self._value(trial)
+            if after < value - least:
+                return trial, after
+        return None
+
+    def _admissible(self, x: Array) -> Array:
+        lengths = self.problem.lengths
+        x = np.clip(x, *self._ends)
+        size = lengths.of(x)
+        share = np.divide(self._radius, size, out=np.ones_like(size), where=size > self._radius)
+        return unknowns_of(lengths, x, lengths.vectors(x) * share[:, None])
 
     @cached_property
-    def stack(self) -> ArcTable:
-        """ψ as arrays."""
-        return ArcTable.of(self.chains)
-
-    @cached_property
-    def radius(self) -> Array:
+    def _radius(self) -> Array:
         """The largest lengths that are allowed, (m,)."""
-        return self.stack.last[len(self.b) :]
+        return self.laws.last[len(self.b) :]
 
-    def value(self, x: Array) -> float:
-        """The objective.
-
-        Args:
-            x: an admissible point, (n,).
-        """
-        laws = self.stack.energy(np.concatenate([x, self.lengths.of(x)])).sum()
-        negative = np.where(self.lengths.opens, np.minimum(self.lengths.vectors(x)[:, 0], 0.0), 0.0)
-        return float(0.5 * x @ (self.a @ x) - self.b @ x + laws + 0.5 * self.shut @ negative**2)
-
-    def bound_forces(self, x: Array, laws: Array) -> Array:
-        """Forces of the bounds that are met, such that the laws' forces are left for the vectors' unknowns, (n,).
-
-        Args:
-            x: a point, (n,).
-            laws: forces of the laws on the vectors' unknowns, (n,).
-        """
-        force = self.b - self.a @ x
-        wanted = np.where(self._own, force, laws)
-        return np.where(x <= self.lower, np.maximum(wanted - force, 0.0), 0.0) + np.where(
-            x >= self.upper, np.minimum(wanted - force, 0.0), 0.0
+    def _frame(self, x: Array, *, near_zero: bool) -> _Frame:
+        lengths, n = self.problem.lengths, len(self.b)
+        along = lengths.along(self.b - self.a @ x)
+        out = left_out(lengths, x, along, self._ends)
+        z, g = np.where(out, 0.0, lengths.vectors(x)), np.where(out, 0.0, along)
+        size, start = np.linalg.norm(z, axis=1), self.laws.after[n:, 0]
+        step = z + g / self._stiffness[:, None] if near_zero else g / self._stiffness[:, None]
+        held = (start > 0.0) & (np.linalg.norm(step, axis=1) <= start / self._stiffness) & ((size == 0.0) | near_zero)
+        force = np.divide((z * g).sum(axis=1), size, out=np.zeros_like(size), where=size > 0.0)
+        least, most = self.laws.interval(np.concatenate([self.laws.low[:n, 0], np.minimum(size, self._radius)]))
+        traction = np.clip(force, np.maximum(least[n:], 0.0), np.maximum(most[n:], 0.0))
+        way = np.where((size > 0.0)[:, None], z, g)
+        return _Frame(
+            frames=Frames.along(lengths, way),
+            way=way,
+            out=out,
+            held=held,
+            start=np.where(size > 0.0, 0.0, np.maximum(start, 0.0)),
+            across=np.divide(traction, size, out=self.laws.slopes[n:, 0].copy(), where=size > 0.0),
         )
 
-    def borne(self, size: Array) -> tuple[Array, Array]:
-        """What the laws bear just before some lengths, and what they hold at zero, (m,) each.
+    def _solved(self, x: Array, here: _Frame, *, bounding: bool) -> Optimum:
+        """The programme in the frames; its solution as unknowns, on a joint of a law where the component along is."""
+        frames, lengths, n = here.frames, self.problem.lengths, len(x)
+        chains: list[Array] = [self.laws.rows(i) for i in range(n)]
+        for v, k in zip(*np.nonzero(lengths.there), strict=True):
+            chains[lengths.unknowns[v, k]] = np.array(list(self._component(here, int(v), int(k), bounding)))
+        limits = self.problem.thresholds.programmes
+        matrix, force = frames.matrix(self.a), frames.forces(self.b)
+        found = minimise(matrix, force, ArcTable.of(chains), self._begin(frames, x), limits, self.cut)
+        y = parts(lengths, found.x)
+        vectors, ahead = frames.turned(y), np.abs(y[np.arange(len(y)), frames.axis])
+        size = np.linalg.norm(vectors, axis=1)
+        on_joint = np.any(self.laws.ends[n:] == ahead[:, None], axis=1) & ~here.out.any(axis=1) & (ahead > 0.0)
+        share = np.divide(ahead, size, out=np.ones_like(size), where=on_joint & (not bounding))
+        safe = found.bound - self._rounding(found.x)
+        return Optimum(x=unknowns_of(lengths, found.x, vectors * share[:, None]), bound=safe)
 
-        Args:
-            size: the lengths, (m,).
-        """
-        n = len(self.b)
-        low, _ = self.stack.interval(np.concatenate([self.stack.low[:n, 0], np.minimum(size, self.radius)]))
-        return np.maximum(low[n:], 0.0), np.maximum(self.stack.after[n:, 0], 0.0)
+    def _begin(self, frames: Frames, x: Array) -> Array:
+        """The point in the frames; components along vectors that only rounding keeps off a joint are there."""
+        y, rows = frames.into(x), np.arange(len(frames.axis))
+        axis, joints = self.problem.lengths.unknowns[rows, frames.axis], self.laws.ends[len(x) :]
+        size = np.abs(y[axis])
+        at = joints[rows, np.argmin(np.abs(joints - size[:, None]), axis=1)]
+        y[axis] = np.where(np.abs(at - size) <= 1e-12 * size, np.copysign(at, y[axis]), y[axis])
+        return y
 
-    def admissible(self, x: Array) -> Array:
-        """The point with its unknowns and lengths on their intervals, (n,).
+    def _rounding(self, y: Array) -> float:
+        """What the frames may change of the energy of a point in them, by rounding: less than four errors a component."""
+        lengths, size = self.problem.lengths, np.abs(y)
+        each = np.abs(parts(lengths, y)).sum(axis=1)[:, None] / np.where(lengths.there, np.abs(lengths.factors), 1.0)
+        size[lengths.members] = each[lengths.there]
+        sizes = 0.5 * size @ (np.abs(self.a) @ size) + np.abs(self.b) @ size
+        return float(12.0 * np.finfo(float).eps * sizes)
 
-        Args:
-            x: a point, (n,).
-        """
-        low, high = self.stack.low[: len(x), 0], self.stack.last[: len(x)]
-        x = np.where(self._own, np.clip(x, low, high), np.clip(x, self.lower, self.upper))
-        size = self.lengths.of(x)
-        share = np.divide(self.radius, size, out=np.ones_like(size), where=size > self.radius)
-        return unknowns_of(self.lengths, x, self.lengths.vectors(x) * share[:, None])
+    def _component(self, here: _Frame, v: int, k: int, bounding: bool) -> Iterator[list[float]]:
+        """The arcs of the law of one component in its frame."""
+        opening, across = bool(self.problem.lengths.opens[v]), 0.0 if bounding else float(here.across[v])
+        start = 0.0 if bounding else float(here.start[v])
+        far = float(self._far[v])
+        if here.out[v, k]:
+            low, high = (float(end[v, k]) for end in self._sides)
+            behind = opening and k == 0
+            if low < 0.0:
+                yield _parabola(low, min(high, 0.0), *((float(self.shut[v]), 0.0) if behind else (across, -start)))
+            if high > 0.0 or low >= 0.0:
+                yield _parabola(max(low, 0.0), high, across, start)
+        elif here.held[v] and not bounding:
+            yield _parabola(0.0, 0.0)
+        elif k == here.frames.axis[v]:
+            yield from self._along(here, v, one_sided=bounding and opening and not here.out[v, 0])
+        else:
+            yield _parabola(-far, far, across, 0.0)
+
+    def _along(self, here: _Frame, v: int, *, one_sided: bool) -> list[list[float]]:
+        """The arcs of a cut u·v, on both sides of zero alike; one-sided where a negative opening would count in -u."""
+        rows = self.laws.rows(len(self.b) + v).tolist()
+        turned = [[-high, -low, -anchor, value, -rate, slope] for low, high, anchor, value, rate, slope in rows[::-1]]
+        if not one_sided:
+            return [*turned, *rows]
+        _, _, anchor, value, rate, slope = rows[0]
+        far, least = float(self._far[v]), value + (0.5 * slope * anchor - rate) * anchor
+        if here.frames.turns[v, here.frames.axis[v]] @ here.way[v] > 0.0:
+            return [[-far, 0.0, 0.0, least, 0.0, 0.0], *rows]
+        return [*turned, [0.0, far, 0.0, least, 0.0, 0.0]]
 
     @cached_property
-    def _own(self) -> Mask:
-        """Which unknowns are in no vector, (n,)."""
-        own = np.ones(len(self.b), dtype=np.bool_)
-        own[self.lengths.members] = False
-        return own
+    def _ends(self) -> tuple[Array, Array]:
+        """Where the unknowns end: in vectors at the problem's bounds, or far away, (n,) each."""
+        problem, n = self.problem, len(self.b)
+        low, high, members = self.low[:n].copy(), self.high[:n].copy(), problem.lengths.members
+        far = 2.0 * float(np.max(np.abs([low, high])))
+        low[members], high[members] = np.maximum(problem.lower, -far)[members], np.minimum(problem.upper, far)[members]
+        return low, high
+
+    @cached_property
+    def _sides(self) -> tuple[Array, Array]:
+        """Where the vectors' components end, (m, 3) each."""
+        ends = np.sort([self.problem.lengths.vectors(end) for end in self._ends], axis=0)
+        return ends[0], ends[1]
+
+    @cached_property
+    def _far(self) -> Array:
+        """The longest vector, openings that do not count included, (m,)."""
+        return np.asarray(np.linalg.norm(np.max(np.abs(self._sides), axis=0), axis=1))
+
+    @cached_property
+    def _stiffness(self) -> Array:
+        """A stiffness of each vector, (m,)."""
+        lengths = self.problem.lengths
+        own = np.diag(self.a)[lengths.unknowns]
+        each = np.divide(own, lengths.factors**2, out=np.zeros_like(own), where=lengths.there)
+        return np.maximum(each.max(axis=1), 1e-3 * float(np.max(each, initial=0.0)) or 1.0)
 
 
-def with_held_forces(programme: LengthProgramme, x: Array, springs: Array) -> tuple[Array, Array]:
-    """The minimiser where the laws' forces on vectors stay as they are at a point, and the bounds' forces, (n,) each.
-
-    Args:
-        programme: the programme.
-        x: the point, (n,).
-        springs: a matrix (n, n) that resists rigid motions.
-    """
-    held = _forces(programme, x)
-    pull = programme.b - held + springs @ x
-    chains = ArcTable.of(_without_lengths(programme, x))
-    y = minimise(programme.a + springs, pull, chains, x, programme.thresholds).x
-    return y, programme.bound_forces(y, held)
-
-
-def _forces(programme: LengthProgramme, x: Array) -> Array:
-    """Forces of the laws on the vectors' unknowns: on long vectors the traction just before, on none what it holds."""
-    lengths = programme.lengths
-    along = lengths.along(programme.b - programme.a @ x)
-    out = left_out(lengths, x, along, (programme.lower, programme.upper))
-    vectors, needed = (np.where(out, 0.0, v) for v in (lengths.vectors(x), along))
-    size, most = np.linalg.norm(vectors, axis=1), np.linalg.norm(needed, axis=1)
-    before, start = programme.borne(size)
-    moved = size > 0.0
-    way, divisor = np.where(moved[:, None], vectors, needed), np.where(moved, size, most)
-    traction = np.where(moved, before, np.minimum(most, start))
-    each = np.divide(traction, divisor, out=np.zeros_like(size), where=divisor > 0.0)[:, None] * way
-    result = np.zeros(len(x))
-    result[lengths.members] = (each * lengths.factors)[lengths.there]
-    return result
-
-
-def _without_lengths(programme: LengthProgramme, x: Array) -> list[Array]:
-    """The laws of the unknowns; of the vectors' ones their bounds."""
-    chains = list(programme.chains[: len(x)])
-    end = programme.thresholds.beyond * float(np.abs(x).max()) + 1.0
-    for i in programme.lengths.members:
-        low, high = max(float(programme.lower[i]), -end), min(float(programme.upper[i]), end)
-        chains[i] = np.array([[low, high, 0.0, 0.0, 0.0, 0.0]])
-    return chains
+def _parabola(low: float, high: float, slope: float = 0.0, traction: float = 0.0) -> list[float]:
+    """An arc about zero."""
+    return [low, high, 0.0, 0.0, traction, slope]

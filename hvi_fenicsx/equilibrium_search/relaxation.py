@@ -15,8 +15,7 @@ from .arcs import ArcTable
 from .boxes import Box
 from .convex_programme import minimise, never
 from .curvature import Curvature, CurvatureShare
-from .length_newton import LengthNewton
-from .length_programme import LengthProgramme, with_held_forces
+from .length_programme import LengthProgramme
 from .motions import Lent
 from .scalar_problem import ScalarProblem
 
@@ -112,16 +111,15 @@ class Relaxation:
         problem, undecided = self.problem, self.undecided(box.low, box.high)
         weights = self._weights(box, undecided)
         curvature, wanted = self._curvature(box, undecided, weights, part, lost)
-        chains = envelopes(problem, box.low, box.high, curvature.added)
         lent = self.lent(box, curvature)
-        stack = ArcTable.of(chains)
-        x, value, bound = self._minimised(box, curvature, lent, chains, stack)
+        stack = ArcTable.of(envelopes(problem, box.low, box.high, curvature.added))
+        x, bound = self._minimised(box, curvature, lent, stack)
         gaps = np.zeros(len(box.motion_low))
         gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), self._thresholds.tight * problem.energy_size(x))
         box = replace(
             box,
             motion_gaps=np.where(wanted, np.inf, gaps),
-            value=value + problem.constant,
+            value=bound + problem.constant,
             bound=max(box.bound, bound + problem.constant),
         )
         return self._examined(box, x, stack, curvature, undecided), curvature
@@ -164,27 +162,21 @@ class Relaxation:
         return Lent(shapes=self._share.shapes[:, used], stiffness=curvature.lent[used], low=ends[0], high=ends[1])
 
     def _minimised(
-        self, box: Box, curvature: Curvature, lent: Lent, chains: list[Array], stack: ArcTable
-    ) -> tuple[Array, float, float]:
-        """The minimiser, and two lower bounds: that of the point and a better one."""
+        self, box: Box, curvature: Curvature, lent: Lent, stack: ArcTable
+    ) -> tuple[Array, float]:
+        """The minimiser, and a lower bound."""
         problem = self.problem
         a = problem.stiffness - np.diag(problem.diagonal(curvature.added)) + lent.matrix
         b = problem.force + lent.force
-        if not len(problem.lengths):
+        if len(problem.lengths):
+            shut = curvature.added[problem.size :]
+            programme = LengthProgramme(
+                problem=problem, a=a, b=b, laws=stack, shut=shut, low=box.low, high=box.high, cut=self._cut
+            )
+            found = programme.bound(programme.minimiser(box.x))
+        else:
             found = minimise(a, b, stack, box.x, problem.thresholds.programmes, self._cut)
-            bound = found.bound + lent.constant
-            return found.x, bound, bound
-        programme = LengthProgramme.of(problem, a, b, chains, curvature.added[problem.size :])
-        newton = LengthNewton(programme, self._cut)
-        x = newton.minimiser(box.x)
-        dual = DualBound(problem=problem, low=box.low, high=box.high, added=curvature.added, lent=lent)
-        multipliers = newton.multipliers(x)
-        value = bound = dual.at(x, multipliers)
-        if np.any(np.abs(self.shares(x)) > self.joints):
-            y, pushes = with_held_forces(programme, x, self._share.springs)
-            rested = ((self._share.at_rest(p), forces) for p, forces in ((x, multipliers), (y, pushes)))
-            bound = max(bound, *(dual.at(*each) for each in rested))  # at rest the forces have less rounding
-        return x, value, bound
+        return found.x, found.bound + lent.constant
 
     def _weights(self, box: Box, undecided: Integers) -> Array:
         """How much of D each argument is to have, (n + m,)."""
@@ -221,75 +213,3 @@ class Relaxation:
 
 def _above(values: Array, least: float) -> Array:
     return np.where(values > least, values, 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class DualBound:
-    """The bound on one box.
-
-    Attributes:
-        problem: the problem.
-        low: of the box, finite, (n + m,).
-        high: of the box, finite, (n + m,).
-        added: d, (n + m,).
-        lent: curvature along rigid motions.
-    """
-
-    problem: ScalarProblem
-    low: Array
-    high: Array
-    added: Array
-    lent: Lent
-
-    def at(self, x: Array, multipliers: Array) -> float:
-        """The bound from a point, without the problem's constant.
-
-        Args:
-            x: the point, (n,).
-            multipliers: of the problem's bounds, positive at lower ones, negative at upper ones, (n,).
-        """
-        problem, lengths = self.problem, self.problem.lengths
-        pull = problem.stiffness @ x - problem.diagonal(self.added) * x + self.lent.pull(x)
-        force = problem.force + self.lent.force - pull + multipliers
-        error = self._rounding * self._sizes(x, multipliers)
-        along, slack = lengths.along(force), np.abs(lengths.along(error))
-        own = force.copy()
-        own[lengths.members] = error[lengths.members] = 0.0
-        q = np.concatenate([own, np.linalg.norm(lengths.felt(along), axis=1)])
-        values, parts = self._least(q, np.concatenate([error, np.linalg.norm(slack, axis=1)]))
-        held = np.where(multipliers != 0.0, np.where(multipliers > 0.0, problem.lower, problem.upper), 0.0)
-        shut = self._shut(along - slack)
-        bound = -0.5 * x @ pull + values.sum() + shut.sum() + multipliers @ held + self.lent.constant
-        parts += float(np.abs(shut).sum() + np.abs(multipliers * held).sum())
-        parts += 0.5 * float(np.abs(x) @ self._sizes(x, multipliers))
-        return float(bound - self._rounding * parts)
-
-    def _least(self, q: Array, error: Array) -> tuple[Array, float]:
-        """The least terms for all forces near q, which are concave in the force, and the sum of their parts' sizes."""
-        problem = self.problem
-        (first, at), (second, other) = (
-            problem.arcs.least(self.low, self.high, self.added, q + sign * error) for sign in (-1.0, 1.0)
-        )
-        values, places = np.minimum(first, second), np.maximum(np.abs(at), np.abs(other))
-        sizes = np.abs(values) + np.abs(q * places) + np.abs(0.5 * self.added * places * places)
-        return values, float(sizes.sum())
-
-    def _shut(self, along: Array) -> Array:
-        """The least of ½ d t² - g t over negative openings t, (m,)."""
-        lengths, n = self.problem.lengths, self.problem.size
-        g, d = np.where(lengths.opens, np.minimum(along[:, 0], 0.0), 0.0), self.added[n:]
-        ends = np.stack([lengths.vectors(self.low[:n])[:, 0], lengths.vectors(self.high[:n])[:, 0]])
-        end = np.minimum(ends.min(axis=0), 0.0)
-        at = np.maximum(np.divide(g, d, out=np.array(end), where=d > 0.0), end)
-        return np.asarray(np.where(g < 0.0, (0.5 * d * at - g) * at, 0.0))
-
-    @property
-    def _rounding(self) -> float:
-        """What a sum of as many terms as there are unknowns is off at most, relative to their sizes."""
-        return float(np.finfo(float).eps) * (self.problem.size + len(self.problem.lengths))
-
-    def _sizes(self, x: Array, multipliers: Array) -> Array:
-        """The sizes of all terms of the forces at a point, (n,)."""
-        problem = self.problem
-        elastic = np.abs(problem.stiffness) @ np.abs(x) + np.abs(problem.diagonal(self.added) * x)
-        return np.asarray(elastic + self.lent.size(x) + np.abs(problem.force) + np.abs(multipliers))

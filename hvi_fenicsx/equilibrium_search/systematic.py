@@ -18,7 +18,6 @@ from ..typing import Array
 from .arcs import ROUNDING
 from .convex_programme import minimise, never
 from .deflation import DeflatedNewton
-from .length_newton import LengthNewton
 from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
 from .stationarity import StationaryPoint, kind_of
@@ -197,12 +196,22 @@ def _minimiser(problem: ScalarProblem, low: Array, high: Array, x: Array, cut: C
     rising = problem.arcs.convex_part
     pull = rising.rates(at)[1] - problem.arcs.rates(at)[1]
     force = problem.force + pull[:n]
-    chains = rising.on(np.minimum(low, at), np.maximum(high, at))
+    begin = np.concatenate([np.minimum(low, at)[:n], np.zeros(len(lengths))])
+    chains = rising.on(begin, np.maximum(high, at))
     if not len(lengths):
         return minimise(problem.stiffness, force, chains, x, problem.thresholds.programmes, cut).x
     size, felt = at[n:], lengths.felt(lengths.vectors(x)) * lengths.factors
     along = np.divide(pull[n:], size, out=np.zeros_like(size), where=size > 0.0)[:, None] * felt
     force[lengths.members] += along[lengths.there]
-    laws = [chains.rows(i) for i in range(len(at))]
-    programme = LengthProgramme.of(problem, problem.stiffness, force, laws, np.zeros(len(lengths)))
-    return LengthNewton(programme, cut).minimiser(x)
+    ends = [np.concatenate([end[:n], radial]) for end, radial in ((low, np.zeros_like(size)), (high, chains.last[n:]))]
+    programme = LengthProgramme(
+        problem=problem,
+        a=problem.stiffness,
+        b=force,
+        laws=chains,
+        shut=np.zeros_like(size),
+        low=ends[0],
+        high=ends[1],
+        cut=cut,
+    )
+    return programme.minimiser(x)
