@@ -10,7 +10,7 @@ from typing import Any
 
 from .. import console, results
 from ..equilibrium_search.bodies import Equilibria
-from ..equilibrium_search.found import Clock, Found, Saved, certified_in_words, counted
+from ..equilibrium_search.found import Found, Saved, certified_in_words, counted
 from ..errors import ExitCode, NotWrittenError
 from ..report import page
 from ..report.pictures.draw import draw as draw_pictures
@@ -146,10 +146,10 @@ def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> Exi
 
 def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[files.Row]:
     """Write all equilibria, and tell how many are written; their rows. Collective."""
-    report, clock, count = _reporter(), Clock(), len(found.points)
+    report, count = _reporter(), len(found.points)
     for i in range(count):
         yield _written(call, bodies, found, i)
-        report(certified_in_words(i + 1, count, clock))
+        report(certified_in_words(i + 1, count))
 
 
 def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.Row:

@@ -8,17 +8,16 @@ are weights that prove as much of the cell as can be proven in this way. What is
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..typing import Array, Integers
-from .boxes import Box, clipped
+from .boxes import Box
 from .interior_point import Iterate, Programme, iterates
 from .relaxation import Relaxation
 from .scalar_problem import ScalarProblem
-from .thresholds import BalanceThresholds
-from .weighed_balance import Graphs, Split, Weighed, weighed
+from .weighed_balance import Graphs, Split, weighed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +56,7 @@ class BalanceProgramme:
 
     def __init__(self, problem: ScalarProblem, split: Split, low: Array, high: Array) -> None:
         self._problem, self._split, self._low, self._high = problem, split, low, high
-        self._thresholds = problem.thresholds.balance
-        self._points = _points(Graphs.of(problem, low, high), split.diagonal, self._thresholds)
+        self._points = _points(Graphs.of(problem, low, high), split.diagonal)
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
         below, above = np.flatnonzero(low <= problem.lower), np.flatnonzero(high >= problem.upper)
         self._pushed = np.concatenate([below, above])
@@ -66,8 +64,6 @@ class BalanceProgramme:
         self._bounds = np.concatenate([problem.lower[below], problem.upper[above]])
         self._force_scale, self._unit = self._scales()
         self._programme = self._made()
-        middle = self._middle
-        self._offset = float(middle @ split.matrix @ middle - problem.force @ middle)
 
     def _scales(self) -> tuple[Array, float]:
         """The scale of each force, and that of the energy."""
@@ -76,7 +72,7 @@ class BalanceProgramme:
         np.maximum.at(most, points.owner, points.t)
         np.minimum.at(least, points.owner, points.t)
         forces = np.maximum(most - least, np.abs(self._problem.stiffness) @ self._half)
-        forces = np.maximum(forces, self._thresholds.least_scale * float(forces.max()) + 1e-300)
+        forces = np.maximum(forces, 1e-3 * float(forces.max()) + 1e-300)
         largest = np.maximum(np.abs(most), np.abs(least)) + np.abs(self._problem.force)
         return forces, float(largest @ self._half) + 1e-300
 
@@ -87,7 +83,7 @@ class BalanceProgramme:
         along = np.divide(away, half[owner], out=np.zeros_like(away), where=half[owner] > 0.0)
         pull = 2.0 * (matrix @ middle) - problem.force
         cost = self._split.diagonal[owner] * points.x**2 + points.x * points.t + pull[owner] * away
-        price = self._thresholds.price * scale * float(np.max(np.abs([self._low, self._high]))) / unit
+        price = problem.thresholds.cells.price * scale * float(np.max(np.abs([self._low, self._high]))) / unit
         pushing = self._push * self._bounds * scale[self._pushed] / unit
         spare, each = np.zeros(len(self._push) + 2 * n), np.arange(n)
         ones = np.ones(n)
@@ -109,15 +105,8 @@ class BalanceProgramme:
 
     def iterates(self) -> Iterator[Iterate]:
         """The steps of the method."""
-        return iterates(self._programme, self._thresholds)
-
-    def value(self, here: Iterate) -> float:
-        """The energy of an iterate.
-
-        Args:
-            here: the iterate.
-        """
-        return here.value * self._unit + self._offset
+        limits = self._problem.thresholds
+        return iterates(self._programme, limits.programmes.most_steps, limits.points.zero, limits.programmes.close)
 
     def weights(self, here: Iterate) -> tuple[Array, Array]:
         """The weights and the point of an iterate, (n,) each.
@@ -145,19 +134,18 @@ class BalanceProgramme:
         forces = pushes * self._force_scale[self._pushed]
         np.add.at(bound, self._pushed, forces * np.abs(x[self._pushed] - self._bounds))
         law, size = x * t + d * x * x - mean, np.abs(x * t) + np.abs(d) * x * x
-        far = free & (law > self._thresholds.noise * size)
+        far = free & (law > self._problem.thresholds.points.same * size)
         return Guide(x=x, law=np.where(far, law, 0.0), bound=np.where(free, bound, 0.0))
 
 
-def _points(graphs: Graphs, diagonal: Array, thresholds: BalanceThresholds) -> _Points:
+def _points(graphs: Graphs, diagonal: Array) -> _Points:
     """The ends of arcs, and some points between them where h is convex."""
-    number, place = graphs.meets.sum(axis=1)[:, None], np.cumsum(graphs.meets, axis=1) - 1
-    stride = np.maximum(1, -(-number // thresholds.most_arcs))
-    owner, k = np.nonzero(graphs.meets & ((place % stride == 0) | (place == number - 1)))
+    owner, k = np.nonzero(graphs.meets)
     begin, end = graphs.begin[owner, k], graphs.end[owner, k]
     inner = np.flatnonzero((diagonal[owner] + graphs.slope[owner, k] > 0.0) & (end > begin))
-    which = [np.arange(len(owner))] * 2 + [inner] * len(thresholds.between)
-    x = np.concatenate([begin, end, *(begin[inner] + share * (end - begin)[inner] for share in thresholds.between)])
+    quarters = (0.25, 0.5, 0.75)
+    which = [np.arange(len(owner))] * 2 + [inner] * len(quarters)
+    x = np.concatenate([begin, end, *(begin[inner] + share * (end - begin)[inner] for share in quarters)])
     each = np.concatenate(which)
     owner, k = owner[each], k[each]
     return _Points(owner=owner, x=x, t=graphs.offset[owner, k] + graphs.slope[owner, k] * x)
@@ -185,7 +173,6 @@ class BalanceTest:
 
     def __init__(self, relaxation: Relaxation) -> None:
         self._relaxation, self._problem = relaxation, relaxation.problem
-        self._thresholds = relaxation.problem.thresholds.balance
 
     def look(self, cell: Box, cut: Callable[[], bool] = lambda: False) -> Look | None:
         """What is left of a cell; None if no stationary point is in it.
@@ -194,38 +181,24 @@ class BalanceTest:
             cell: the cell.
             cut: whether to be content with less of a proof, asked at each step of the programme.
         """
-        ends = cell.low, cell.high
-        split = Split.of(self._problem, self._relaxation.curvature(cell, self._problem.thresholds.lowest.parts[0]))
+        split = Split.of(self._problem, self._relaxation.diagonal(cell.low, cell.high))
         if not np.isfinite(split.short):
             return Look(cell=cell, guide=None)
-        best, guide = self._best(split, ends, cut)
-        if best is None:
-            return Look(cell=cell, guide=guide)
-        smaller = None if best.excludes else best.smaller(*ends)
-        if smaller is None:
-            return None
-        low, high = smaller
-        return Look(cell=replace(cell, low=low, high=high, x=clipped(cell.x, low, high)), guide=guide)
-
-    def _best(
-        self, split: Split, ends: tuple[Array, Array], cut: Callable[[], bool]
-    ) -> tuple[Weighed | None, Guide | None]:
-        """The best proof that was found, and the guide of the last iterate."""
-        limits = self._thresholds
-        programme, best, before, last = BalanceProgramme(self._problem, split, *ends), None, -np.inf, None
-        for step, here in enumerate(programme.iterates()):
-            last = here
+        programme = BalanceProgramme(self._problem, split, cell.low, cell.high)
+        best, last, limits = None, None, self._problem.thresholds
+        for step, last in enumerate(programme.iterates()):
             if cut():
                 break
-            if step < limits.first or step % limits.every != limits.first % limits.every:
-                continue
-            proof = weighed(self._problem, split, ends, *programme.weights(here))
-            if np.isfinite(proof.total) and (best is None or proof.total > best.total):
-                best = proof
-            value = programme.value(here)
-            near = value < 0.0 and here.residual < limits.settled and value - proof.total < limits.near * -value
-            still = step > limits.first and abs(proof.total - before) < limits.still * abs(before)
-            if proof.excludes or near or still:
-                break
-            before = proof.total
-        return best, None if last is None else programme.guide(last)
+            if step % 3 == 0 and 4 * step >= limits.programmes.most_steps:
+                proof = weighed(self._problem, split, (cell.low, cell.high), *programme.weights(last))
+                if proof.excludes:
+                    return None
+                if best is not None and not proof.total > best.total + limits.cells.enough * abs(best.total):
+                    break
+                if np.isfinite(proof.total):
+                    best = proof
+        guide = None if last is None else programme.guide(last)
+        if best is None:
+            return Look(cell=cell, guide=guide)
+        smaller = best.smaller(cell.low, cell.high)
+        return None if smaller is None else Look(cell=Box.around(*smaller, cell.x), guide=guide)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
+from ..certify.second_order import LOCAL_MINIMISER, NO_MINIMISER, UNDECIDED
 from ..certify.uniqueness import is_convex
 from ..errors import SolverError
 from ..reduced.condensation import Condensation
@@ -16,14 +16,14 @@ from ..solvers.method import SolveResult
 from ..typing import Array
 from ..workflow import Preparation, Solution, certified, finish
 from .condensed_form import scalar_problem
-from .curved_laws import CurvedLaws
-from .found import Found, Keep, Saved, Unit, Wanted, forget
+from .curved_laws import stationary_point
+from .found import Found, Keep, Saved, Task, Unit, forget
 from .scalar_problem import ScalarProblem
-from .search import begun, find
-from .stationarity import Kind, StationaryPoint, kind_of
+from .search import find
+from .stationarity import Kind, StationaryPoint
 from .thresholds import DEFAULT, Thresholds
 
-NONE = Found(points=(), complete=True, lower_bound=None, proven=True, nodes=0, reason="no solution exists")
+NONE = Found(complete=True, proven=True, reason="no solution exists")
 """What is found where the load moves a body away."""
 FALLS = "no lowest energy: it falls without limit as the load moves a body away"
 """What is told of a body that the load can move away from its equilibrium."""
@@ -32,6 +32,9 @@ NO_POTENTIAL = (
     "equilibria could be compared; without --lowest some equilibria are looked for"
 )
 """What is told of laws that are no derivatives of an energy."""
+
+KINDS = {LOCAL_MINIMISER: Kind.MINIMISER, NO_MINIMISER: Kind.SADDLE, UNDECIDED: Kind.UNDECIDED}
+"""What an equilibrium is by its certificate."""
 
 
 class Equilibria:
@@ -92,20 +95,24 @@ class Equilibria:
         if not lowest and saved is None and (only := self._only()) is not None:
             return only
         scales = self._prepared.problem.scales
-        wanted = Wanted(
+        task = Task(
+            problem=self.problem,
             lowest=lowest,
             gap=gap,
+            stop=stop,
+            report=report,
+            saved=saved,
+            keep=keep,
             bounded=self._prepared.solvability.state == "held",
             has_potential=self._prepared.problem.has_potential,
             no_lowest=self._no_lowest,
             known=() if lowest or saved is not None or stop() else self._known(stop),
+            unit=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
             exact=self._exact,
-            energies=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
+            refined=self._refined,
         )
         with self._prepared.timer("solve"):
-            if self.problem.error and lowest and not wanted.no_lowest:
-                wanted = self._refined(self.problem, wanted, stop, report)
-            return find(self.problem, wanted, stop, report, saved, keep)
+            return find(task)
 
     @property
     def _no_lowest(self) -> str:
@@ -122,10 +129,8 @@ class Equilibria:
         result, examined, only = known.solve_result, known.examination, known.uniqueness
         if result is None or examined is None or only is None or only.state != "unique":
             return None
-        x, energy = self._condensation.restricted(result.u), examined.energy
-        point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER, isolated=True)
-        reason = f"the only equilibrium, proven: {only.why}"
-        return Found(points=(point,), complete=True, lower_bound=energy, proven=True, nodes=0, reason=reason)
+        x, reason = self._condensation.restricted(result.u), f"the only equilibrium, proven: {only.why}"
+        return Found.only(x, examined.energy, reason)
 
     def _known(self, stop: Callable[[], bool]) -> tuple[Array, ...]:
         """The equilibrium that a run finds, if it finds one, (n,). Collective."""
@@ -141,42 +146,20 @@ class Equilibria:
             x: the point, (n,).
         """
         assert self.problem is not None
-        if len(self.problem.lengths):
-            return self._solved(self.problem, x)
-        return CurvedLaws(near=self.problem, problem=self._condensation.problem).point(x)
-
-    def _solved(self, problem: ScalarProblem, x: Array) -> StationaryPoint | None:
-        """The certified equilibrium of the whole bodies that the solver finds from a point. Collective."""
-        known = self.solution(StationaryPoint(x=x, energy=np.nan, kind=Kind.UNDECIDED, isolated=True))
+        if not len(self.problem.lengths):
+            return stationary_point(self.problem, self._condensation.problem, x)
+        known = self.solution(StationaryPoint(x=x, energy=np.nan, kind=Kind.UNDECIDED))
         if not known.converged or known.solve_result is None or known.examination is None:
             return None
-        found = self._condensation.restricted(known.solve_result.u)
-        kind = kind_of(problem, found) if self._prepared.problem.has_potential else Kind.UNDECIDED
-        return StationaryPoint(x=found, energy=known.examination.energy, kind=kind, isolated=True)
+        found, examined = self._condensation.restricted(known.solve_result.u), known.examination
+        kind = KINDS[examined.certificate.second_order] if self._prepared.problem.has_potential else Kind.UNDECIDED
+        return StationaryPoint(x=found, energy=examined.energy, kind=kind)
 
-    def _refined(
-        self, coarse: ScalarProblem, wanted: Wanted, stop: Callable[[], bool], report: Callable[[str], None]
-    ) -> Wanted:
-        """Polylines of curved laws as near as the gap needs, and a point of low energy to begin at. Collective."""
-        limits = self._thresholds.lowest
-        start = begun(coarse, limits.coarse_gap, stop, report)
-        if start is None:
-            return wanted
-        for _ in range(self._thresholds.cells.most_rounds):
-            if stop():
-                break
-            size = max(abs(start.energy), 1e-6 * coarse.energy_size(start.x))
-            aim = limits.error_share * wanted.gap * size
-            self.problem = scalar_problem(
-                self._condensation.problem, tolerance=aim, within=start.reach, thresholds=self._thresholds
-            )
-            if self.problem.error <= limits.most_share * wanted.gap * size:
-                break
-            nearer = begun(self.problem, limits.coarse_gap, stop, report, start)
-            if nearer is None or np.all(nearer.reach > limits.shorter * start.reach):
-                break
-            start = nearer
-        return replace(wanted, start=start)
+    def _refined(self, tolerance: float, within: Array) -> ScalarProblem:
+        """The problem with polylines near curved laws."""
+        return scalar_problem(
+            self._condensation.problem, tolerance=tolerance, within=within, thresholds=self._thresholds
+        )
 
     def _check_same(self, x: Array) -> None:
         """Refuse points that differ from rank to rank. Collective."""

@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 
 from ..typing import Array, Integers, Mask
 from . import stationarity
-from .arcs import ArcTable, on_interval
+from .arcs import on_interval
 from .balance_programme import Guide
 from .boxes import Box, clipped
 from .convex_programme import minimise
@@ -81,7 +81,7 @@ class PolylineCells:
         x = np.clip(x, problem.lower, problem.upper)
         if stationarity.imbalance(problem, x) > problem.thresholds.points.accuracy:
             return None
-        kind = stationarity.kind_of(problem, x)
+        kind = stationarity.kind(problem, x)
         return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
 
     def _done(self, x: Array, *, isolated: bool = True) -> Verdict:
@@ -90,7 +90,7 @@ class PolylineCells:
 
     def _minimum(self, cell: Box, added: Array) -> Array:
         """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
-        problem, chains = self._problem, ArcTable.of(envelopes(self._problem, cell.low, cell.high, added))
+        problem, chains = self._problem, envelopes(self._problem, cell.low, cell.high, added)
         programmes = problem.thresholds.programmes
         return minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x, programmes).x
 
@@ -149,7 +149,7 @@ def some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
 
 
 def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guide: Guide | None) -> list[Box]:
-    """The parts of a cell, the one to look at first last; each has its share of the search.
+    """The parts of a cell, the one to look at first last.
 
     Args:
         problem: the problem.
@@ -160,8 +160,7 @@ def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guide: Guide | No
     found = _far(problem, pivots, cell)
     if guide is not None:
         found = found or _guided(problem, cell, guide)
-    found = found or list(_any(problem, cell))
-    return [replace(part, share=cell.share / len(found)) for part in found]
+    return found or list(_any(problem, cell))
 
 
 def at_bounds(problem: ScalarProblem, cell: Box) -> Mask:
@@ -177,11 +176,10 @@ def at_bounds(problem: ScalarProblem, cell: Box) -> Mask:
 
 def _far(problem: ScalarProblem, pivots: Integers, cell: Box) -> list[Box]:
     """Growing parts of the widest interval of a pivot that reaches far: near the joints, and far on either side."""
-    thresholds = problem.thresholds.cells
     begin, end = cell.low[pivots], cell.high[pivots]
     near = np.maximum(problem.joint, np.maximum(begin, -end))
     most = np.maximum(end, -begin)
-    wide = np.flatnonzero((end - begin > thresholds.wide * problem.joint) & (most > thresholds.ratio * near))
+    wide = np.flatnonzero(most > problem.thresholds.cells.wide * near)
     if not wide.size:
         return []
     j = wide[np.argmax((end - begin)[wide])]

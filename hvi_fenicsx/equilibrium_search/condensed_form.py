@@ -49,7 +49,7 @@ def scalar_problem(
     unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
     chains = [*unknowns, *(laws.chains[v] for v in vectors)]
     whole = tuple(total(one) if one else FREE for one in chains)
-    lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, polylines.off_drops)
+    lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, thresholds.points.zero)
     stiffness, motions = with_motions(problem.stiffness, thresholds.cells)
     return ScalarProblem(
         stiffness=stiffness,

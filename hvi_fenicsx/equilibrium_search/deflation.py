@@ -45,7 +45,7 @@ class Graphs:
     def of(cls, problem: ScalarProblem) -> Graphs:
         """The graphs of a problem without laws of lengths."""
         diagonal = np.diag(problem.stiffness)
-        weight = np.maximum(diagonal, problem.thresholds.systematic.least_weight * (float(np.max(diagonal)) or 1.0))
+        weight = np.maximum(diagonal, problem.thresholds.points.zero * (float(np.max(diagonal)) or 1.0))
         ends = zip(problem.chains, problem.lower, problem.upper, weight, strict=True)
         rows = [_polyline(chain, float(low), float(high), float(k)) for chain, low, high, k in ends]
         most = max(map(len, rows))
@@ -102,7 +102,6 @@ class DeflatedNewton:
 
     def __init__(self, problem: ScalarProblem) -> None:
         self.problem, self._graphs = problem, Graphs.of(problem)
-        self._size = float(np.max(np.abs(problem.force), initial=0.0)) or 1.0
 
     def root(self, start: Array, known: Iterable[Array], reach: float, attempt: int) -> Array | None:
         """A stationary point; None if none is found.
@@ -113,28 +112,27 @@ class DeflatedNewton:
             reach: how far these push away, relative to the largest force.
             attempt: the method begins near the start, at another place for each number.
         """
-        problem, s, size = self.problem, self._parameters(start), reach * self._size
-        limits = problem.thresholds.systematic
+        problem, s, size = self.problem, self._parameters(start), reach * self.problem.force_size
         away = np.array([self._parameters(x) for x in known]).reshape(-1, problem.size)
         s = s + size * np.random.default_rng(attempt).uniform(-1.0, 1.0, problem.size)
+        longest = problem.thresholds.systematic.longest
         for _ in range(problem.thresholds.programmes.most_steps):
             x, t, dx, dt = self._graphs.at(s)
             rest = problem.stiffness @ x + t - problem.force
-            if np.max(np.abs(rest)) <= limits.accuracy * self._size:
+            if np.max(np.abs(rest)) <= problem.thresholds.points.zero * problem.force_size:
                 return x
             try:
                 step = np.linalg.solve(problem.stiffness * dx + np.diag(dt), -rest)
             except np.linalg.LinAlgError:
                 return None
-            s = np.asarray(s + _stretch((s - away) / size, np.asarray(step / size), limits.longest) * step)
+            s = np.asarray(s + _stretch((s - away) / size, np.asarray(step / size), longest) * step)
             if not np.all(np.isfinite(s)):
                 return None
         return None
 
     def _parameters(self, x: Array) -> Array:
         problem = self.problem
-        forces = problem.force - problem.stiffness @ x
-        return self._graphs.nearest(x, forces)
+        return self._graphs.nearest(x, problem.force - problem.stiffness @ x)
 
 
 def _stretch(apart: Array, step: Array, longest: float) -> float:

@@ -8,20 +8,19 @@ it, where the traction may have any value between. Laws act on one component eac
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..typing import Array
 from .balance_programme import BalanceTest, Look
-from .boxes import Box, fresh_box
+from .boxes import Box
 from .cells import PolylineCells, parts, settled
-from .elastic_radius import ElasticRadius
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
 from .scalar_problem import ScalarProblem
-from .stationarity import PointList, StationaryPoint
-from .tightening import ForceIntervals
+from .stationarity import PointList
+from .tightening import ForceIntervals, clipped_again
 
 
 @dataclass(kw_only=True)
@@ -43,19 +42,15 @@ class Enumeration:
     waiting: list[Box] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.points = PointList(self.problem.size, self.problem.thresholds.points.same)
+        self.points = PointList(self.problem.thresholds.points.same)
         self._laws, self._balance = PolylineCells(self.problem), RigidBalance(self.problem)
-        self._forces = ForceIntervals(self.problem, joints_at_ends=False)
-        self._elastic = ElasticRadius(self.problem, self._balance)
-        self._weighed = BalanceTest(Relaxation(self.problem))
+        self._forces, self._weighed = ForceIntervals(self.problem), BalanceTest(Relaxation(self.problem))
 
     def start(self) -> None:
         """Begin with a cell that is far larger than the problem's displacements."""
         problem, far = self.problem, self.problem.far
         low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
-        cell = self._tightened(fresh_box(low, high, np.zeros(problem.size)))
-        if cell is not None:
-            self.waiting.append(cell)
+        self.waiting.append(Box.around(low, high, np.zeros(problem.size)))
 
     def run(self, stop: Callable[[], bool], report: Callable[[Enumeration], None]) -> bool:
         """Divide cells until none is left; whether that is so.
@@ -78,11 +73,7 @@ class Enumeration:
         Args:
             x: the place, (n,).
         """
-        self._enter(self._laws.point(x))
-
-    def _enter(self, point: StationaryPoint | None) -> None:
-        if point is not None and not self.points.has(point.x):
-            self.points.add(point)
+        self.points.add(self._laws.point(x))
 
     def _divide(self, cell: Box) -> None:
         """Test a cell, keep its point, and put the parts of what is left on the stack."""
@@ -90,39 +81,28 @@ class Enumeration:
         if look is None:
             return
         verdict = self._laws.verdict(look.cell)
-        self._enter(verdict.point)
+        self.points.add(verdict.point)
         if not verdict.decided:
             self.waiting += parts(self.problem, self._balance.pivots, look.cell, look.guide)
 
     def _looked(self, cell: Box) -> Look | None:
         """The cell made smaller, and where to divide it; None if no stationary point is in it."""
-        look, limits = None, self.problem.thresholds.cells
-        for _ in range(limits.most_looks):
-            if (tight := self._tightened(cell)) is None:
+        look, limits = Look(cell=cell, guide=None), self.problem.thresholds.cells
+        for _ in range(limits.most_rounds):
+            if (tight := self._tightened(look.cell)) is None:
                 return None
-            if (look := self._weighed.look(tight, self.cut)) is None:
+            if (found := self._weighed.look(tight, self.cut)) is None:
                 return None
-            cell = look.cell
-            if self.cut() or not np.any(cell.high - cell.low < limits.shorter_look * (tight.high - tight.low)):
+            look = found
+            if self.cut() or not np.any(look.cell.high - look.cell.low < limits.shorter * (tight.high - tight.low)):
                 break
         return look
 
     def _tightened(self, cell: Box) -> Box | None:
-        """The cell made smaller; None if no stationary point is in it."""
-        limits = self.problem.thresholds.cells
-        for _ in range(limits.most_rounds):
-            smaller = self._tightened_once(cell)
-            if smaller is None:
-                return None
-            shrinks = np.any(smaller.high - smaller.low < limits.shorter * (cell.high - cell.low))
-            cell = settled(self.problem, smaller)
-            if not shrinks:
-                break
-        return cell
+        """The cell made smaller by balances of forces; None if no stationary point is in it."""
+        ends = clipped_again(self._balanced, cell.low, cell.high, self.problem.thresholds.cells)
+        return None if ends is None else settled(self.problem, Box.around(*ends, cell.x))
 
-    def _tightened_once(self, cell: Box) -> Box | None:
-        sides = self._forces.tightened(cell.low, cell.high)
-        sides = None if sides is None else self._balance.tightened(*sides)
-        if sides is None:
-            return None
-        return self._elastic.tightened(replace(cell, low=sides[0], high=sides[1]))
+    def _balanced(self, low: Array, high: Array) -> tuple[Array, Array] | None:
+        ends = self._forces.tightened(low, high)
+        return None if ends is None else self._balance.tightened(*ends)

@@ -2,43 +2,27 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from ..typing import Array
-from .enumeration import Enumeration
-from .lowest import Progress
-from .stationarity import StationaryPoint
+from .scalar_problem import ScalarProblem
+from .stationarity import Kind, StationaryPoint
 
 Saved = Mapping[str, Array]
 """What is left of an unfinished search: arrays, by name."""
 Keep = Callable[[Callable[[], Saved]], None]
 """Is given, after each box, what makes the state to go on from."""
+Refined = Callable[[float, Array], ScalarProblem]
+"""A problem with polylines nearer to curved laws: by the difference of the energies and where it counts, (n,)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """What an earlier search of nearly the same problem knows of its lowest point.
+def forget(state: Callable[[], Saved]) -> None:
+    """Keep nothing.
 
-    Attributes:
-        x: a point of low energy, (n,).
-        energy: there.
-        low: of a box that holds all points of lower energy, (n + m,).
-        high: of that box, (n + m,).
+    Args:
+        state: makes what could be kept.
     """
-
-    x: Array
-    energy: float
-    low: Array
-    high: Array
-
-    @property
-    def reach(self) -> Array:
-        """The largest displacement of each unknown in the box, (n,)."""
-        return np.asarray(np.max(np.abs([self.low, self.high]), axis=0)[: len(self.x)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,38 +39,49 @@ class Unit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """What is asked for.
+class Task:
+    """A search to be made.
 
     Attributes:
+        problem: the problem.
         lowest: the lowest energy with a proof; else all equilibria.
         gap: relative gap that the proof of the lowest may leave.
+        stop: asked before each box, and inside long steps.
+        report: told how far it is, in words.
+        saved: what an earlier search of the same problem left.
+        keep: keeps what is left while the search goes on.
         bounded: whether the energy is known to be bounded from below.
         has_potential: whether all laws are derivatives of an energy.
         no_lowest: why there is no lowest energy; empty where there may be one.
-        start: where the lowest is, as far as that is known.
         known: points near which equilibria are known to be, (n,) each.
-        energies: the unit of energies in reports.
+        unit: of energies in reports.
         exact: makes a point near an equilibrium exact; None where there is none near it.
+        refined: follows curved laws more closely.
     """
 
+    problem: ScalarProblem
     lowest: bool = False
     gap: float = 1e-8
+    stop: Callable[[], bool] = lambda: False
+    report: Callable[[str], None] = lambda _: None
+    saved: Saved | None = None
+    keep: Keep = forget
     bounded: bool = True
     has_potential: bool = True
     no_lowest: str = ""
-    start: Start | None = None
     known: tuple[Array, ...] = ()
-    energies: Unit = field(default_factory=Unit)
+    unit: Unit = field(default_factory=Unit)
     exact: Callable[[Array], StationaryPoint | None] | None = None
+    refined: Refined | None = None
 
-
-def forget(state: Callable[[], Saved]) -> None:
-    """Keep nothing.
-
-    Args:
-        state: makes what could be kept.
-    """
+    @property
+    def unproven(self) -> str:
+        """The laws of which it cannot be proven that all equilibria are found; empty where there are none."""
+        if not self.has_potential:
+            return "laws whose energy of separation depends on the mode"
+        if len(self.problem.lengths):
+            return "laws that act on a length"
+        return "curved laws" if self.problem.error else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,13 +98,25 @@ class Found:
         left: what is needed to go on; empty if there is nothing left.
     """
 
-    points: tuple[StationaryPoint, ...]
-    complete: bool
-    lower_bound: float | None
-    proven: bool
-    nodes: int
+    points: tuple[StationaryPoint, ...] = ()
+    complete: bool = False
+    lower_bound: float | None = None
+    proven: bool = False
+    nodes: int = 0
     reason: str
     left: Saved = field(default_factory=dict)
+
+    @classmethod
+    def only(cls, x: Array, energy: float, reason: str) -> Found:
+        """The only equilibrium, proven.
+
+        Args:
+            x: where it is, (n,).
+            energy: there.
+            reason: how it is proven.
+        """
+        point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER)
+        return cls(points=(point,), complete=True, lower_bound=energy, proven=True, reason=reason)
 
     @property
     def gap(self) -> float | None:
@@ -118,32 +125,6 @@ class Found:
             return None
         lowest = self.points[0].energy
         return max(lowest - self.lower_bound, 0.0) / (abs(lowest) or 1.0)
-
-
-LEAST_DONE = 0.01
-"""Share of a search that must be done before a time is told."""
-
-
-@dataclass(frozen=True)
-class Clock:
-    """The time since a search began.
-
-    Attributes:
-        start: seconds.
-    """
-
-    start: float = field(default_factory=time.monotonic)
-
-    def to_go(self, share: float) -> str:
-        """About how long it will take; empty where too little is done.
-
-        Args:
-            share: of the search that is open.
-        """
-        done = 1.0 - share
-        if done < LEAST_DONE:
-            return ""
-        return f", about {(time.monotonic() - self.start) * share / done:.0f} s to go"
 
 
 def counted(count: int, one: str, several: str) -> str:
@@ -157,38 +138,11 @@ def counted(count: int, one: str, several: str) -> str:
     return f"{count} {one if count == 1 else several}"
 
 
-def lowest_in_words(now: Progress, energies: Unit, clock: Clock) -> str:
-    """How far a search for the lowest energy is.
-
-    Args:
-        now: what is known.
-        energies: the unit of energies.
-        clock: since the search began.
-    """
-    low, high = (f"{bound * energies.size:.8g}" for bound in (now.lower, now.upper))
-    ends = f"between {low} and {high} {energies.name}".rstrip()
-    boxes = counted(now.boxes, "box", "boxes")
-    return f"lowest: {ends}, gap {now.gap:.1e}, {boxes}, {now.waiting} open{clock.to_go(now.share)}"
-
-
-def certified_in_words(done: int, count: int, clock: Clock) -> str:
+def certified_in_words(done: int, count: int) -> str:
     """How many of the equilibria found are certified, and written where they are written.
 
     Args:
         done: so many.
         count: of so many.
-        clock: since the first one.
     """
-    return f"certified: {done} of {count} equilibria{clock.to_go(1.0 - done / count)}"
-
-
-def all_in_words(search: Enumeration, clock: Clock) -> str:
-    """How far a search for all equilibria is.
-
-    Args:
-        search: the search.
-        clock: since it began.
-    """
-    share = sum(cell.share for cell in search.waiting)
-    found = f"{len(search.points)} found, {counted(search.cells, 'cell', 'cells')}, {len(search.waiting)} open"
-    return f"all equilibria: {found}{clock.to_go(share)}"
+    return f"certified: {done} of {count} equilibria"

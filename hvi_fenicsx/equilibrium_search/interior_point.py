@@ -14,7 +14,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..typing import Array, Integers
-from .thresholds import BalanceThresholds
+
+EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +42,7 @@ class Programme:
 
     def sums(self, shares: Array) -> Array:
         """What columns add to the three equations of each unknown, (3, n)."""
-        n = len(self.force)
-        return np.stack([np.bincount(self.owner, row * shares, n) for row in self.factors])
+        return np.stack([np.bincount(self.owner, row * shares, len(self.force)) for row in self.factors])
 
     def prices(self, duals: Array) -> Array:
         """What the equations' duals (3, n) make of each column, (m,)."""
@@ -56,93 +56,89 @@ class Iterate:
     Attributes:
         x: (n,).
         duals: of the balance, the displacements and the sums, (3, n).
-        shares: (m,).
+        shares: z, (m,).
         reduced: reduced costs, (m,).
-        value: of the programme at x and the shares.
-        residual: the largest one of all equations.
     """
 
     x: Array
     duals: Array
     shares: Array
     reduced: Array
-    value: float
-    residual: float
+
+    @property
+    def _parts(self) -> tuple[Array, ...]:
+        return self.x, self.duals, self.shares, self.reduced
+
+    def moved(self, step: tuple[Array, ...], close: float) -> Iterate:
+        """The iterate after a step, or the share of it that leaves shares and reduced costs positive.
+
+        Args:
+            step: the changes.
+            close: how near the first of these may come to zero, as a share of the way there.
+        """
+        way = min(close * _most(self.shares, step[2]), close * _most(self.reduced, step[3]))
+        x, duals, shares, reduced = (part + way * change for part, change in zip(self._parts, step, strict=True))
+        return Iterate(x=x, duals=duals, shares=shares, reduced=reduced)
 
 
-def iterates(programme: Programme, thresholds: BalanceThresholds) -> Iterator[Iterate]:
+def iterates(programme: Programme, most_steps: int, enough: float, close: float) -> Iterator[Iterate]:
     """The steps of the method, until it ends or rounding stops it.
 
     Args:
         programme: the programme.
-        thresholds: how many steps, and what is enough.
+        most_steps: how many at most.
+        enough: mean product of shares and reduced costs, and residual, that end the steps.
+        close: share of the way to the next zero of a share or a reduced cost.
     """
     n, z = len(programme.force), programme.start
-    x: Array = np.zeros(n)
-    u: Array = np.zeros((3, n))
-    s: Array = np.maximum(np.abs(programme.cost), 1.0)
-    for _ in range(thresholds.most_steps):
-        rest = _Rest.of(programme, x, u, z, s)
-        value = float(0.5 * x @ programme.curvature @ x + programme.cost @ z)
-        yield Iterate(x=x, duals=u, shares=z, reduced=s, value=value, residual=rest.largest)
-        if z @ s < thresholds.enough * len(z) and rest.largest < thresholds.balanced:
+    here = Iterate(x=np.zeros(n), duals=np.zeros((3, n)), shares=z, reduced=np.maximum(np.abs(programme.cost), 1.0))
+    for _ in range(most_steps):
+        yield here
+        rest = _rest(programme, here)
+        if here.shares @ here.reduced < enough * len(z) and max(float(np.abs(r).max()) for r in rest) < enough:
             return
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                changes = _Newton(programme, z, s, rest, thresholds).step()
+                step = _Newton(programme, here, rest).step()
         except LinAlgError:
             return
-        if not all(np.all(np.abs(change) < thresholds.largest) for change in changes):
+        if not all(np.all(np.isfinite(change)) for change in step):
             return
-        dx, du, dz, ds = changes
-        way = min(thresholds.close * _most(z, dz), thresholds.close * _most(s, ds))
-        x, u, z, s = x + way * dx, u + way * du, z + way * dz, s + way * ds
+        here = here.moved(step, close)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Rest:
+def _rest(programme: Programme, here: Iterate) -> tuple[Array, Array, Array]:
     """What the equations lack: of columns' sums (3, n), of x (n,), of reduced costs (m,)."""
-
-    primal: Array
-    dual: Array
-    cost: Array
-
-    @classmethod
-    def of(cls, programme: Programme, x: Array, u: Array, z: Array, s: Array) -> _Rest:
-        right = np.stack([programme.force, np.zeros_like(x), np.ones_like(x)])
-        return cls(
-            primal=programme.sums(z) + np.stack([programme.matrix @ x, x, np.zeros_like(x)]) - right,
-            dual=programme.curvature @ x - programme.matrix.T @ u[0] - u[1],
-            cost=s + programme.prices(u) - programme.cost,
-        )
-
-    @property
-    def largest(self) -> float:
-        return float(max(np.abs(part).max() for part in (self.primal, self.dual, self.cost)))
+    x, u = here.x, here.duals
+    right = np.stack([programme.force - programme.matrix @ x, -x, np.ones_like(x)])
+    return (
+        programme.sums(here.shares) - right,
+        programme.curvature @ x - programme.matrix.T @ u[0] - u[1],
+        here.reduced + programme.prices(u) - programme.cost,
+    )
 
 
 class _Newton:
     """A step of Newton's method, with its corrector."""
 
-    def __init__(self, programme: Programme, z: Array, s: Array, rest: _Rest, thresholds: BalanceThresholds) -> None:
-        self._programme, self._z, self._s, self._rest = programme, z, s, rest
-        self._ratio = z / s
-        self._inverse = self._blocks(thresholds)
+    def __init__(self, programme: Programme, here: Iterate, rest: tuple[Array, Array, Array]) -> None:
+        self._programme, self._z, self._s, self._rest = programme, here.shares, here.reduced, rest
+        self._ratio = self._z / self._s
+        self._inverse = self._blocks()
         matrix, inverse = programme.matrix, self._inverse
         mixed = matrix.T * inverse[:, 0, 1]
         whole = programme.curvature + matrix.T @ (inverse[:, 0, 0][:, None] * matrix) + mixed + mixed.T
         whole[np.diag_indices_from(whole)] += inverse[:, 1, 1]
         self._factors = cho_factor(0.5 * (whole + whole.T), check_finite=False)
 
-    def _blocks(self, thresholds: BalanceThresholds) -> Array:
+    def _blocks(self) -> Array:
         """The inverse of each unknown's block, (n, 3, 3)."""
         factors, owner, n = self._programme.factors, self._programme.owner, len(self._programme.force)
-        blocks = np.zeros((n, 3, 3))
-        for i in range(3):
-            for j in range(i + 1):
-                blocks[:, i, j] = blocks[:, j, i] = np.bincount(owner, factors[i] * factors[j] * self._ratio, n)
-        added = thresholds.regular * np.trace(blocks, axis1=1, axis2=2) + thresholds.least
-        return np.asarray(np.linalg.inv(blocks + added[:, None, None] * np.eye(3)))
+        blocks = np.empty((n, 3, 3))
+        for i, j in np.ndindex(3, 3):
+            blocks[:, i, j] = np.bincount(owner, factors[i] * factors[j] * self._ratio, n)
+        size = np.trace(blocks, axis1=1, axis2=2)
+        return np.asarray(np.linalg.inv(blocks + (4.0 * EPSILON * (size + 1.0))[:, None, None] * np.eye(3)))
 
     def step(self) -> tuple[Array, Array, Array, Array]:
         """The changes of x, duals, shares and reduced costs."""
@@ -153,12 +149,11 @@ class _Newton:
         return self._solved(-z * s - dz * ds + (ahead / mean) ** 3 * mean)
 
     def _solved(self, wanted: Array) -> tuple[Array, Array, Array, Array]:
-        programme, rest = self._programme, self._rest
-        moved = programme.sums(wanted / self._s + self._ratio * rest.cost)
-        v = self._times(-rest.primal - moved)
-        dx = cho_solve(self._factors, -rest.dual + programme.matrix.T @ v[0] + v[1], check_finite=False)
+        programme, (primal, dual, cost) = self._programme, self._rest
+        v = self._times(-primal - programme.sums(wanted / self._s + self._ratio * cost))
+        dx = cho_solve(self._factors, -dual + programme.matrix.T @ v[0] + v[1], check_finite=False)
         du = v - self._times(np.stack([programme.matrix @ dx, dx, np.zeros_like(dx)]))
-        ds = -rest.cost - programme.prices(du)
+        ds = -cost - programme.prices(du)
         return dx, du, (wanted - self._z * ds) / self._s, ds
 
     def _times(self, right: Array) -> Array:

@@ -70,9 +70,7 @@ def _nodes(law: Superpotential, far: float, tolerance: float, thresholds: Polyli
     kept, worst = [first[-1:]], 0.0
     while begin.size:
         full = sum(map(len, kept)) + 2 * begin.size > thresholds.most_nodes
-        least, errors = _errors(law, begin, end, thresholds.few_samples)
-        close = np.flatnonzero((errors > tolerance) & (full | (least <= tolerance)))
-        errors[close] = _errors(law, begin[close], end[close], thresholds.samples)[1]
+        errors = _errors(law, begin, end, thresholds.samples)
         fine = (errors <= tolerance) | full
         worst = float(np.max(errors[fine], initial=worst))  # not a number stays so
         kept.append(begin[fine])
@@ -129,8 +127,8 @@ def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
     return np.asarray(np.maximum(slope - below, above - slope) + rounding)
 
 
-def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> tuple[Array, Array]:
-    """The difference of the energies on intervals at samples, and bounds of it, (n,) each."""
+def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Array:
+    """Bounds of the difference of the energies on intervals, (n,)."""
     share, x = _samples(begin, end, samples)
     energy, traction = _polyline(law, begin, end, share)
     value = law.value(x.ravel()).reshape(x.shape)
@@ -139,8 +137,7 @@ def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> tupl
     span = np.abs(np.diff(traction, axis=1)) + _rises(law, x)
     between = step * np.minimum(0.25 * span, 0.125 * step * _slopes_apart(law, x, traction))
     most = np.maximum(difference[:, 1:], difference[:, :-1]) + between
-    rounding = np.finfo(float).eps * np.abs(value).max(axis=1)
-    return np.asarray(difference.max(axis=1) - rounding), np.asarray(most.max(axis=1) + rounding)
+    return np.asarray(most.max(axis=1) + np.finfo(float).eps * np.abs(value).max(axis=1))
 
 
 def _polyline(law: Superpotential, begin: Array, end: Array, share: Array) -> tuple[Array, Array]:

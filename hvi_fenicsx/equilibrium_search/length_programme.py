@@ -165,7 +165,7 @@ class LengthProgramme:
         return y
 
     def _rounding(self, y: Array) -> float:
-        """What the frames may change of the energy of a point in them, by rounding: less than four errors a component."""
+        """What the frames may change of the energy of a point in them, by rounding."""
         lengths, size = self.problem.lengths, np.abs(y)
         each = np.abs(parts(lengths, y)).sum(axis=1)[:, None] / np.where(lengths.there, np.abs(lengths.factors), 1.0)
         size[lengths.members] = each[lengths.there]

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers
 from . import envelopes as convex
-from . import motions
 from .arcs import ArcTable
-from .boxes import Box
-from .convex_programme import minimise, never
+from .convex_programme import Optimum, minimise, never
 from .curvature import Curvature, CurvatureShare
 from .length_programme import LengthProgramme
-from .motions import Lent
 from .scalar_problem import ScalarProblem
 
 
-def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> list[Array]:
+def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> ArcTable:
     """The convex envelopes of all laws with ½ d t² added, on a box; those of lengths reach to zero, and never fall.
 
     Args:
@@ -30,7 +27,7 @@ def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> 
         added: d, (n + m,).
     """
     chains = convex.envelopes(problem.arcs, low, high, added)
-    return [*chains[: problem.size], *(_risen(c) for c in chains[problem.size :])]
+    return ArcTable.of([*chains[: problem.size], *(_risen(c) for c in chains[problem.size :])])
 
 
 def _risen(chain: Array) -> Array:
@@ -52,6 +49,27 @@ def _flat(arc: Array, end: float) -> list[float]:
     anchor, value, traction, slope = map(float, arc[2:])
     away = end - anchor
     return [0.0, end, end, value + (traction + 0.5 * slope * away) * away, 0.0, 0.0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Minimum:
+    """The minimum of a relaxation on a box.
+
+    Attributes:
+        x: the minimiser, (n,).
+        bound: no point of the box has a lower energy; by strong convexity it grows with the distance from x.
+        curvature: that the laws were given.
+        gap: the largest by which an envelope is below its law at x; 0 where the relaxation is the energy.
+        argument: of that law.
+        place: where its interval is to be divided.
+    """
+
+    x: Array
+    bound: float
+    curvature: Curvature
+    gap: float
+    argument: int
+    place: float
 
 
 class Relaxation:
@@ -77,139 +95,120 @@ class Relaxation:
         wide = high > low
         return np.flatnonzero(wide & ((arcs.drops(low, high) > 0.0) | (arcs.least_slope(low, high) < 0.0)))
 
-    def share_span(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """The least and the largest shares of rigid motions in a box, (k,) each.
+    @property
+    def kernel(self) -> Array:
+        """Orthonormal columns of rigid motions, (n, k)."""
+        return self._share.kernel
+
+    def diagonal(self, low: Array, high: Array) -> Array:
+        """The diagonal D of a box, (n + m,).
 
         Args:
             low: of the box, (n + m,).
             high: of the box, (n + m,).
         """
-        n = self.problem.size
-        return motions.span(self._share.shapes, low[:n], high[:n], self.problem.thresholds.cells.widened)
+        return self._share.share(low, high, self.undecided(low, high)).added
 
-    @cached_property
-    def joints(self) -> Array:
-        """The largest shares of rigid motions at which laws have joints, (k,)."""
-        return motions.farthest_joints(self.problem, self._share.shapes)
-
-    def shares(self, x: Array) -> Array:
-        """The shares of rigid motions at a point, (k,).
+    def solve(self, low: Array, high: Array, start: Array, lost: float = 0.0) -> Minimum:
+        """The minimum on a box.
 
         Args:
-            x: the point, (n,).
-        """
-        return np.asarray(self._share.shapes.T @ x)
-
-    def solve(self, box: Box, part: float, lost: float = 0.0) -> tuple[Box, Curvature]:
-        """The box with its bound, minimiser and gaps, and the curvature that was used.
-
-        Args:
-            box: where to minimise; its x is where to begin.
-            part: share of the largest curvature.
+            low: of the box, (n + m,), finite.
+            high: of the box, (n + m,), finite.
+            start: where to begin, (n,).
             lost: energy that the chords of rigid motions may take off.
         """
-        problem, undecided = self.problem, self.undecided(box.low, box.high)
-        weights = self._weights(box, undecided)
-        curvature, wanted = self._curvature(box, undecided, weights, part, lost)
-        lent = self.lent(box, curvature)
-        stack = ArcTable.of(envelopes(problem, box.low, box.high, curvature.added))
-        x, bound = self._minimised(box, curvature, lent, stack)
-        gaps = np.zeros(len(box.motion_low))
-        gaps[np.flatnonzero(curvature.lent)] = _above(lent.gaps(x), self._thresholds.tight * problem.energy_size(x))
-        box = replace(
-            box,
-            motion_gaps=np.where(wanted, np.inf, gaps),
-            value=bound + problem.constant,
-            bound=max(box.bound, bound + problem.constant),
-        )
-        return self._examined(box, x, stack, curvature, undecided), curvature
+        undecided = self.undecided(low, high)
+        lent = self._lent(low, high) if undecided.size else None
+        if lent is not None and lent.cost > lost:
+            lent = None
+        curvature = self._share.share(low, high, undecided, lend=lent is not None)
+        stack = envelopes(self.problem, low, high, curvature.added)
+        found = self._minimised(low, high, start, curvature, lent, stack)
+        return self._examined(low, high, found, stack, curvature, lent)
 
-    def curvature(self, box: Box, part: float) -> Array:
-        """The diagonal D of a box, (n + m,).
-
-        Args:
-            box: the box.
-            part: share of the largest curvature.
-        """
-        undecided = self.undecided(box.low, box.high)
-        return self._share.share(box.low, box.high, undecided, self._weights(box, undecided), part).added
-
-    def _curvature(
-        self, box: Box, undecided: Integers, weights: Array, part: float, lost: float
-    ) -> tuple[Curvature, Mask]:
-        """The curvature, and the rigid motions whose shares are to be divided before any is lent along them, (k,)."""
-        given, wide = (box.low, box.high, undecided, weights, part), box.motion_high - box.motion_low
-        wanted: Mask = np.zeros(len(wide), dtype=np.bool_)
-        if lost > 0.0 and 0 < len(wide) <= self._thresholds.most_motions:
-            wanted = motions.long(box.motion_low, box.motion_high, self.joints, self._thresholds.growth)
-            if undecided.size and not wanted.any():
-                curvature = self._share.share(*given, lend=True)
-                cost = curvature.lent * wide**2 / 8.0
-                if cost.sum() <= lost:
-                    return curvature, wanted
-                wanted = (cost >= 0.5 * cost.max()) & (cost.sum() <= self._thresholds.most_parts**2 * lost)
-        return self._share.share(*given), wanted
-
-    def lent(self, box: Box, curvature: Curvature) -> Lent:
-        """The curvature along rigid motions with the intervals of their shares.
-
-        Args:
-            box: the box.
-            curvature: on it.
-        """
-        used = np.flatnonzero(curvature.lent)
-        ends = (box.motion_low[used], box.motion_high[used]) if used.size else (np.empty(0), np.empty(0))
-        return Lent(shapes=self._share.shapes[:, used], stiffness=curvature.lent[used], low=ends[0], high=ends[1])
+    def _lent(self, low: Array, high: Array) -> _Lent | None:
+        """The curvature along rigid motions, with the intervals of their shares in a box."""
+        shapes, n = self._share.shapes, self.problem.size
+        if not shapes.size:
+            return None
+        ends = np.sort(np.stack([shapes * low[:n, None], shapes * high[:n, None]]), axis=0)
+        slack = 1e-12 * np.abs(ends).sum(axis=(0, 1))
+        first, last = ends.sum(axis=1)
+        return _Lent(shapes=shapes, stiffness=self._share.lent, low=first - slack, high=last + slack)
 
     def _minimised(
-        self, box: Box, curvature: Curvature, lent: Lent, stack: ArcTable
-    ) -> tuple[Array, float]:
-        """The minimiser, and a lower bound."""
+        self, low: Array, high: Array, start: Array, curvature: Curvature, lent: _Lent | None, stack: ArcTable
+    ) -> Optimum:
         problem = self.problem
-        a = problem.stiffness - np.diag(problem.diagonal(curvature.added)) + lent.matrix
-        b = problem.force + lent.force
+        a, b, constant = problem.stiffness - np.diag(problem.diagonal(curvature.added)), problem.force, problem.constant
+        if lent is not None:
+            a, b, constant = a + lent.matrix, b + lent.force, constant + lent.constant
         if len(problem.lengths):
             shut = curvature.added[problem.size :]
             programme = LengthProgramme(
-                problem=problem, a=a, b=b, laws=stack, shut=shut, low=box.low, high=box.high, cut=self._cut
+                problem=problem, a=a, b=b, laws=stack, shut=shut, low=low, high=high, cut=self._cut
             )
-            found = programme.bound(programme.minimiser(box.x))
+            found = programme.bound(programme.minimiser(start))
         else:
-            found = minimise(a, b, stack, box.x, problem.thresholds.programmes, self._cut)
-        return found.x, found.bound + lent.constant
+            found = minimise(a, b, stack, start, problem.thresholds.programmes, self._cut)
+        return Optimum(x=found.x, bound=found.bound + constant)
 
-    def _weights(self, box: Box, undecided: Integers) -> Array:
-        """How much of D each argument is to have, (n + m,)."""
-        arcs, low, high = self.problem.arcs, box.low, box.high
-        drops = arcs.drops(low, high)
-        strength = np.where(drops > 0.0, drops, -arcs.least_slope(low, high) * (high - low))[undecided]
-        seen = box.weights[undecided]
-        most = float(seen.max(initial=0.0))
-        weights = np.zeros(len(low))
-        weights[undecided] = strength * (seen / most + self._thresholds.least_weight if most > 0.0 else 1.0)
-        return weights
-
-    def _examined(self, box: Box, x: Array, stack: ArcTable, curvature: Curvature, undecided: Integers) -> Box:
-        """Where the envelope is not tight at x: the gaps, the chords, and the weights for the next D."""
-        problem, at = self.problem, self.problem.arguments(x)
-        rows = np.arange(len(at))
-        k = np.minimum(stack.at(at), stack.slopes.shape[1] - 1)
-        begin, end = stack.ends[rows, k], stack.ends[rows, k + 1]
+    def _examined(
+        self, low: Array, high: Array, found: Optimum, stack: ArcTable, curvature: Curvature, lent: _Lent | None
+    ) -> Minimum:
+        """Where envelopes are not tight, and chords take something off."""
+        problem, x, at = self.problem, found.x, self.problem.arguments(found.x)
+        tight = self._thresholds.tight * problem.energy_size(x)
         gaps = problem.arcs.energy(at) + 0.5 * curvature.added * at * at - stack.energy(at)
-        loose = np.zeros(len(at), dtype=bool)
-        loose[undecided] = gaps[undecided] > self._thresholds.tight * problem.energy_size(x)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            spread = np.where(loose, 0.5 * (at - begin) * (end - at), 0.0)
-        weights = 0.5 * (box.weights + spread) if box.weights.any() else spread
-        return replace(
-            box,
-            x=x,
-            weights=weights,
-            gaps=np.where(loose, gaps, 0.0),
-            chord_low=begin,
-            chord_high=end,
-        )
+        gaps = np.where((gaps > tight) & (high > low), gaps, 0.0)
+        i = int(np.argmax(gaps))
+        place, gap = self._place(stack, i, float(at[i])), float(gaps[i])
+        if lent is not None and (off := lent.gap(x)) > max(gap, tight):
+            i, gap = int(np.argmax(np.abs(lent.shapes).max(axis=1) * (high - low)[: problem.size])), off
+            place = 0.5 * float(low[i] + high[i])
+        return Minimum(x=x, bound=found.bound, curvature=curvature, gap=gap, argument=i, place=place)
+
+    def _place(self, stack: ArcTable, i: int, at: float) -> float:
+        """The joint of a law in the chord of its envelope that is nearest to a place; the place if there is none."""
+        k = int((stack.high[i, :-1] < at).sum())
+        begin, end = stack.low[i, k], stack.high[i, k]
+        joints = self.problem.arcs.high[i]
+        inside = joints[(joints > begin) & (joints < end)]
+        return float(inside[np.argmin(np.abs(inside - at))]) if inside.size else at
 
 
-def _above(values: Array, least: float) -> Array:
-    return np.where(values > least, values, 0.0)
+@dataclass(frozen=True, kw_only=True)
+class _Lent:
+    """Curvature σ along the shapes of rigid motions, (n, k), less its chords over the intervals of their shares."""
+
+    shapes: Array
+    stiffness: float
+    low: Array
+    high: Array
+
+    @cached_property
+    def cost(self) -> float:
+        """What the chords take off at most."""
+        return float(self.stiffness * ((self.high - self.low) ** 2).sum() / 8.0)
+
+    @property
+    def matrix(self) -> Array:
+        """What is added to S, (n, n)."""
+        return np.asarray(self.stiffness * self.shapes @ self.shapes.T)
+
+    @property
+    def force(self) -> Array:
+        """What the chords add to f, (n,)."""
+        return np.asarray(self.shapes @ (self.stiffness * 0.5 * (self.low + self.high)))
+
+    @property
+    def constant(self) -> float:
+        """What the chords add to the energy, less its rounding."""
+        parts = 0.5 * self.stiffness * self.low * self.high
+        return float(parts.sum() - np.finfo(float).eps * len(self.shapes) * np.abs(parts).sum())
+
+    def gap(self, x: Array) -> float:
+        """What the chords take off at a point, (n,)."""
+        s = self.shapes.T @ x
+        return float(0.5 * self.stiffness * np.maximum((s - self.low) * (self.high - s), 0.0).sum())

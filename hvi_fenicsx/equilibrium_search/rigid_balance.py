@@ -18,7 +18,6 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from ..typing import Array, Integers
-from .arcs import ArcTable
 from .rigid_motions import RigidMotions
 from .scalar_problem import ScalarProblem
 from .tightening import GraphClip, clipped_again
@@ -35,15 +34,12 @@ class RigidBalance:
     Attributes:
         pivots: unknowns that fix the rigid motions, one for each.
         motions: T, (n, k).
-        exact: whether S resists no motion, and G is near enough to an inverse for bounds of what it is off.
-        softness: the largest square of each e whose elastic energy is ½, (n,); where this is exact.
     """
 
     def __init__(self, problem: ScalarProblem) -> None:
         self._problem, n = problem, problem.size
         self._widened = problem.thresholds.cells.widened
-        self._arcs = ArcTable.of(problem.chains[:n])
-        self._graphs = GraphClip(problem, np.zeros(n), joints_at_ends=False)
+        self._graphs = GraphClip(problem, np.zeros(n))
         motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
         self.pivots: Integers = motions.pivots
         self.motions: Array = motions.shapes
@@ -55,8 +51,7 @@ class RigidBalance:
         resistance, rounding = motions.resistance(problem.stiffness)
         self._net = np.where(resistance <= rounding, 0.0, resistance + rounding)
         self._rest = self._error()
-        self.exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
-        self.softness = np.diag(self._flexibility) + 2.0 * np.diag(self._rest @ np.abs(self._flexibility))
+        self._exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
 
     def _error(self) -> Array:
         """How far G is off the inverse on elastic parts, for exact numbers, rounding included, (n, n)."""
@@ -74,47 +69,22 @@ class RigidBalance:
             low: of the cell, (n,), finite.
             high: of the cell, (n,), finite.
         """
-        limits = self._problem.thresholds.cells
-        return clipped_again(self._once, low, high, most_rounds=limits.rigid_passes, progress=limits.rigid_progress)
-
-    def forces(self, low: Array, high: Array) -> tuple[Array, Array] | None:
-        """What laws and bounds bear in a cell, (n,) each; None if the net forces cannot be in balance.
-
-        Args:
-            low: of the cell, (n,), finite.
-            high: of the cell, (n,), finite.
-        """
-        return self._balanced(*self._forces(low, high), low, high)
+        return clipped_again(self._once, low, high, self._problem.thresholds.cells)
 
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
-        if (forces := self.forces(low, high)) is None:
+        if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
             return None
         rounding = self._widened * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
         ends = self._graphs.clipped(low, high, forces[0] - rounding, forces[1] + rounding)
         if ends is None or not np.all(np.isfinite(forces)):
             return ends
         parts = self._elastic_parts(*ends, *forces)
-        moved = self.moved(*ends, *parts.ends)
+        moved = self._moved(*ends, *parts.ends)
         return None if moved is None else self._moved_alike(*moved, parts)
-
-    def elastic_parts(self, low: Array, high: Array, forces: tuple[Array, Array]) -> tuple[Array, Array]:
-        """The intervals of e = x - T x_p in a cell, (n,) each.
-
-        Args:
-            low: of the cell, (n,), finite.
-            high: of the cell, (n,), finite.
-            forces: what laws and bounds bear there.
-        """
-        moved_low, moved_high = product(self.motions, low[self.pivots], high[self.pivots])
-        first, last = low - moved_high, high - moved_low
-        if not np.all(np.isfinite(forces)):
-            return first, last
-        begin, end = self._elastic_parts(low, high, *forces).ends
-        return np.maximum(first, begin), np.minimum(last, end)
 
     def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
         """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""
-        problem, arcs = self._problem, self._arcs
+        problem, arcs = self._problem, self._problem.arcs
         begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
         meets = arcs.meets(low, high) | ((low == high)[:, None] & (begin <= end))
         with np.errstate(invalid="ignore"):
@@ -141,27 +111,20 @@ class RigidBalance:
             least[i], most[i] = np.maximum(least[i], new[0]), np.minimum(most[i], new[1])
         return None if np.any(least > most) else (least, most)
 
-    def moved(self, low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array] | None:
-        """Smaller intervals of the displacements x = T x_p + e; None if one is empty.
-
-        Args:
-            low: of x, (n,), finite.
-            high: of x, (n,), finite.
-            first: of e, (n,), finite.
-            last: of e, (n,), finite.
-        """
+    def _moved(self, low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array] | None:
+        """Smaller intervals of the displacements x = T x_p + e, by those of e; None if one is empty."""
         begin, end = low[self.pivots], high[self.pivots]
         for j in range(len(begin)):
             motion = self.motions[:, j]
             i = np.flatnonzero(motion)
             others = np.delete(np.arange(len(begin)), j)
-            rest_low, rest_high = product(self.motions[np.ix_(i, others)], begin[others], end[others])
+            rest_low, rest_high = _product(self.motions[np.ix_(i, others)], begin[others], end[others])
             ways = np.sort(np.stack([low[i] - last[i] - rest_high, high[i] - first[i] - rest_low]) / motion[i], axis=0)
             slack = self._widened * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
             begin[j], end[j] = max(begin[j], ways[0].max() - slack), min(end[j], ways[1].min() + slack)
         if np.any(begin > end):
             return None
-        moved_low, moved_high = product(self.motions, begin, end)
+        moved_low, moved_high = _product(self.motions, begin, end)
         slack = self._widened * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
         low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
         return None if np.any(low > high) else (low, high)
@@ -188,7 +151,7 @@ class RigidBalance:
         rows, middle = flexibility * (0.5 * (most - least)), flexibility @ (problem.force - 0.5 * (least + most))
         reach = np.abs(rows).sum(axis=1)
         size = np.maximum(np.abs(low), np.abs(high))
-        if self.exact:  # then only e is off, by less than itself
+        if self._exact:  # then only e is off, by less than itself
             size = np.minimum(size, 2.0 * np.max(np.abs(middle) + reach))
         forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
         sizes = np.abs(self._flexibility) @ forces + np.abs(shift) @ (np.abs(motions.T) @ forces)
@@ -196,14 +159,8 @@ class RigidBalance:
         return ElasticParts(middle=middle, rows=rows, error=error)
 
 
-def product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """The ends of matrix @ [low, high].
-
-    Args:
-        matrix: (m, n).
-        low: of the intervals, (n,).
-        high: of the intervals, (n,).
-    """
+def _product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The ends of matrix @ [low, high]."""
     plus, minus = np.maximum(matrix, 0.0), np.minimum(matrix, 0.0)
     return plus @ low + minus @ high, plus @ high + minus @ low
 

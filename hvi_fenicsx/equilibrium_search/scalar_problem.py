@@ -58,6 +58,19 @@ class ScalarProblem:
         ends = (abs(e) for c in self.chains for a in c for e in (a.low, a.high))
         return max([1.0, *(e for e in ends if e < INF)])
 
+    def is_far(self, x: Array) -> bool:
+        """Whether a point is at the end of what is searched, or beyond: a body comes off.
+
+        Args:
+            x: the point, (n,).
+        """
+        return bool(np.max(np.abs(x), initial=0.0) >= (1.0 - 1e-9) * self.far)
+
+    @cached_property
+    def force_size(self) -> float:
+        """The largest force, not zero."""
+        return float(np.max(np.abs(self.force), initial=0.0)) or 1.0
+
     @cached_property
     def joint(self) -> float:
         """The largest displacement at which a traction bends or jumps by a share of its peak; one if there is none."""

@@ -3,176 +3,213 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import InputError, SolverError
 from ..typing import Array
-from . import systematic
-from .boxes import fresh_box
+from . import stationarity, systematic
+from .boxes import Box
 from .enumeration import Enumeration
-from .found import Clock, Found, Keep, Saved, Start, Wanted, all_in_words, counted, forget, lowest_in_words
+from .found import Found, Saved, Task, counted
 from .level_set import Cut
 from .lowest import LowestSearch, Progress
 from .scalar_problem import ScalarProblem
-from .stationarity import Kind, PointList, StationaryPoint, kind_of
+from .stationarity import Kind, PointList, StationaryPoint
 
 NO_POINT = "no equilibrium, proven"
+STOPPED = "stopped before a first bound of the energy was known"
+"""What is told where there was no time for more."""
 
 
-def find(
-    problem: ScalarProblem,
-    wanted: Wanted,
-    stop: Callable[[], bool],
-    report: Callable[[str], None],
-    saved: Saved | None = None,
-    keep: Keep = forget,
-) -> Found:
+def find(task: Task) -> Found:
     """All stationary points, or the lowest energy.
 
     Args:
-        problem: the problem.
-        wanted: what is asked for.
-        stop: asked before each box, and inside long steps.
-        report: told how far it is, in words.
-        saved: what an earlier search of the same problem left.
-        keep: keeps what is left while the search goes on.
+        task: the search.
 
     Raises:
         InputError: an earlier search was for something else.
     """
-    if not problem.size:
-        return _only(problem)
-    if saved is not None and bool(saved["lowest"]) != wanted.lowest:
+    if not task.problem.size:
+        reason = "the only equilibrium: there is no contact and no law"
+        return Found.only(np.empty(0), task.problem.constant, reason)
+    if task.saved is not None and bool(task.saved["lowest"]) != task.lowest:
         raise InputError(
             "--resume: the search there was for something else: give or leave --lowest as then, or --force"
         )
-    task = Task(problem=problem, wanted=wanted, stop=stop, report=report, saved=saved, keep=keep)
-    if wanted.lowest:
+    if task.lowest:
         return lowest(task)
-    provable = wanted.has_potential and not problem.error and not len(problem.lengths)
-    return _all(task) if provable else _without_proof(task)
-
-
-def _only(problem: ScalarProblem) -> Found:
-    """The equilibrium of bodies without contact and laws: the minimiser of a convex energy."""
-    kind = Kind.MINIMISER
-    point = StationaryPoint(x=np.empty(0), energy=problem.constant, kind=kind, isolated=True)
-    return Found(
-        points=(point,),
-        complete=True,
-        lower_bound=point.energy,
-        proven=True,
-        nodes=0,
-        reason="the only equilibrium: there is no contact and no law",
-    )
-
-
-def _left_of_all(search: Enumeration) -> Saved:
-    boxes = {name: np.array([getattr(cell, name) for cell in search.waiting]) for name in ("low", "high", "weights")}
-    points = [p.x for p in sorted(search.points, key=lambda p: p.energy)]
-    found = np.array(points) if points else np.empty((0, search.problem.size))
-    return {"lowest": np.array(False), "x": found, **boxes}
-
-
-def _resumed(task: Task, saved: Saved) -> Enumeration:
-    """A search for all points to go on with."""
-    search = Enumeration(problem=task.problem, cut=task.stop)
-    for x in saved["x"]:
-        search.enter(x)
-    low, high = saved["low"], saved["high"]
-    n = search.problem.size
-    cells = [fresh_box(low[i], high[i], 0.5 * (low[i] + high[i])[:n]) for i in range(len(low))]
-    search.waiting = [replace(cell, share=1.0 / len(cells)) for cell in cells]
-    return search
-
-
-def _patience(task: Task, known: PointList) -> Callable[[], bool]:
-    """Whether a search that proves nothing is over: to be asked before each attempt."""
-    before, vain = len(known), 0
-
-    def over() -> bool:
-        nonlocal before, vain
-        vain = vain + 1 if len(known) == before else 0
-        before = len(known)
-        return vain > task.problem.thresholds.systematic.most_vain or task.stop()
-
-    return over
+    return _without_proof(task) if task.unproven else _all(task)
 
 
 def _all(task: Task) -> Found:
-    search = Enumeration(problem=task.problem, cut=task.stop) if task.saved is None else _resumed(task, task.saved)
-    clock = Clock()
+    search = Enumeration(problem=task.problem, cut=task.stop)
 
-    def tell(now: Enumeration) -> None:
-        task.report(all_in_words(now, clock))
+    def tell(_: Enumeration) -> None:
+        found = f"{len(search.points)} found, {counted(search.cells, 'cell', 'cells')}, {len(search.waiting)} open"
+        task.report(f"all equilibria: {found}")
         task.keep(lambda: _left_of_all(search))
 
-    for x in task.wanted.known:
+    below = None
+    for x in task.known if task.saved is None else task.saved["x"]:
         search.enter(x)
-    few = False  # a few cells often are all
-    if task.saved is None:
+    if task.saved is not None:
+        ends = zip(task.saved["low"], task.saved["high"], strict=True)
+        search.waiting = [Box.around(low, high, 0.5 * (low + high)) for low, high in ends]
+    else:
         search.start()
-        few = search.run(lambda: search.cells >= task.most_boxes or task.stop(), tell)
-    below = None if few else bounded(task, [p.x for p in search.points])
-    if below is not None:
-        search.enter(below.x)
-    if task.saved is None and not few:
-        over = _patience(task, search.points)
-        for x in systematic.candidates(search.problem, search.points.listed, over, task.stop):
-            search.enter(x)
+        limit = task.problem.thresholds.systematic.first_boxes
+        if not search.run(lambda: search.cells >= limit or task.stop(), tell):
+            if (below := _bounded(task, [p.x for p in search.points])) is not None:
+                search.enter(below.x)
+            for x in systematic.candidates(task.problem, search.points, task.stop):
+                search.enter(x)
     complete = search.run(task.stop, tell)
     points = tuple(sorted(search.points, key=lambda p: p.energy))
-    bound = points[0].energy if complete and points and task.wanted.bounded else None
-    bound = bound if complete or below is None else below.progress().lower
+    bound = None if below is None else below.progress().lower
+    open_cells = counted(len(search.waiting), "cell is", "cells are")
     return Found(
         points=points,
         complete=complete,
-        lower_bound=bound,
+        lower_bound=points[0].energy if complete and points and task.bounded else bound,
         proven=complete,
         nodes=search.cells,
-        reason=_in_words(points) if complete else _open_in_words(search),
+        reason=_in_words(points) if complete else f"{len(points)} found, and {open_cells} open",
         left={} if complete else _left_of_all(search),
     )
 
 
-def _without_proof(task: Task) -> Found:
-    """What is found where it cannot be proven that these are all."""
-    problem = task.problem
-    task.report("a search without a proof that nothing is missed")
-    below = bounded(task, [])
-    known = [*task.wanted.known, *([] if below is None else [below.x])]
-    points = tuple(systematic.near_stationary(problem, known, task.stop, task.wanted.exact))
-    return Found(
-        points=points,
-        complete=False,
-        lower_bound=None if below is None else below.progress().lower - problem.error,
-        proven=False,
-        nodes=0 if below is None else below.boxes,
-        reason=f"{len(points)} found, and there may be more: {_unproven(task)} are searched without a proof",
-    )
-
-
-def _unproven(task: Task) -> str:
-    """The laws of which nothing is proven."""
-    if not task.wanted.has_potential:
-        return "laws whose energy of separation depends on the mode"
-    return "laws that act on a length" if len(task.problem.lengths) else "curved laws"
+def _left_of_all(search: Enumeration) -> Saved:
+    boxes = {name: np.array([getattr(cell, name) for cell in search.waiting]) for name in ("low", "high")}
+    x = np.array([p.x for p in search.points]).reshape(-1, search.problem.size)
+    return {"lowest": np.array(False), "x": x, **boxes}
 
 
 def _in_words(points: tuple[StationaryPoint, ...]) -> str:
     if not points:
         return NO_POINT
     continua = sum(not p.isolated for p in points)
-    return f"all equilibria, proven: {len(points)}" + (
-        f", of these {counted(continua, 'stands', 'stand')} for a continuum" if continua else ""
+    told = f", of these {counted(continua, 'stands', 'stand')} for a continuum" if continua else ""
+    return f"all equilibria, proven: {len(points)}{told}"
+
+
+def _without_proof(task: Task) -> Found:
+    """What is found where it cannot be proven that these are all."""
+    problem, limits = task.problem, task.problem.thresholds.systematic
+    task.report("a search without a proof that nothing is missed")
+    below = _bounded(task, [])
+    points, tried = PointList(limits.same), PointList(limits.same)
+
+    def enter(x: Array) -> None:
+        if not tried.has(x):
+            near = StationaryPoint(x=x, energy=problem.energy(x), kind=Kind.UNDECIDED)
+            tried.add(near)
+            points.add(near if task.exact is None else task.exact(x))
+
+    for x in (*task.known, *([] if below is None else [below.x])):
+        enter(x)
+    for x in systematic.candidates(problem, points, task.stop):
+        enter(x)
+    return Found(
+        points=tuple(sorted(points, key=lambda p: p.energy)),
+        lower_bound=None if below is None else below.progress().lower - problem.error,
+        nodes=0 if below is None else below.boxes,
+        reason=f"{len(points)} found, and there may be more: {task.unproven} are searched without a proof",
     )
 
 
-def _open_in_words(search: Enumeration) -> str:
-    """What is found, and why it is not proven that this is all."""
-    return f"{len(search.points)} found, and {counted(len(search.waiting), 'cell is', 'cells are')} open"
+def _bounded(task: Task, points: list[Array]) -> LowestSearch | None:
+    """A search for the lowest energy of a few boxes, for its bound; None where there is none."""
+    if task.no_lowest:
+        return None
+    search = LowestSearch(problem=task.problem, gap=task.gap, cut=task.stop)
+    try:
+        search.start(points)
+    except (SolverError, Cut):
+        return None
+    limit = task.problem.thresholds.systematic.first_boxes
+    search.run(lambda: search.boxes > limit or task.stop(), lambda _: None)
+    return search
+
+
+def lowest(task: Task) -> Found:
+    """The lowest energy, with a proof where it comes to its end.
+
+    Args:
+        task: the search.
+    """
+    if task.no_lowest:
+        return Found(reason=task.no_lowest)
+    search = LowestSearch(problem=task.problem, gap=task.gap, cut=task.stop)
+    try:
+        if task.problem.error and task.refined is not None:
+            search = _refined(task, task.refined)
+        if task.saved is None and not search.waiting:
+            search.start()
+        elif task.saved is not None:
+            boxes = zip(task.saved["low"], task.saved["high"], task.saved["bound"], strict=True)
+            search.resume(boxes, task.saved["x"][0])
+    except SolverError as error:
+        return Found(reason=str(error), nodes=search.boxes)
+    except Cut:
+        return Found(reason=STOPPED)
+
+    def tell(now: Progress) -> None:
+        low, high = (f"{bound * task.unit.size:.8g}" for bound in (now.lower, now.upper))
+        boxes = f"{counted(now.boxes, 'box', 'boxes')}, {now.waiting} open"
+        task.report(f"lowest: between {low} and {high} {task.unit.name}, gap {now.gap:.1e}, {boxes}")
+        if not search.proven:
+            task.keep(lambda: _left_of_lowest(search))
+
+    search.run(task.stop, tell)
+    return _proof(task, search)
+
+
+def _refined(task: Task, refined: Callable[[float, Array], ScalarProblem]) -> LowestSearch:
+    """The search with polylines as near to curved laws as the gap needs, begun where a coarse search has ended."""
+    limits = task.problem.thresholds.bounds
+    first = LowestSearch(problem=task.problem, gap=limits.coarse_gap, cut=task.stop)
+    first.start()
+    first.run(task.stop, lambda now: task.report(f"first search: gap {now.gap:.1e}"))
+    size = max(abs(first.upper), 1e-6 * task.problem.energy_size(first.x))
+    n = task.problem.size
+    problem = refined(limits.error_share * task.gap * size, np.max(np.abs(first.region), axis=0)[:n])
+    left = task.gap - 2.1 * problem.error / size  # what the polylines differ on both sides, and some more
+    search = LowestSearch(problem=problem, gap=max(left, limits.error_share * task.gap), cut=task.stop)
+    if task.saved is None:
+        search.start([first.x], first.region)
+    return search
+
+
+def _proof(task: Task, search: LowestSearch) -> Found:
+    """What a search for the lowest energy knows; curved laws are worse by what their polylines may differ."""
+    problem, now = search.problem, search.progress()
+    kind = Kind.UNDECIDED if len(problem.lengths) else stationarity.kind(problem, search.x)
+    point = StationaryPoint(x=search.x, energy=search.upper + problem.error, kind=kind)
+    if (exact := None if task.exact is None else task.exact(search.x)) is not None:
+        same = abs(exact.energy - search.upper) <= 1e-11 * problem.energy_size(search.x) and not problem.error
+        point = exact if same else replace(point, kind=exact.kind)
+    lower = now.lower - problem.error
+    open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
+    proven = search.proven and 2.0 * problem.error <= (task.gap - search.gap) * abs(search.upper)
+    reason = f"a gap of {open_gap:.1e} is left: the curved laws are known no better than this"
+    if not search.proven:
+        reason = f"a gap of {open_gap:.1e} is open in {counted(now.waiting, 'box', 'boxes')}"
+    return Found(
+        points=(point,),
+        lower_bound=lower,
+        proven=proven,
+        nodes=now.boxes,
+        reason="the lowest energy, proven" if proven else reason,
+        left={} if search.proven else _left_of_lowest(search),
+    )
+
+
+def _left_of_lowest(search: LowestSearch) -> Saved:
+    low, high, bound = (np.array(part) for part in zip(*search.open_boxes(), strict=True))
+    return {"lowest": np.array(True), "x": search.x[None], "low": low, "high": high, "bound": bound}
 
 
 def falls_passed(problem: ScalarProblem, x: Array) -> int:
@@ -188,162 +225,3 @@ def falls_passed(problem: ScalarProblem, x: Array) -> int:
     dropped = problem.arcs.drops(low, high) > 0.0
     slopes = problem.arcs.least_slope(low, high)
     return int(np.count_nonzero(moved & (dropped | (np.isfinite(slopes) & (slopes < 0.0)))))
-
-
-STOPPED = "stopped before a first bound of the energy was known"
-"""What is told where there was no time for more."""
-
-
-def lowest(task: Task) -> Found:
-    """The lowest energy, with a proof where it comes to its end.
-
-    Args:
-        task: the search.
-    """
-    problem, saved = task.problem, task.saved
-    if task.wanted.no_lowest:
-        return _no_lowest(task.wanted.no_lowest)
-    search = LowestSearch(problem=problem, gap=_own_gap(problem, task.wanted), cut=task.stop)
-    try:
-        if saved is None:
-            _start(search, task.wanted.start)
-        else:
-            boxes = (saved[name] for name in ("low", "high", "weights", "bound"))
-            search.resume(zip(*boxes, strict=True), saved["x"][0])
-    except SolverError as error:
-        return _no_lowest(str(error), search.boxes)
-    except Cut:
-        return _no_lowest(STOPPED)
-
-    clock = Clock()
-
-    def tell(now: Progress) -> None:
-        task.report(lowest_in_words(now, task.wanted.energies, clock))
-        if not search.proven:
-            task.keep(lambda: _left_of_lowest(search))
-
-    search.run(task.stop, tell)
-    return _proof(search, task.wanted)
-
-
-def _no_lowest(reason: str, boxes: int = 0) -> Found:
-    return Found(points=(), complete=False, lower_bound=None, proven=False, nodes=boxes, reason=reason)
-
-
-def _own_gap(problem: ScalarProblem, wanted: Wanted) -> float:
-    """The gap that a search may leave: what the polylines of curved laws differ, on both sides, is taken off."""
-    if not problem.error or wanted.start is None:
-        return wanted.gap
-    size, limits = abs(wanted.start.energy) or 1.0, problem.thresholds.lowest
-    return max(wanted.gap - limits.sides * problem.error / size, limits.error_share * wanted.gap)
-
-
-def begun(
-    problem: ScalarProblem,
-    gap: float,
-    stop: Callable[[], bool],
-    report: Callable[[str], None],
-    known: Start | None = None,
-) -> Start | None:
-    """A first search; None where there is no lowest energy, or no time for a first bound.
-
-    Args:
-        problem: of polylines near the laws.
-        gap: relative gap that the search may leave.
-        stop: asked before each box, and inside long steps.
-        report: told how far it is, in words.
-        known: where the lowest is, from polylines that were less near.
-    """
-    search = LowestSearch(problem=problem, gap=gap, cut=stop)
-    try:
-        _start(search, known)
-    except (SolverError, Cut):
-        return None
-    search.run(stop, lambda now: report(f"first search: gap {now.gap:.1e}, {counted(now.boxes, 'box', 'boxes')}"))
-    low, high = search.region
-    return Start(x=search.x, energy=search.upper, low=low, high=high)
-
-
-def _start(search: LowestSearch, known: Start | None) -> None:
-    """Bound the whole problem, or what an earlier search has left of it."""
-    if known is None:
-        search.start()
-    else:
-        search.start([known.x], (known.low, known.high))
-
-
-def _proof(search: LowestSearch, wanted: Wanted) -> Found:
-    """What a search for the lowest energy knows; curved laws are worse by what their polylines may differ."""
-    problem, now, point = search.problem, search.progress(), _lowest_point(search, wanted)
-    lower = now.lower - problem.error
-    proven = search.proven and 2.0 * problem.error <= (wanted.gap - search.gap) * abs(search.upper)
-    left = {} if search.proven else _left_of_lowest(search)
-    open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
-    return Found(
-        points=(point,),
-        complete=False,
-        lower_bound=lower,
-        proven=proven,
-        nodes=now.boxes,
-        reason="the lowest energy, proven" if proven else _gap_in_words(open_gap, now.waiting),
-        left=left,
-    )
-
-
-def _lowest_point(search: LowestSearch, wanted: Wanted) -> StationaryPoint:
-    """The lowest point found; a descent ends where energies are equal to rounding, so polylines are balanced."""
-    problem, x = search.problem, search.x
-    if wanted.exact is not None and not (problem.error or len(problem.lengths)):
-        exact = wanted.exact(x)
-        allowed = problem.thresholds.lowest.one_point * problem.energy_size(x)
-        if exact is not None and abs(exact.energy - search.upper) <= allowed:
-            return exact
-    return StationaryPoint(x=x, energy=search.upper + problem.error, kind=kind_of(problem, x), isolated=True)
-
-
-def _left_of_lowest(search: LowestSearch) -> Saved:
-    low, high, weights, bound = (np.array(part) for part in zip(*search.open_boxes(), strict=True))
-    boxes = {"low": low, "high": high, "weights": weights, "bound": bound}
-    return {"lowest": np.array(True), "x": search.x[None], **boxes}
-
-
-def _gap_in_words(gap: float, boxes: int) -> str:
-    """Why a proof is missing."""
-    if boxes:
-        return f"a gap of {gap:.1e} is open in {counted(boxes, 'box', 'boxes')}"
-    return f"a gap of {gap:.1e} is left: the curved laws are known no better than this"
-
-
-def bounded(task: Task, points: list[Array]) -> LowestSearch | None:
-    """A search for the lowest energy of a few boxes, for its bound; None where there is none.
-
-    Args:
-        task: the search.
-        points: that are known.
-    """
-    if task.wanted.no_lowest:
-        return None
-    search = LowestSearch(problem=task.problem, gap=task.wanted.gap, cut=task.stop)
-    try:
-        search.start(points)
-    except (SolverError, Cut):
-        return None
-    search.run(lambda: search.boxes > task.most_boxes or task.stop(), lambda _: None)
-    return search
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """A search to be made: the arguments of a search."""
-
-    problem: ScalarProblem
-    wanted: Wanted
-    stop: Callable[[], bool]
-    report: Callable[[str], None]
-    saved: Saved | None
-    keep: Keep
-
-    @property
-    def most_boxes(self) -> int:
-        """Boxes that are bounded for the gap where what was asked for is not proven."""
-        return self.problem.thresholds.lowest.most_boxes

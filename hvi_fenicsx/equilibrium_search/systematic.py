@@ -1,14 +1,12 @@
-"""A systematic search without a proof: loading from several loads, pieces of the laws, and deflation from each.
+"""A systematic search without a proof: loading from several loads, and deflation from each state.
 
-The starts are the ends of loading in steps from no load, from twice and four times the load, and from the opposite one;
-every unknown on the same piece of its law; and fronts: the pieces beyond for the unknowns that moved most. From each
-start the energy is lowered, and Newton's method looks for further points until it finds none, then from each point
-that is known (:mod:`.deflation`).
+The starts are the ends of loading in steps from no load, from twice and four times the load, and from the opposite one,
+and multiples of the first. From each the energy is lowered, and Newton's method looks for further points until it
+finds none, then from each point that is known (:mod:`.deflation`).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 
@@ -20,42 +18,37 @@ from .convex_programme import minimise, never
 from .deflation import DeflatedNewton
 from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
-from .stationarity import StationaryPoint, kind_of
+from .stationarity import PointList
 
-Exact = Callable[[Array], StationaryPoint | None]
-"""The stationary point near a given one, (n,); None where there is none."""
+PROGRAMMES = [[k / 8 for k in range(1, 9)], [2, 1.5, 1], [4, 2, 1], [-1, 0, 1]]
+"""Load factors, one after the other; each programme begins at rest."""
+MULTIPLES = (0, 0.5, 2, 5, 20)
+"""Of the state that the first one leads to."""
 
 
-def candidates(
-    problem: ScalarProblem, known: Sequence[StationaryPoint], stop: Callable[[], bool], cut: Callable[[], bool]
-) -> Iterator[Array]:
+def candidates(problem: ScalarProblem, known: PointList, stop: Callable[[], bool]) -> Iterator[Array]:
     """Points that may be stationary, one after the other.
 
     Args:
         problem: the problem.
         known: the points found, to which the caller adds those that are.
-        stop: asked before each attempt.
-        cut: whether an attempt is to be cut short.
+        stop: asked before each attempt, and inside long ones.
     """
     newton = None if len(problem.lengths) else DeflatedNewton(problem)
-    for start in _starts(problem, cut):
+    for start in _starts(problem, stop):
         if stop():
             return
-        x = _descended(problem, start, cut)
-        if cut():
-            return
-        yield x
-        if newton is not None:
+        if not problem.is_far(x := _descended(problem, start, stop)):
+            yield x
+        if newton is not None and not problem.is_far(start):
             yield from _deflated(newton, start, known, stop)
     tried = 0
-    while newton is not None and tried < len(known) < problem.thresholds.systematic.most_points:
+    while newton is not None and tried < min(len(known), problem.thresholds.systematic.most_points):
         yield from _deflated(newton, known[tried].x, known, stop)
         tried += 1
 
 
-def _deflated(
-    newton: DeflatedNewton, start: Array, known: Sequence[StationaryPoint], stop: Callable[[], bool]
-) -> Iterator[Array]:
+def _deflated(newton: DeflatedNewton, start: Array, known: PointList, stop: Callable[[], bool]) -> Iterator[Array]:
     """Points from near one start, for each reach until several attempts find no new one."""
     limits = newton.problem.thresholds.systematic
     for reach in limits.reaches:
@@ -63,98 +56,30 @@ def _deflated(
         while failures < limits.failures and not stop():
             before, attempt = len(known), attempt + 1
             found = newton.root(start, [p.x for p in known], reach, attempt)
-            if found is not None and not _far(newton.problem, found):
+            if found is not None and not newton.problem.is_far(found):
                 yield found
             failures += len(known) == before
 
 
-def near_stationary(
-    problem: ScalarProblem, known: Sequence[Array], stop: Callable[[], bool], exact: Exact | None = None
-) -> list[StationaryPoint]:
-    """Points, by energy, where laws act on lengths, or are curved and do not bound their slopes.
-
-    Args:
-        problem: the problem.
-        known: points of low energy, each (n,).
-        stop: asked before each attempt, and inside long ones.
-        exact: makes points near stationary ones exact, such as those of polylines near curved laws; None: they are
-            taken as they are.
-    """
-    points, near, same = list[StationaryPoint](), list[Array](), problem.thresholds.systematic.same
-    for x in itertools.chain(known, candidates(problem, points, stop, stop)):
-        if _far(problem, x) or any(_same(y, x, same) for y in near):
-            continue
-        near.append(x)
-        point = _as_it_is(problem, x) if exact is None else exact(x)
-        if point is not None and not any(_same(p.x, point.x, same) for p in points):
-            points.append(point)
-    return sorted(points, key=lambda p: p.energy)
-
-
-def _as_it_is(problem: ScalarProblem, x: Array) -> StationaryPoint:
-    return StationaryPoint(x=x, energy=problem.energy(x) + problem.error, kind=kind_of(problem, x), isolated=True)
-
-
-def _same(one: Array, other: Array, same: float) -> bool:
-    return bool(np.max(np.abs(one - other)) < same * (1.0 + np.max(np.abs(other), initial=0.0)))
-
-
-def _starts(problem: ScalarProblem, cut: Callable[[], bool]) -> Iterator[Array]:
-    limits = problem.thresholds.systematic
-    first = _loaded(problem, limits.programmes[0], cut)
+def _starts(problem: ScalarProblem, stop: Callable[[], bool]) -> Iterator[Array]:
+    first = _loaded(problem, PROGRAMMES[0], stop)
     yield first
-    yield from (_loaded(problem, programme, cut) for programme in limits.programmes[1:])
-    yield from (factor * first for factor in limits.multiples)
-    yield from _on_pieces(problem, first)
+    yield from (_loaded(problem, programme, stop) for programme in PROGRAMMES[1:])
+    yield from (factor * first for factor in MULTIPLES)
 
 
-def _loaded(problem: ScalarProblem, programme: Sequence[float], cut: Callable[[], bool]) -> Array:
+def _loaded(problem: ScalarProblem, programme: Sequence[float], stop: Callable[[], bool]) -> Array:
     """The state that a programme of loads leads to from rest."""
-    x = np.clip(np.zeros(problem.size), problem.lower, problem.upper)
+    x = np.zeros(problem.size)
     for factor in programme:
-        x = _descended(problem.under(factor * problem.force), x, cut)
+        x = _descended(problem.under(factor * problem.force), x, stop)
     return x
 
 
-def _on_pieces(problem: ScalarProblem, loaded: Array) -> Iterator[Array]:
-    """The balance of forces with laws of one component on one piece each, those that moved most beyond."""
-    n, arcs, limits = problem.size, problem.arcs, problem.thresholds.systematic
-    here, last = arcs.at(problem.arguments(loaded))[:n], np.array([len(c) - 1 for c in problem.chains[:n]])
-    order = np.argsort(-np.abs(loaded) * (last > 0), kind="stable")
-    moved = int(np.count_nonzero(last))
-    most = int(last.max(initial=0))
-    shifts = np.linspace(-most, most, min(2 * most, limits.most_shifts) + 1)
-    for beyond in sorted({round(shift) for shift in shifts} - {0}):
-        for count in sorted({round(moved * share) for share in np.linspace(0.0, 1.0, limits.fronts + 1)} - {0}):
-            pieces = here.copy()
-            pieces[order[:count]] += beyond
-            start = _balanced(problem, np.clip(pieces, 0, last))
-            if start is not None:
-                yield start
-
-
-def _balanced(problem: ScalarProblem, pieces: Array) -> Array | None:
-    """Where forces are in balance if each law was the parabola of one piece; None where nothing holds the body."""
-    rows, arcs = np.arange(problem.size), problem.arcs
-    slopes = np.maximum(arcs.slopes[rows, pieces], 0.0)
-    offset = arcs.tractions[rows, pieces] - slopes * arcs.anchors[rows, pieces]
-    try:
-        x = np.linalg.solve(problem.stiffness + np.diag(slopes), problem.force - offset)
-    except np.linalg.LinAlgError:
-        return None
-    return np.clip(x, np.maximum(problem.lower, -problem.far), np.minimum(problem.upper, problem.far))
-
-
-def _descended(problem: ScalarProblem, x: Array, cut: Callable[[], bool]) -> Array:
-    far = problem.far
+def _descended(problem: ScalarProblem, x: Array, stop: Callable[[], bool]) -> Array:
+    far, n = problem.far, problem.size
     low, high = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
-    n = problem.size
-    return descend(problem, low, high, np.clip(x, low[:n], high[:n]), cut=cut)[0]
-
-
-def _far(problem: ScalarProblem, x: Array) -> bool:
-    """Whether it is at the end of what is searched, or beyond: a body comes off."""
-    return bool(np.max(np.abs(x), initial=0.0) >= problem.far)
+    return descend(problem, low, high, np.clip(x, low[:n], high[:n]), cut=stop)[0]
 
 
 def descend(
@@ -175,7 +100,7 @@ def descend(
         goal: a descent that comes down too slowly to reach this energy is given up.
         cut: whether to end where it is, since the search stops.
     """
-    energy, limits = problem.energy(x), problem.thresholds.descent
+    energy, slow = problem.energy(x), problem.thresholds.programmes.slow if len(problem.lengths) else ROUNDING
     for _ in range(problem.thresholds.programmes.most_steps):
         if cut():
             break
@@ -185,7 +110,7 @@ def descend(
         if not fall > ROUNDING * size:
             break
         x, energy = found, after
-        if energy - goal > limits.reach * fall or (len(problem.lengths) and fall <= limits.slow * size):
+        if energy - goal > problem.thresholds.programmes.reach * fall or fall <= slow * size:
             break
     return np.asarray(x), energy
 

@@ -7,81 +7,37 @@ from collections.abc import Callable
 import numpy as np
 
 from ..typing import Array, Mask
-from .arcs import ArcTable
 from .scalar_problem import ScalarProblem
 from .thresholds import CellThresholds
 
 
 class ForceIntervals:
-    """What the balance of forces leaves of a box: Sᵢᵢxᵢ + ∂φᵢ(xᵢ) meets fᵢ - Σⱼ Sᵢⱼxⱼ, an interval.
+    """What the balance of forces leaves of a cell: Sᵢᵢxᵢ + ∂φᵢ(xᵢ) meets fᵢ - Σⱼ Sᵢⱼxⱼ, an interval.
 
     Args:
         problem: the problem.
-        joints_at_ends: whether a joint at the end of an interval counts with all its tractions; if not, only where the
-            interval is that joint alone.
     """
 
-    def __init__(self, problem: ScalarProblem, *, joints_at_ends: bool = True) -> None:
+    def __init__(self, problem: ScalarProblem) -> None:
         self._problem, diagonal = problem, np.diag(problem.stiffness).copy()
-        self._graphs = GraphClip(problem, diagonal, joints_at_ends=joints_at_ends)
+        self._graphs = GraphClip(problem, diagonal)
         others = problem.stiffness - np.diag(diagonal)
-        self._lengths_arcs = ArcTable.of(problem.chains[problem.size :]) if len(problem.lengths) else None
         self._positive, self._negative = np.maximum(others, 0.0), np.minimum(others, 0.0)
 
     def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
-        """A smaller box with the same stationary points; None if there is none in it.
+        """A smaller cell with the same stationary points; None if there is none in it.
 
         Args:
-            low: of the box, (n + m,), finite.
-            high: of the box, (n + m,), finite.
+            low: of the cell, (n,), finite.
+            high: of the cell, (n,), finite.
         """
-        limits = self._problem.thresholds.cells
-        return clipped_again(self._once, low, high, most_rounds=limits.force_passes, progress=limits.force_progress)
+        return clipped_again(self._once, low, high, self._problem.thresholds.cells)
 
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
-        n = self._problem.size
-        found = self._pass(low[:n], high[:n], self._most_tractions(low[n:], high[n:]))
-        return None if found is None else self._with_lengths(found, low[n:], high[n:])
-
-    def _most_tractions(self, low: Array, high: Array) -> Array:
-        """The largest forces of laws of lengths on the unknowns, (n,)."""
-        problem = self._problem
-        lengths, result = problem.lengths, np.zeros(problem.size)
-        if (arcs := self._lengths_arcs) is None:
-            return result
-        begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
-        with np.errstate(invalid="ignore"):
-            ends = [np.abs(arcs.tractions + arcs.slopes * (at - arcs.anchors)) for at in (begin, end)]
-        most = np.where(begin <= end, np.maximum(*ends), 0.0).max(axis=1)
-        result[lengths.members] = (most[:, None] * np.abs(lengths.factors))[lengths.there]
-        return result
-
-    def _with_lengths(self, box: tuple[Array, Array], low: Array, high: Array) -> tuple[Array, Array] | None:
-        """A box of the unknowns and one of the lengths, each smaller by the other; None if they do not meet."""
-        lengths = self._problem.lengths
-        if not len(lengths):
-            return box
-        factors, there = np.abs(lengths.factors), lengths.there
-        wide = 1.0 + self._problem.thresholds.cells.widened
-        reach = np.divide((high * wide)[:, None], factors, out=np.zeros_like(factors), where=there)
-        first, last = box[0].copy(), box[1].copy()
-        opening = lengths.opens[:, None] & (np.arange(3) == 0)
-        below = np.where(opening & (lengths.factors > 0.0), -np.inf, -reach)
-        above = np.where(opening & (lengths.factors < 0.0), np.inf, reach)
-        first[lengths.members] = np.maximum(first[lengths.members], below[there])
-        last[lengths.members] = np.minimum(last[lengths.members], above[there])
-        least, most = lengths.within(first, last)
-        low, high = np.maximum(low, least / wide), np.minimum(high, most * wide)
-        if np.any(first > last) or np.any(low > high):
-            return None
-        return np.concatenate([first, low]), np.concatenate([last, high])
-
-    def _pass(self, low: Array, high: Array, others: Array) -> tuple[Array, Array] | None:
         force = self._problem.force
-        least = force - self._positive @ high - self._negative @ low - others
-        most = force - self._positive @ low - self._negative @ high + others
-        widened = self._problem.thresholds.cells.widened
-        slack = widened * (np.abs(least) + np.abs(most) + np.abs(force))
+        least = force - self._positive @ high - self._negative @ low
+        most = force - self._positive @ low - self._negative @ high
+        slack = self._problem.thresholds.cells.widened * (np.abs(least) + np.abs(most) + np.abs(force))
         return self._graphs.clipped(low, high, least - slack, most + slack)
 
 
@@ -89,22 +45,19 @@ Clip = Callable[[Array, Array], tuple[Array, Array] | None]
 """A pass over intervals: smaller ones, or None if one is empty."""
 
 
-def clipped_again(
-    once: Clip, low: Array, high: Array, *, most_rounds: int, progress: float
-) -> tuple[Array, Array] | None:
+def clipped_again(once: Clip, low: Array, high: Array, limits: CellThresholds) -> tuple[Array, Array] | None:
     """What passes leave of intervals, as long as they make some of them shorter; None if one is empty.
 
     Args:
         once: a pass.
         low: of the intervals, (n,), finite.
         high: of the intervals, (n,), finite.
-        most_rounds: passes at most.
-        progress: a pass that makes no interval shorter by this share is the last.
+        limits: how many passes, and what is shorter.
     """
-    for _ in range(most_rounds):
+    for _ in range(limits.most_rounds):
         if (ends := once(low, high)) is None:
             return None
-        shorter = (ends[1] - ends[0]) < (1.0 - progress) * (high - low)
+        shorter = (ends[1] - ends[0]) < limits.shorter * (high - low)
         low, high = ends
         if not shorter.any():
             break
@@ -131,14 +84,11 @@ class GraphClip:
     Args:
         problem: the problem.
         springs: stiffness d of the springs, (n,).
-        joints_at_ends: whether a joint at the end of an interval counts with all its tractions; if not, only where the
-            interval is that joint alone, or the end is a bound of the problem.
     """
 
-    def __init__(self, problem: ScalarProblem, springs: Array, *, joints_at_ends: bool) -> None:
-        self._problem, self._springs, self._joints_at_ends = problem, springs, joints_at_ends
+    def __init__(self, problem: ScalarProblem, springs: Array) -> None:
+        self._problem, self._springs, self._arcs = problem, springs, problem.arcs
         self._cells = problem.thresholds.cells
-        self._arcs = ArcTable.of(problem.chains[: problem.size])
 
     def clipped(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
         """Smaller intervals that hold all x for which d x + ∂φ(x), and what bounds bear, meets the forces.
@@ -179,13 +129,15 @@ class GraphClip:
         return np.where(lost, np.inf, first), np.where(lost, -np.inf, last)
 
     def _at_joints(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
-        """The first and the last joint in the box whose interval of tractions meets the forces."""
+        """The first and the last joint in the box whose interval of tractions meets the forces.
+
+        One at the end of an interval only counts where the interval is that joint alone, or the end is a bound.
+        """
         arcs, d = self._arcs, self._springs[:, None]
         at = arcs.high[:, :-1]
-        inside = (at >= low[:, None]) & (at <= high[:, None])
-        if not self._joints_at_ends:
-            apart = (at > low[:, None]) & (at < high[:, None]) | (low == high)[:, None]
-            inside &= apart | (at == self._problem.lower[:, None]) | (at == self._problem.upper[:, None])
+        inside = (at > low[:, None]) & (at < high[:, None]) | (low == high)[:, None] & (at == low[:, None])
+        inside |= (at == low[:, None]) & (at == self._problem.lower[:, None])
+        inside |= (at == high[:, None]) & (at == self._problem.upper[:, None])
         with np.errstate(invalid="ignore"):
             a, b = arcs.before[:, :-1] + d * at, arcs.after[:, 1:] + d * at
             meets = inside & (np.minimum(a, b) <= most) & (np.maximum(a, b) >= least)

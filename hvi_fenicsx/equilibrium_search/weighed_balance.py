@@ -207,4 +207,4 @@ def _rounding(
     weight, bent = np.abs(y), np.abs(split.matrix) @ np.abs(point)
     size = (3.0 * np.abs(point) + 2.0 * far) @ bent + far @ (np.abs(problem.stiffness) @ weight)
     size += (far + weight) @ (np.abs(problem.force) + graphs.size()) + np.abs(split.diagonal) @ far**2
-    return problem.thresholds.balance.roundings * len(y) * EPSILON * float(size) + split.short * float(apart @ apart)
+    return problem.thresholds.cells.roundings * len(y) * EPSILON * float(size) + split.short * float(apart @ apart)

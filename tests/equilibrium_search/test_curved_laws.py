@@ -11,10 +11,12 @@ from scipy.optimize import brentq
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
-from hvi_fenicsx.equilibrium_search.curved_laws import CurvedLaws
-from hvi_fenicsx.equilibrium_search.stationarity import Kind
-from hvi_fenicsx.equilibrium_search.systematic import near_stationary
+from hvi_fenicsx.equilibrium_search.curved_laws import stationary_point
+from hvi_fenicsx.equilibrium_search.found import Task
+from hvi_fenicsx.equilibrium_search.search import find
+from hvi_fenicsx.equilibrium_search.stationarity import Kind, StationaryPoint
 from hvi_fenicsx.laws.smoothing import registered
+from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.typing import Array
 
 MODEL = laws.QuadraticLinear(2.0, 1.0, 1.0)
@@ -24,11 +26,15 @@ PAPER = registered()["paper"]().relative(MODEL, 0.1)
 SPRING = 0.8
 
 
-def two_bonds(law: laws.Superpotential, pull: Array) -> CurvedLaws:
+def two_bonds(law: laws.Superpotential, pull: Array) -> CondensedProblem:
     """Two bonds, each of which carries a load, with a spring between them, and another spring to the ground."""
     stiffness = SPRING * np.array([[1.0, -1.0], [-1.0, 1.0]]) + 0.1 * np.eye(2)
-    problem = condensed.problem(stiffness, pull, condensed.bonds(law, [0, 1]))
-    return CurvedLaws(near=scalar_problem(problem), problem=problem)
+    return condensed.problem(stiffness, pull, condensed.bonds(law, [0, 1]))
+
+
+def searched(problem: CondensedProblem) -> tuple[StationaryPoint, ...]:
+    near = scalar_problem(problem)
+    return find(Task(problem=near, exact=lambda x: stationary_point(near, problem, x))).points
 
 
 def scanned(law: laws.Superpotential, pull: Array) -> Array:
@@ -57,11 +63,11 @@ def test_minimisers_and_saddles_of_two_bonds_are_those_of_a_scan(
 ) -> None:
     pull = share * float(law.right(np.linspace(0.0, 5.0, 5001)).max()) * np.array([1.05, 0.95])
     both, wanted = two_bonds(law, pull), scanned(law, pull)
-    found = near_stationary(both.near, [], lambda: False, both.point)
+    found = searched(both)
     assert len(found) == len(wanted) == count
     for point in found:
         assert np.min(np.abs(wanted - point.x).max(axis=1)) < 1e-8
-        turning = both.near.stiffness + np.diag(law.convex.second(point.x) - law.concave.second(point.x))
+        turning = both.stiffness + np.diag(law.convex.second(point.x) - law.concave.second(point.x))
         assert (point.kind == Kind.MINIMISER) == bool(np.linalg.eigvalsh(turning)[0] > 0.0)
 
 

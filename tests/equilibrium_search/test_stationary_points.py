@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 from collections.abc import Sequence
@@ -17,7 +18,6 @@ from scenes import DELTA, block, model
 
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain, energy
-from hvi_fenicsx.equilibrium_search.boxes import fresh_box
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.equilibrium_search.envelopes import envelopes
@@ -263,6 +263,8 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int) -> None:
     )
     low, high = np.sort(random.uniform(-3, 3, (2, n)), axis=0)
     for part in (0.5, 0.999):
-        bound = Relaxation(problem).solve(fresh_box(low, high, low), part)[0].bound
+        bounds = dataclasses.replace(problem.thresholds.bounds, part=part)
+        problem = dataclasses.replace(problem, thresholds=dataclasses.replace(problem.thresholds, bounds=bounds))
+        bound = Relaxation(problem).solve(low, high, low).bound
         samples = random.uniform(low, high, (300, n))
         assert min(problem.energy(x) for x in samples) >= bound

@@ -10,7 +10,7 @@ from test_stationary_points import FAST, Case, oracle, problem_of
 
 from hvi_fenicsx.equilibrium_search import systematic
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
-from hvi_fenicsx.equilibrium_search.found import Wanted
+from hvi_fenicsx.equilibrium_search.found import Task
 from hvi_fenicsx.equilibrium_search.search import find
 from hvi_fenicsx.equilibrium_search.systematic import candidates
 
@@ -24,7 +24,7 @@ def test_it_finds_all_points_of_small_floors(case: Case) -> None:
     """Their number and energies are those of the independent enumeration."""
     problem, unit = problem_of(case)
     search = Enumeration(problem=problem)
-    for x in candidates(problem, search.points.listed, never, never):
+    for x in candidates(problem, search.points, never):
         search.enter(x)
     wanted = oracle(case).stationary()
     energies = sorted(p.energy * unit for p in search.points)
@@ -34,13 +34,14 @@ def test_it_finds_all_points_of_small_floors(case: Case) -> None:
 def test_a_search_that_is_stopped_has_what_was_found_without_proof_and_a_gap() -> None:
     """It stops when the first cells are looked at, the lowest energy is bounded and a first point is looked for."""
     problem, unit = problem_of(FAST[0])
-    few = dataclasses.replace(problem.thresholds, lowest=dataclasses.replace(problem.thresholds.lowest, most_boxes=1))
+    limits = dataclasses.replace(problem.thresholds.systematic, first_boxes=1)
+    few = dataclasses.replace(problem.thresholds, systematic=limits)
     problem = dataclasses.replace(problem, thresholds=few)
     least = oracle(FAST[0]).stationary()[0].energy / unit
     with pytest.MonkeyPatch.context() as patched:
         begun: list[int] = []
         patched.setattr(systematic, "candidates", lambda *_: begun.append(1) or iter(()))
-        one = find(problem, Wanted(), lambda: bool(begun), lambda _: None)
+        one = find(Task(problem=problem, stop=lambda: bool(begun)))
     assert (one.proven, one.complete) == (False, False)
     assert one.left
     assert one.lower_bound is not None

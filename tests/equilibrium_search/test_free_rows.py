@@ -6,13 +6,10 @@ import condensed
 import numpy as np
 import pytest
 from array_enumeration import stationary
-from scenes import block
 
-from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.equilibrium_search.scalar_problem import ScalarProblem
-from hvi_fenicsx.reduced.condensation import Condensation
 from hvi_fenicsx.typing import Array
 
 BOND = condensed.graph([[0.0, 0.0], [0.1, 1.0], [0.1, 0.3]])
@@ -54,16 +51,3 @@ def test_all_points_of_a_row_that_only_bonds_hold_are_those_of_brute_force(seed:
     wanted, listed = stationary(problem), [p.x for p in all_of(problem).points]
     assert all(near(x, listed) for x in wanted)
     assert all(near(x, wanted) for x in listed)
-
-
-def test_a_block_whose_floor_stretches_farther_than_its_bonds_slide_has_no_equilibrium() -> None:
-    """Pressed, it grows by 0.65 along the floor, bonds break at 0.04: an eighth is whole; 0.4 of the peak is left."""
-    slip, peak, cells = 0.02e6 / 2.15e11, 1e3, 24
-    points = [[0.0, 0.0], [slip, 0.5 * peak], [slip, peak], [2.0 * slip, peak], [2.0 * slip, 0.3 * peak]]
-    table = block(cells, 0.0, 1e6, {"law": "graph", "points": points})
-    table["domain"] |= {"size": [1.0, 0.1], "cells": [cells, 4]}
-    table["material"] |= {"model": "plane_strain", "youngs_modulus": 2.15e11, "poisson_ratio": 0.45}
-    table["boundary"]["pull"]["traction"] = [f"{9.0 * peak!r}*(4 - 6*y/0.1)", 0.0]
-    search = all_of(scalar_problem(Condensation(prepare(read_tables(table)).system).problem))
-    assert not len(search.points)
-    assert search.cells <= 20
