@@ -118,6 +118,8 @@ class DeflatedNewton:
         longest = problem.thresholds.systematic.longest
         for _ in range(problem.thresholds.programmes.most_steps):
             x, t, dx, dt = self._graphs.at(s)
+            if not np.all(np.isfinite(s)) or problem.is_far(x):
+                return None
             rest = problem.stiffness @ x + t - problem.force
             if np.max(np.abs(rest)) <= problem.thresholds.points.zero * problem.force_size:
                 return x
@@ -126,8 +128,6 @@ class DeflatedNewton:
             except np.linalg.LinAlgError:
                 return None
             s = np.asarray(s + _stretch((s - away) / size, np.asarray(step / size), longest) * step)
-            if not np.all(np.isfinite(s)):
-                return None
         return None
 
     def _parameters(self, x: Array) -> Array:

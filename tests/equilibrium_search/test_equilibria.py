@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -36,12 +35,9 @@ def energies() -> list[float]:
     return [p.energy for p in Floor(3, 6e6, 1e6, law).stationary()]
 
 
-def test_python_finds_all_certified_and_proves_the_lowest(caplog: pytest.LogCaptureFixture) -> None:
+def test_python_finds_all_certified_and_proves_the_lowest() -> None:
     scene = hvi.read_tables(model(3, 6e6, friction=STRONG))
-    with caplog.at_level(logging.DEBUG, logger="hvi_fenicsx"):
-        found = hvi.equilibria(scene)
-    told = [r.getMessage() for r in caplog.records if r.getMessage().startswith("certified: ")]
-    assert [words.split(",")[0] for words in told] == [f"certified: {k} of 3 equilibria" for k in (1, 2, 3)]
+    found = hvi.equilibria(scene)
     assert found.complete
     assert found.kinds == ("minimiser", "minimiser", "saddle")
     assert [s.energy for s in found.solutions] == pytest.approx(energies(), rel=1e-9)
