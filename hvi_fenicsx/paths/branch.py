@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .relations import ContactPoints, Values
@@ -96,6 +98,7 @@ class Branch(ABC):
     points: ContactPoints
     trend: int
     unstable: int
+    _largest_force: float = 0.0
 
     @property
     @abstractmethod
@@ -211,13 +214,16 @@ class Branch(ABC):
             aim: the factor that is wanted.
         """
 
-    @abstractmethod
     def at_rest(self, peak: float) -> bool:
         """Whether loads and forces have gone back to nothing.
 
         Args:
             peak: the greatest factor so far.
         """
+        values, none = self.values, self.points.thresholds.none
+        elastic, force = (float(np.max(np.abs(f), initial=0.0)) for f in (self.points.elastic @ values.x, values.force))
+        self._largest_force = max(self._largest_force, elastic, force)
+        return abs(self.factor) <= none * peak and force <= none * self._largest_force
 
     @abstractmethod
     def beyond(self) -> Array:

@@ -56,7 +56,7 @@ class CurveEquations(Branch):
     """
 
     def __init__(self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float) -> None:
-        self._rate, self.points, self._most = rate, points, 0.0
+        self._rate, self.points = rate, points
         self.trend, self.unstable = 0, 0
         self.limits = points.thresholds
         largest = float(np.max(np.abs(rate) / points.forces, initial=0.0))
@@ -98,13 +98,6 @@ class CurveEquations(Branch):
     def rising(self) -> float:
         rate, tangent = float(self.here.tangent[-1]), self.here.tangent
         return rate if abs(rate) > self.limits.reached * float(np.max(np.abs(tangent))) else 0.0
-
-    @override
-    def at_rest(self, peak: float) -> bool:
-        values = self.here.values
-        size = float(np.max(np.abs(self.points.stiffness @ values.x), initial=0.0))
-        self._most = max(self._most, size, float(np.max(np.abs(values.force), initial=0.0)))
-        return abs(self.factor) <= 1e-9 * peak and bool(np.all(np.abs(values.force) <= 1e-9 * self._most))
 
     def residual(self, y: Array, values: Values) -> Array:
         """What is left of the forces, in their units, (n,): what is left here, and how the forces change from here.

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import toms748
 
 from ..typing import Array
@@ -57,26 +58,13 @@ def driven_work(arc: Arc, points: ContactPoints, rate: Array, unit: float) -> fl
         rate: f1, (n,).
         unit: of the factor.
     """
-    length = float(np.linalg.norm(arc.after.y - arc.before.y))
-    driven, factors = [], []
-    for place in (arc.before, arc.after):
-        driven += [float(rate @ place.values.x), length * float(rate @ displacement_rate(points, place))]
-        factors += [float(place.y[-1]) * unit, length * unit * float(place.tangent[-1])]
+    length, ends, places = float(np.linalg.norm(arc.after.y - arc.before.y)), [0.0, 1.0], (arc.before, arc.after)
+    rates = [length * float(rate @ displacement_rate(points, place)) for place in places]
+    driven = CubicHermiteSpline(ends, [float(rate @ place.values.x) for place in places], rates)
+    factors = [unit * float(place.y[-1]) for place in places]
+    slopes = [unit * length * float(place.tangent[-1]) for place in places]
     t = 0.5 * (1.0 + _NODES)
-    return float(0.5 * _WEIGHTS @ (_cubic(t, driven) * _cubic_rate(t, factors)))
-
-
-def _cubic(t: Array, ends: list[float]) -> Array:
-    """The cubic polynomial with value and derivative at 0 and at 1."""
-    a, da, b, db = ends
-    return np.asarray(
-        (1 + 2 * t) * (1 - t) ** 2 * a + t * (1 - t) ** 2 * da + t**2 * (3 - 2 * t) * b + t**2 * (t - 1) * db
-    )
-
-
-def _cubic_rate(t: Array, ends: list[float]) -> Array:
-    a, da, b, db = ends
-    return np.asarray(6 * t * (1 - t) * (b - a) + (1 - t) * (1 - 3 * t) * da + t * (3 * t - 2) * db)
+    return float(0.5 * _WEIGHTS @ (driven(t) * CubicHermiteSpline(ends, factors, slopes)(t, nu=1)))
 
 
 class Events(CurveEquations):

@@ -65,10 +65,10 @@ class StraightBranch(Branch):
     ) -> None:
         self._thresholds, self._stiffness = points.thresholds, points.elastic
         self.points, self.state = points, StraightState(points, z)
-        self._constant, self.rate, self._factor, self._size = constant, rate, factor, 0.0
+        self._constant, self.rate, self._factor = constant, rate, factor
         self.heading, self.trend, self.unstable, self._driven = heading, 0, 0, 0.0
         self._leader = 0
-        self._stiffest, self._dead, self._live = map(_largest, (self._stiffness.diagonal, constant, rate))
+        self._stiffest, self._live = _largest(self._stiffness.diagonal), _largest(rate)
         self._perturb()
         self.state.hold(rate)
         driver = FACTOR
@@ -170,10 +170,7 @@ class StraightBranch(Branch):
 
     def _residual(self) -> Array:
         values = self.values
-        elastic = self._stiffness @ values.x
-        loads = self._dead, abs(self._factor) * self._live
-        self._size = max(self._size, _largest(elastic), _largest(values.force), *loads)
-        return np.asarray(elastic + values.force - self._constant - self._factor * self.rate)
+        return np.asarray(self._stiffness @ values.x + values.force - self._constant - self._factor * self.rate)
 
     def _refine(self) -> None:
         """Take out what rounding has left in the equations, and find the direction."""
@@ -359,11 +356,6 @@ class StraightBranch(Branch):
         chosen = self._first_end(aim)
         numbers, slack, _, _, allowed = self._ends()
         return chosen is None or not np.any((slack <= allowed)[numbers == chosen[0]])
-
-    @override
-    def at_rest(self, peak: float) -> bool:
-        small = 1e-9 * self._size
-        return abs(self._factor) <= 1e-9 * peak and bool(np.all(np.abs(self.values.force) <= small))
 
 
 def _change(before: Segment, after: Segment) -> int:

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from scipy.linalg import qr
 
 from ..typing import Array, Integers
 from .thresholds import DEFAULT
@@ -96,10 +97,4 @@ def pins(motions: Array) -> Integers:
     Args:
         motions: orthonormal rows, (d, n).
     """
-    rows, found = motions.T.copy(), np.zeros(len(motions), dtype=np.int64)
-    for k in range(len(motions)):
-        sizes = np.linalg.norm(rows, axis=1)
-        found[k] = np.argmax(sizes)
-        way = rows[found[k]] / sizes[found[k]]
-        rows -= np.outer(rows @ way, way)
-    return found
+    return np.asarray(qr(motions, mode="r", pivoting=True)[1][: len(motions)])

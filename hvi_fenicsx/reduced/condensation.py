@@ -225,21 +225,6 @@ class Condensation:
         found.array[:] = self._loading.lifted @ np.array([1.0, factor])
         return found
 
-    def reactions(self, u: PETSc.Vec, factor: float = 1.0) -> Array:
-        """Forces A u - g at this rank's unknowns: where a support, contact or a law holds the body. Collective.
-
-        Args:
-            u: the unknowns of the whole body, as :meth:`expand` finds them.
-            factor: λ.
-        """
-        weights, fixed, out = np.array([1.0, factor]), self._system.problem.fixed_here, u.duplicate()
-        self._system.jacobian.elastic_product(u, out)
-        found = np.asarray(out.array_r - self._loading.lifted @ weights)
-        applied = self._loading.applied @ weights
-        found[fixed] = self._system.holding.at_prescribed(u, self._system.rotation) - applied[fixed]
-        out.destroy()
-        return found
-
     def free(self) -> None:
         """Free the PETSc objects, those of the problem's stiffness too. Collective."""
         self.problem.elastic.free()

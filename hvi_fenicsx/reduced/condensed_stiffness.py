@@ -20,10 +20,10 @@ from typing import Any, Self
 
 import numpy as np
 from scipy.linalg.blas import dger
-from scipy.linalg.lapack import dpotrf, dpotri, dsytrf
+from scipy.linalg.lapack import dsytrf
 from typing_extensions import override
 
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Mask
 
 _ROUNDS = 4
 """Steps of an inverse iteration: each leaves of what is stiff the shift over its stiffness."""
@@ -199,8 +199,7 @@ class DenseStiffness(CondensedStiffness):
 
     @override
     def inverse(self, columns: CellColumns) -> CellInverse:
-        found = None if columns.driver is not None else self._by_symmetry(columns)
-        return DenseInverse(np.asarray(np.linalg.inv(self._matrix(columns))) if found is None else found)
+        return DenseInverse(np.asarray(np.linalg.inv(self._matrix(columns))))
 
     def _matrix(self, columns: CellColumns) -> Array:
         """The equations, (n, n)."""
@@ -211,32 +210,11 @@ class DenseStiffness(CondensedStiffness):
             matrix[:, columns.driver] = columns.factor
         return matrix
 
-    def _by_symmetry(self, columns: CellColumns) -> Array | None:
-        """The inverse from that of the unknowns that move, by Cholesky's method; None where they are not stable."""
-        free, held = np.flatnonzero(columns.moving), np.flatnonzero(~columns.moving)
-        inner = self._moving(free, columns.slope)
-        if free.size:
-            inner, failed = dpotrf(inner, lower=1, overwrite_a=1)
-            if failed:
-                return None
-            inner = dpotri(inner, lower=1, overwrite_c=1)[0]
-            inner += np.tril(inner, -1).T
-        found = np.zeros(self._array.shape, order="F")
-        found[np.ix_(free, free)] = inner
-        found[held, held] = columns.rise[held]
-        found[np.ix_(held, free)] = -columns.rise[held, None] * (self._array[np.ix_(held, free)] @ inner)
-        return found
-
-    def _moving(self, free: Integers, slope: Array) -> Array:
-        """S + diag(slope) of the unknowns that move."""
-        found = np.array(self._array[np.ix_(free, free)], order="F")
-        found[np.diag_indices(free.size)] += slope[free]
-        return found
-
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
         free = np.flatnonzero(moving)
-        return negative_directions(self._moving(free, slope), negligible, self._rounding)
+        inner = self._array[np.ix_(free, free)] + np.diag(slope[free])
+        return negative_directions(inner, negligible, self._rounding)
 
     @override
     def free(self) -> None:

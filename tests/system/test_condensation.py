@@ -153,31 +153,6 @@ def test_the_factor_scales_loads_and_prescribed_displacements(name: str) -> None
         assert products[0] * unit * force == pytest.approx(products[1], rel=1e-9)
 
 
-def test_energy_and_work_agree_along_a_path_of_displacements() -> None:
-    """dE/dλ at fixed x = -<g', u> + the reactions' power: with it follows the work of what is prescribed."""
-    system, condensation = condensed("pulled")
-    problem, (x, _) = condensation.problem, samples(condensation)
-    step, factor = 1e-3, 0.7
-    rate = (problem.energy(x, factor + step) - problem.energy(x, factor - step)) / (2 * step)
-    u = condensation.expand(x, factor)
-    reactions = condensation.reactions(u, factor)
-    fixed = system.problem.fixed_here
-    power = reactions[fixed] @ condensation.load(1.0).array_r[fixed]
-    for bonds in problem.prescribed_bonds:
-        power += (bonds.weights * bonds.law.right(bonds.arguments[0] + factor * bonds.arguments[1])) @ bonds.arguments[
-            1
-        ]
-    applied = (problem.potential(x, factor + step) - problem.potential(x, factor - step)) / (2 * step)
-    following = sum(
-        float(system.forces[n].array_r @ (condensation.expand(x, factor + step).array_r - v.array_r)) / (2 * step)
-        for n in system.forces
-        for v in [condensation.expand(x, factor - step)]
-    )
-    loads = sum(float(v.array_r @ u.array_r) for v in system.forces.values())
-    assert applied == pytest.approx(loads + factor * following, rel=1e-6)
-    assert rate == pytest.approx(power - loads, rel=1e-6)
-
-
 def test_a_name_that_is_no_load_is_refused() -> None:
     system, _ = condensed("wall")
     with pytest.raises(InputError, match=r"pull\.force.*pull\.traction"):
