@@ -17,10 +17,12 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..certify.contact_state import ContactState
+from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..formula import SpatialValue
 from ..problem import spaces
 from ..problem.elastic_operator import stiffness_tensor
 from ..problem.problem import Bounds, PrescribedComponent, Problem
+from ..problem.thresholds import DEFAULT as composition
 from ..runtime.mpi import total
 from ..typing import Array, Entities
 from .bubbles import of_facet, quadrature, shape
@@ -309,10 +311,6 @@ def _solved(kernel: Array, pushes: Array, within: Array, pressure: Array, sweeps
     return p
 
 
-_ALONG = 1e-6
-"""Share of a mean normal along an axis from which it has a component there."""
-
-
 def squares(
     problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState], thresholds: EstimateThresholds
 ) -> Array:
@@ -343,7 +341,7 @@ def squares(
         if varies(part.value):
             on = modes(part.facets)
             np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
-    for obstacle in _obstacles(problem, states, modes, thresholds.near):
+    for obstacle in _obstacles(problem, states, modes, CERTIFICATE.near):
         np.add.at(found, obstacle.on.facets.cells, _moved_pressure(problem, bubbles, obstacle, thresholds))
     return found
 
@@ -417,4 +415,4 @@ def _moved_pressure(
 def _held(problem: Problem, normals: Array) -> bool:
     """Whether a prescribed component holds the body against a translation along a part's mean normal. Collective."""
     mean = [abs(total(problem.domain.mesh.comm, float(along))) for along in normals.sum(axis=0)]
-    return any(mean[part.component] > _ALONG * max(mean) for part in problem.prescribed)
+    return any(mean[part.component] > composition.turned_to_prescribed * max(mean) for part in problem.prescribed)

@@ -18,15 +18,13 @@ from mpi4py import MPI
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Bounds, Problem
+from ..problem.thresholds import DEFAULT as composition
 from ..runtime import forms
 from ..typing import Array, Entities, Mask
 from .bubbles import BubbleStiffness, Springs, of_cell
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
 from .thresholds import DEFAULT, EstimateThresholds
-
-_FAR = 1e30
-"""Stands for no bound: an infinite nodal value has no interpolant."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,8 @@ def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.
     points, field = _Points(space, _on(space, bounds.surface.facets)), fem.Function(problem.space)
 
     def middle(values: Array) -> Array:
-        spread = np.clip(values, -_FAR, _FAR)
+        far = composition.largest_scale  # an infinite nodal value has no interpolant
+        spread = np.clip(values, -far, far)
         field.x.array.reshape(-1, d)[bounds.surface.blocks, : spread.shape[1]] = spread
         field.x.scatter_forward()
         return points.values(field)

@@ -16,11 +16,13 @@ from ..certify import balance
 from ..certify.certificate import Examination
 from ..certify.contact_state import ContactState
 from ..certify.force_attribution import components, on_kink, touches
+from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..problem.vectors import turn
 from ..runtime.mpi import total
 from ..runtime.timing import Timer
+from ..solvers.thresholds import DEFAULT as SOLVERS
 from ..system.held_solver import Goal, HeldPreconditioner
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
@@ -28,6 +30,8 @@ from ..system.system import System
 from ..typing import Array, Entities, Integers
 from .law_traces import nearest
 from .thresholds import DEFAULT, EstimateThresholds
+
+NEAR = CERTIFICATE.near
 
 
 class DualNorm:
@@ -44,10 +48,10 @@ class DualNorm:
         self, system: System, levels: Levels, u: fem.Function, thresholds: EstimateThresholds = DEFAULT
     ) -> None:
         self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.tolerance
-        self._near, self._x = thresholds.near, system.unknowns(u)
-        self.held = _held(system, self._x, thresholds.near)
+        self._x = system.unknowns(u)
+        self.held = _held(system, self._x)
         at = self._x.array_r
-        system.jacobian.set_rates([_rising(system.comm, term, at, thresholds) for term in system.terms])
+        system.jacobian.set_rates([_rising(system.comm, term, at) for term in system.terms])
         self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
         self._inverse.prepare(self.held)
 
@@ -93,7 +97,7 @@ class DualNorm:
             dofs, sign = bounds.component()
             along = sign * (at[dofs] + error_there.array_r[dofs])
             inside = np.clip(along, bounds.lower, bounds.upper)
-            beyond = np.abs(along - inside) > self._near
+            beyond = np.abs(along - inside) > NEAR
             error_there.array[dofs[beyond]] = (sign * inside - at[dofs])[beyond]
             self.held = np.union1d(self.held, dofs[beyond]).astype(np.int32)
         leaves = bool(self.system.comm.allreduce(len(self.held) > len(before), op=MPI.LOR))
@@ -117,52 +121,50 @@ class DualNorm:
         self.system.jacobian.set_rates(self._before)
 
 
-def _held(system: System, x: PETSc.Vec, near: float) -> Entities:
+def _held(system: System, x: PETSc.Vec) -> Entities:
     """Owned scalar dofs on a bound, or on a convex kink of a law."""
     u = x.array_r
     found: list[Integers] = [np.empty(0, np.int64)]
     for bounds in system.bounds:
         dofs, sign = bounds.component()
-        found.append(dofs[touches(bounds, sign * u[dofs], near)])
+        found.append(dofs[touches(bounds, sign * u[dofs], NEAR)])
     for term in system.terms:
-        stuck = on_kink(term.law.convex, term.argument(u), term.reach(near))[:, None] & term.counts(u, near)
+        stuck = on_kink(term.law.convex, term.argument(u), term.reach(NEAR))[:, None] & term.counts(u, NEAR)
         found.extend(dofs[stuck[:, i]] for i, (dofs, _) in enumerate(components(term)))
     return np.setdiff1d(np.unique(np.concatenate(found)), system.problem.fixed).astype(np.int32)
 
 
-def _rising(comm: MPI.Comm, term: LawTerm, u: Array, thresholds: EstimateThresholds) -> Array:
+def _rising(comm: MPI.Comm, term: LawTerm, u: Array) -> Array:
     """The rising part of a law's tangent; where it is flat everywhere, a foundation in its place. Collective."""
     argument = term.argument(u)
     convex = term.law.convex
     second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
     if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
-        second = np.full_like(second, thresholds.foundation)
+        second = np.full_like(second, SOLVERS.foundation)
         return term.rate(u, second * argument * term.stretch, second * term.stretch)
     secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second
     return term.rate(u, secant, second)
 
 
-def smoothing(problem: Problem, states: Sequence[ContactState], near: float) -> Array:
+def smoothing(problem: Problem, states: Sequence[ContactState]) -> Array:
     """The smoothed laws' nodal forces minus the nearest ones of the unsmoothed laws, owned blocks (n, d).
 
     Args:
         problem: what was solved.
         states: of the parts of Γc.
-        near: distance from a kink that counts as being on it.
     """
-    return _law_forces(problem, states, near, exact=True)
+    return _law_forces(problem, states, exact=True)
 
 
-def algebraic(problem: Problem, examination: Examination, near: float) -> Array:
+def algebraic(problem: Problem, examination: Examination) -> Array:
     """Nodal forces that nothing accounts for: off the carriers, beyond the laws, pulling or distant contact; (n, d).
 
     Args:
         problem: what was solved.
         examination: of its solution.
-        near: distance from a kink that counts as being on it.
     """
     rest = balance.unbalanced(problem, examination.forces.reaction, examination.states)
-    rest = rest - _law_forces(problem, examination.states, near, exact=False)  # a law's force is minus its residual
+    rest = rest - _law_forces(problem, examination.states, exact=False)  # a law's force is minus its residual
     for state in examination.states:
         if state.bounds is not None:
             force = state.surface.weights * _impossible_pressure(state)
@@ -192,7 +194,7 @@ def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> floa
     return total(problem.domain.mesh.comm, local)
 
 
-def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *, exact: bool) -> Array:
+def _law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool) -> Array:
     """Nodal law forces that the (exact or solved) law cannot give, owned blocks (n, d)."""
     d = problem.scales.dimension
     forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
@@ -201,7 +203,7 @@ def _law_forces(problem: Problem, states: Sequence[ContactState], near: float, *
             term = law.term
             asked = term.exact if exact else term.law
             components = np.asarray(law.components / term.stretch[:, None])
-            away = law.given - nearest(asked, term.length, components, law.given, term.reach(near))
+            away = law.given - nearest(asked, term.length, components, law.given, term.reach(NEAR))
             away[law.hidden] = 0.0
             vectors = np.einsum("mk,mkd->md", away * term.weights[:, None], term.directions)
             np.add.at(forces, state.surface.blocks, vectors)

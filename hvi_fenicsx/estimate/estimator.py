@@ -85,7 +85,7 @@ def estimate(
         examination: of the same u.
         thresholds: how accurately.
     """
-    problem, near = system.problem, thresholds.near
+    problem = system.problem
     traces = LawTraces(problem, u, examination.states, thresholds, exact=False)
     inverse = dual_norm.DualNorm(system, levels, u, thresholds)
     energy = _energy(problem, u, examination)
@@ -93,8 +93,8 @@ def estimate(
     cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
     cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse, thresholds)
     smoothed = any(term.law != term.exact for term in problem.terms)
-    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states, near))[1] if smoothed else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination, near), thresholds.rough_tolerance[0])
+    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), thresholds.rough_tolerance[0])
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)

@@ -16,6 +16,7 @@ from dolfinx import fem
 from ..certify.contact_state import ContactState
 from ..certify.law_state import LawState
 from ..certify.placed_forces import traction
+from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..laws import Length, Superpotential
 from ..mesh import nodes
 from ..problem.contact_surface import Surface
@@ -181,7 +182,7 @@ class LawTraces:
         """
         solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
         k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
-        near = np.asarray(self.thresholds.near / solved.stretch, dtype=np.float64).ravel()
+        near = np.asarray(CERTIFICATE.near / solved.stretch, dtype=np.float64).ravel()
         traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), near)
         return LawTrace(solved.points, solved.nodal, solved.multiplier * traction.reshape(slip.shape))
 
@@ -227,7 +228,7 @@ class LawTraces:
                 multiplier=points.interpolated(law.term.multiplier[:, None]),
                 stretch=stretch,
                 nodal=points.interpolated_components(law.carried),
-                sticks=np.asarray(on_kink > 1 - self.thresholds.near),
+                sticks=np.asarray(on_kink > 1 - CERTIFICATE.near),
                 nodewise=points.of_field_from_node_to_node(self.u) / stretch,
                 slip=points.of_field(self.u) / stretch,
             )

@@ -111,7 +111,7 @@ def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Itera
     comm = problem.domain.mesh.comm
     for surface in (bounds.surface for bounds in problem.bounds):
         turn = largest_turn(comm, surface)
-        if composition.DEFAULT.flat < turn < composition.DEFAULT.uneven:
+        if composition.DEFAULT.same < turn < composition.DEFAULT.uneven:
             yield (
                 f"{of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to "
                 f"{turn:.1e} rad; this unevenness is part of the problem. If it is rounding of the mesh's coordinates, "

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..certify import thresholds
-
 
 @dataclass(frozen=True, kw_only=True)
 class EstimateThresholds:
     """How accurately the estimates are computed.
 
     Attributes:
-        near: distance (of u0) from a kink or a bound that counts as being on it; variation of a gap that is rounding.
         facet_degree: of the quadrature of the laws on a facet, at degree 1 and 2: a drop within an edge is met to a
             fourteenth of its length at degree 1, to a thirty-second at degree 2, whose edges are longer. On the
             intersections of the facets of two bodies, which are smaller, half of it.
@@ -24,8 +21,6 @@ class EstimateThresholds:
         bubble_steps: conjugate gradient steps at most of a solve for bubbles.
         rounds: of the active set of the bounds between the nodes, and of corrections of the nodes' answer to bubbles by
             the laws, at most.
-        foundation: stiffness per area, in units of E0/L, in the place of a law that is flat everywhere: it may be all
-            that could hold a motion.
         vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the nodes at each step.
         data_degree: of the modes by which the data on a facet are sampled, in the plane and in space.
         gap_shifts: bisections of the body's motion along a normal, where a gap varies within facets.
@@ -41,13 +36,11 @@ class EstimateThresholds:
         coarse: the mesh's error over the norm of the solution, above which the numbers are rough.
     """
 
-    near: float = thresholds.DEFAULT.near
     facet_degree: tuple[int, int] = (12, 30)
     tolerance: float = 0.1
     rough_tolerance: tuple[float, float] = (0.3, 0.2)
     bubble_steps: int = 30
     rounds: int = 4
-    foundation: float = 1e-8
     vertex_tolerance: float = 1e-6
     data_degree: tuple[int, int] = (14, 6)
     gap_shifts: int = 20

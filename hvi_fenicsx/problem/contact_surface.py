@@ -169,7 +169,7 @@ def decide(
         InputError: on all ranks alike: two directions at a vertex are neither orthogonal nor equal.
     """
     own = {name: _own(s, stated.get(name), length, thresholds.rounding) for name, s in surfaces.items()}
-    flat = {name for name, surface in own.items() if largest_turn(comm, surface) <= thresholds.flat}
+    flat = {name for name, surface in own.items() if largest_turn(comm, surface) <= thresholds.same}
     normals = _at_shared_vertices(comm, own, flat, fixed, thresholds)
     return {name: replace(s, normals=normals[name], tangents=tangents(normals[name])) for name, s in own.items()}
 
@@ -302,4 +302,4 @@ def _largest_turn(normal: _Row, row: _Row, thresholds: CompositionThresholds) ->
     """By which angle a normal may be turned to be orthogonal or equal to another direction."""
     if not normal.exact:
         return thresholds.uneven
-    return thresholds.turned_to_prescribed if row.prescribed else thresholds.flat
+    return thresholds.turned_to_prescribed if row.prescribed else thresholds.same

@@ -10,12 +10,10 @@ class CompositionThresholds:
     """What counts as rounding, and what a law's traction is judged by.
 
     Attributes:
-        same: difference of two prescribed displacements, relative to the largest, and of two vertices, over the body's
-            length, up to which they are the same.
+        same: difference of two prescribed displacements, relative to the largest, of two vertices, over the body's
+            length, or of normals (rad), up to which they are the same: a part is flat, two parts orthogonal or equal.
         rounding: relative rounding of the mesh's coordinates, and of a direction that the scene states; part of a facet
             that is too little to lie over another one.
-        flat: angle (rad) between the normals of a part up to which the part is flat, and up to which those of two flat
-            parts are orthogonal or equal.
         uneven: angle by which the normal of a part that is not flat may be turned at a vertex that it shares with
             another part or with a prescribed component: few digits in the coordinates explain so much.
         turned_to_prescribed: the same for a flat part at a prescribed component. Contact stays exact; a law sees the
@@ -37,9 +35,8 @@ class CompositionThresholds:
             coefficients of all of them.
     """
 
-    same: float = 1e-9
+    same: float = 1e-8
     rounding: float = 1e-14
-    flat: float = 1e-8
     uneven: float = 0.02
     turned_to_prescribed: float = 1e-4
     outside_bounds: float = 1e-12

@@ -169,7 +169,7 @@ class ActiveSetSolver:
         with self.timer("solve"):
             self.system.evaluate_by_cells(x)
             found, left = once(), np.inf
-            while not found.interrupted and found.measure <= self.thresholds.largest_rounding:
+            while not found.interrupted and found.measure <= self.thresholds.coarse_tolerance:
                 self.system.evaluate_by_cells(x)
                 self.system.equations.residual(x, self._residual, models)
                 sizes = self.convergence.sizes(x, self._residual, *bounds)
@@ -330,24 +330,21 @@ class StallTest:
 
     def __init__(self, thresholds: Thresholds, *, full_steps: bool) -> None:
         self._thresholds, self._full_steps = thresholds, full_steps
-        self._last = self._least = np.inf
-        self._still, self._slow, self._useless = False, 0, 0
+        self._least = self._last = np.inf
+        self._useless, self._stood = 0, False
 
     def gives_up(self, residual: float) -> bool:
-        """Whether to give up after a step.
+        """Whether to give up after a step: for long none has halved the residual, or two in a row have not changed it.
 
         Args:
             residual: relative, after the step.
         """
-        thresholds, stood = self._thresholds, self._still
-        self._still = abs(residual - self._last) < thresholds.still * self._last
-        self._slow = self._slow + 1 if residual > 0.5 * self._last else 0
-        falls = residual < (1.0 - thresholds.still) * self._least
-        self._useless = 0 if falls else self._useless + 1
+        self._useless = 0 if residual < 0.5 * self._least else self._useless + 1
+        small, before = self._thresholds.coarse_tolerance, self._stood
+        self._stood = abs(residual - self._last) < small * self._last
         self._least, self._last = min(self._least, residual), residual
-        useless = self._useless if self._full_steps else 0
-        slow = self._slow if residual < thresholds.largest_rounding else 0
-        return (stood and self._still) or max(slow, useless) >= thresholds.useless_steps
+        counts = self._full_steps or residual < small
+        return (before and self._stood) or (counts and self._useless >= self._thresholds.few_steps)
 
 
 def unextracted(held: HeldPreconditioner) -> PETSc.Mat:

@@ -261,4 +261,4 @@ def widths(context: SolveContext, first: float) -> Iterator[float]:
     width, thresholds = first, context.options.thresholds
     while width > max(thresholds.narrowest, context.epsilon or 0.0):
         yield width
-        width *= thresholds.narrowing
+        width /= 2.0

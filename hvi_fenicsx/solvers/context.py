@@ -164,5 +164,4 @@ class SolverOptions(SolverTable):
         """
         if self.second_order is not None:
             return self.second_order
-        plane = system.problem.scales.dimension == 2
-        return system.dofs <= (self.thresholds.inertia_plane if plane else self.thresholds.nested_from)
+        return system.dofs <= self.thresholds.linear.largest_direct[system.problem.scales.dimension]

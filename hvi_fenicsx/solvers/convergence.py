@@ -176,7 +176,7 @@ class ConvergenceTest:
             x: the displacement that it ended at.
             tolerance: of the net forces.
         """
-        if found.converged or not (np.isfinite(x.norm()) and sizes.worst <= self._thresholds.largest_rounding):
+        if found.converged or not (np.isfinite(x.norm()) and sizes.worst <= self._thresholds.coarse_tolerance):
             return found
         norm, traction = self.rounding(x)
         if (

@@ -118,7 +118,7 @@ class ConvexStep:
             moves = self._overloaded(x, models)
             if not outcome.converged or not self.anywhere(moves):
                 return cells, outcome
-            cells = [c.moved(m, self._thresholds.narrowing) for c, m in zip(cells, moves, strict=True)]
+            cells = [c.moved(m) for c, m in zip(cells, moves, strict=True)]
         return cells, replace(outcome, converged=False, reason="the states of the convex kinks keep changing")
 
     def measure(self, x: PETSc.Vec, cells: Sequence[Cells], xi: Sequence[Array]) -> float:
@@ -251,7 +251,7 @@ class ConvexStep:
 
     def _is_unbounded(self, xi: Sequence[Array]) -> bool:
         system = self._system
-        return boundedness.is_unbounded(system.problem, system.forces, self._laws, xi, system.thresholds)
+        return boundedness.is_unbounded(system.problem, system.forces, self._laws, xi)
 
 
 def no_step() -> Outcome:

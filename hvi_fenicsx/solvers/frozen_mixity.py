@@ -23,14 +23,11 @@ from . import nested_iteration
 from .context import RunControl, SolverOptions
 from .method import Counts
 from .nested_iteration import LevelSolution
+from .thresholds import DEFAULT
 
 _LOG = logger("solvers")
 _ROUNDS = 60
 """Solves at most; the certificate tells where they do not end."""
-_STANDS = 0.1
-"""The change of the energies at which they stand, in tolerances of the solve."""
-_NEAR = 1e-12
-"""A length that has no mode, relative to the largest."""
 
 
 def settled(
@@ -58,7 +55,7 @@ def settled(
         anew = _energies(found.system.problem, found.result.u)
         change = _change(found.system, anew)
         _LOG.info("the energies of separation change by %.1e with the mode mixity", change)
-        if change <= _STANDS * options.tolerance:
+        if change <= options.thresholds.margin * options.tolerance:
             break
         for term, energies in zip(found.system.terms, anew, strict=True):
             term.freeze(energies)
@@ -86,7 +83,7 @@ def _energies(problem: Problem, u: fem.Function) -> list[Array]:
     for term in problem.terms:
         components = term.slip(values)
         size = largest(problem.domain.mesh.comm, float(np.max(np.abs(components), initial=0.0)))
-        found.append(term.energies_of(components, np.full(len(components), _NEAR * size)))
+        found.append(term.energies_of(components, np.full(len(components), DEFAULT.near * size)))
     return found
 
 

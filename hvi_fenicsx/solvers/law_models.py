@@ -60,14 +60,13 @@ class Cells:
         """Upper ends; inf where there is none."""
         return np.concatenate([self.kinks, [np.inf]])[self.index]
 
-    def moved(self, step: Integers, shrinks: float) -> Cells:
-        """The cells after each vertex moved to a neighbouring one, or stayed.
+    def moved(self, step: Integers) -> Cells:
+        """The cells after each vertex moved to a neighbouring one, or stayed; if any moved to the right, half the ramp.
 
         Args:
             step: -1, 0 or 1, (m,).
-            shrinks: factor of the ramp if a vertex moved to the right.
         """
-        return Cells(self.kinks, self.index + step, self.ramp * (shrinks if np.any(step > 0) else 1.0))
+        return Cells(self.kinks, self.index + step, self.ramp / 2.0 if np.any(step > 0) else self.ramp)
 
 
 UNDIVIDED = Cells(np.empty(0), np.zeros(1, dtype=np.int64))

@@ -22,9 +22,6 @@ from .branch import BranchIteration, widths
 from .context import SolveContext
 from .method import Counts, SolveResult
 
-_SPRING = LinearSpring(stiffness=1.0)
-"""In units of E0/L."""
-
 
 def solve(context: SolveContext) -> SolveResult:
     """A stationary point of the wanted laws. Collective.
@@ -35,11 +32,11 @@ def solve(context: SolveContext) -> SolveResult:
     still = _stay_on_kinks(context, context.system.undisplaced())
     if still.converged:
         return still
-    found = held = BranchIteration(context, [_SPRING] * len(context.system.terms)).solve()
+    found = held = BranchIteration(context, [LinearSpring(stiffness=1.0)] * len(context.system.terms)).solve()
     counts = Counts()
     for one in (still, held):
         counts.add(one.counts)
-    for width in widths(context, context.options.thresholds.widest) if held.converged else ():
+    for width in widths(context, 1.0 / context.options.thresholds.narrowest) if held.converged else ():
         start, laws = (
             found if found.converged else held,
             [QUADRATIC.relative(t.exact, width) for t in context.system.terms],

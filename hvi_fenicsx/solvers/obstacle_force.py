@@ -1,17 +1,19 @@
 """An obstacle that a force presses: how far it moves until contact bears the force.
 
 The force R that contact bears is the derivative of the body's least energy by the obstacle's way; where the energy is
-convex R never falls. A safeguarded secant method solves R = F: for contact alone R is piecewise linear, and the last
-secant is exact. Each step is a solve on the same matrices, with other bounds.
+convex R never falls. The secant method solves R = F: for contact alone R is piecewise linear, and the last secant is
+exact. Each step is a solve on the same matrices, with other bounds.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
+from scipy.optimize import newton
 
 from ..errors import InputError
 from ..problem.compose import Formulation
@@ -28,12 +30,11 @@ from .nested_iteration import CoarseStart, LevelSolution
 _LOG = logger("solvers")
 _MOST = 60
 """Solves at most."""
-_STRIDE = 4.0
-"""Where contact does not bear the force yet, the next way is so many times as long, at most."""
-_BISECTS = 6
-"""Each so many-th step halves what is known, in case secants do not."""
-_ROUNDING = 1e-14
-"""Two ways whose difference is so small a part of them are one."""
+_DIGIT = float(np.finfo(np.float64).eps)
+
+
+class _Ended(Exception):
+    """A solve failed, or nothing bears the force as far as the body is long."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,17 +139,36 @@ class ObstacleForceSolve:
         Args:
             start: a solution on a coarser mesh; or a displacement on the same mesh to begin at, m.
         """
-        ways = _Ways(self._first_touch(), self._force.force, self._farthest)
-        found = self._refined(start) if isinstance(start, CoarseStart) else self._anew(ways.first, start)
-        balance = self._balance(found)
-        for _ in range(_MOST):
-            if balance.passed or not found.result.converged:
-                break
-            if (way := ways.after(balance.way, balance.borne)) is None:
-                break
-            found = self._at(way, found)
-            balance = self._balance(found)
-        return self._told(found, balance), balance
+        touch, force = self._first_touch(), self._force.force
+        ways = touch, touch + force  # the second is that of a block of the body's size
+        found: list[tuple[LevelSolution, ObstacleBalance]] = []
+
+        def excess(way: float) -> float:
+            """What contact bears beyond the force, 0 within the tolerance; nothing where the obstacle touches."""
+            if way == touch:
+                return -force
+            if found and abs(way - touch) > self._farthest:
+                raise _Ended
+            new = self._at(way, found[-1][0]) if found else self._begun(ways[1], start)
+            found.append((new, self._balance(new)))
+            if not new.result.converged:
+                raise _Ended
+            return 0.0 if found[-1][1].passed else found[-1][1].borne - force
+
+        with suppress(_Ended):
+            newton(excess, touch, x1=self._way_of(start, ways[1]), tol=_DIGIT, rtol=_DIGIT, maxiter=_MOST, disp=False)
+        solution, balance = found[-1]
+        return self._told(solution, balance), balance
+
+    def _way_of(self, start: CoarseStart | fem.Function | None, first: float) -> float:
+        """The way that is tried first."""
+        if not isinstance(start, CoarseStart):
+            return first
+        assert start.way is not None
+        return start.way / self._system.problem.scales.displacement
+
+    def _begun(self, way: float, start: CoarseStart | fem.Function | None) -> LevelSolution:
+        return self._refined(start) if isinstance(start, CoarseStart) else self._anew(way, start)
 
     @property
     def _farthest(self) -> float:
@@ -164,8 +184,7 @@ class ObstacleForceSolve:
 
     def _refined(self, start: CoarseStart) -> LevelSolution:
         """From a solution on a coarser mesh, the obstacle where it was there. Collective."""
-        assert start.way is not None
-        system = self._system.with_obstacle_at(start.way / self._system.problem.scales.displacement)
+        system = self._system.with_obstacle_at(self._way_of(start, 0.0))
         found = nested_iteration.solve_from_coarser(system, start, self._solvability, self._options, self._control)
         self._counts.add(found.result.counts)
         return found
@@ -233,57 +252,3 @@ class ObstacleForceSolve:
             )
             result = replace(result, converged=False, reason=reason)
         return replace(found, result=result)
-
-
-class _Ways:
-    """The secant method for R(way) = F, within what is known.
-
-    Args:
-        touch: the way at which R begins, if nothing else strains the body.
-        force: F.
-        farthest: beyond so long a way from there nothing is tried.
-    """
-
-    def __init__(self, touch: float, force: float, farthest: float) -> None:
-        self._touch, self._force, self._farthest = touch, force, farthest
-        self._points: list[tuple[float, float]] = [(touch, 0.0)]
-        self._low, self._high = -np.inf, np.inf
-
-    @property
-    def first(self) -> float:
-        """The way of a block of the body's size."""
-        return self._touch + self._force
-
-    def after(self, way: float, borne: float) -> float | None:
-        """The way to try next; None where there is none left.
-
-        Args:
-            way: that was tried last.
-            borne: what was found there.
-        """
-        if way == self._points[-1][0]:  # as near as rounding allows
-            return None
-        self._points.append((way, borne))
-        if borne < self._force:
-            self._low = max(self._low, way)
-        else:
-            self._high = min(self._high, way)
-        return self._between() if np.isfinite(self._high - self._low) else self._beyond()
-
-    def _between(self) -> float | None:
-        low, high, way = self._low, self._high, self._secant()
-        if high - low <= _ROUNDING * max(abs(high), abs(low)):
-            return None
-        halves = len(self._points) % _BISECTS == 0 or not low < way < high
-        return 0.5 * (low + high) if halves else way
-
-    def _beyond(self) -> float | None:
-        """No further than some times the longest way so far."""
-        reach = _STRIDE * max(abs(way - self._touch) for way, _ in self._points)
-        way = float(np.clip(self._secant(), self._touch - reach, self._touch + reach))
-        return None if abs(way - self._touch) > self._farthest else way
-
-    def _secant(self) -> float:
-        (before, first), (last, second) = self._points[-2:]
-        rise = (second - first) / (last - before)
-        return last + (self._force - second) / rise if rise > 0.0 else float(np.copysign(np.inf, self._force - second))

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from ..laws import Superpotential
 from ..problem.law_term import LawTerm
 from ..rigid import OneSidedSupports, Rest, least_energy
+from ..rigid.thresholds import DEFAULT as RIGID
 from ..runtime.mpi import agree
 from ..system import existence, free_motions
 from ..system.equations import LawModel
@@ -74,7 +75,7 @@ def _held_by_laws(
     if not moves:
         return at_rest, np.empty(0, np.int64)
     settled = settle(system, laws, x, moves) is not None
-    kinks = at_kinks(system, laws, x, solver.thresholds.touching)
+    kinks = at_kinks(system, laws, x, RIGID.touching)
     return models(solver, laws, x) if settled else at_rest, kinks
 
 
@@ -141,7 +142,7 @@ def at_rest(
     bearing = _rest(system, laws, x, moves)
     if bearing is None:
         return None
-    kinks = at_kinks(system, laws, x, context.options.thresholds.touching)
+    kinks = at_kinks(system, laws, x, RIGID.touching)
     held = np.setdiff1d(np.union1d(bearing, kinks), system.problem.fixed).astype(np.int32)
     return x, context.solver.newton_step(x, held, models(x), rtol).linear
 

@@ -25,19 +25,15 @@ class Thresholds:
         linear: of the linear solvers.
         following: how paths are followed.
         near: distance from a bound or a kink that counts as being on it.
-        touching: the same for a rigid position, relative to a kink further away.
         rounding_safety: the sample of the rounding error is trusted within this factor.
-        largest_rounding: a residual larger than this is no rounding.
         energy_rounding: change of an energy, or of a merit function or step of ``condensed``, relative to it, that is
             rounding.
         loose: relative tolerance of a linear solve whose solution is to tell an active set.
         margin: part of what is still allowed that one of several steps, or of several errors, may take.
         coarse_tolerance: tolerance of what is a start only: on a coarser level, while the pieces of the laws still
-            change, of a step's linear solve.
-        still: fraction of the residual; a step that changes it by less shows a line search that stalls.
-        useless_steps: steps in a row that lower no residual, after which a solve ends; of 67 solves of hard cases that
-            converged after more than five steps, two had more.
-        few_steps: Newton steps of a start that finds an equilibrium at once or hardly ever.
+            change, of a step's linear solve; a residual larger than this is no rounding.
+        few_steps: Newton steps of a start that finds an equilibrium at once or hardly ever; and steps in a row that do
+            not halve a residual, after which a solve ends.
         search_steps: Newton steps of all starts together, unless the body is held; hard cases took at most 589.
         most_changes: convex steps at most, and changes of the cells between kinks in one of them.
         runaway: a displacement of so many times p0 L / E0 is a body that slides away; a slip of so many times that at
@@ -46,47 +42,36 @@ class Thresholds:
         first_ramp: slip up to which the traction of a law of |u_t| grows from zero at first, relative to the largest
             slip: a free vertex may turn its direction there.
         least_slip: the largest slip is taken to be this at least.
-        widest: relative width of the smoothing at which laws that push are nearly straight.
         narrowest: the last width of a continuation to the law itself.
-        narrowing: factor from each width to the next, and of the ramp where a vertex becomes free.
         vertex_unknowns: unknowns of Γc's vertices up to which a load path is followed for a start.
         curve_unknowns: the same where the path is a curve, without jumps; where it goes on through jumps a half.
         most_events: of such a path.
         largest_dense: unknowns of Γc's vertices up to which the stiffness is formed for a load path of its own, where
             solves with factors take longer.
         nested_from: unknowns from which a coarser level pays.
-        inertia_plane: unknowns in the plane up to which a factorisation of the Hessian takes little of a run; in space
-            those up to which no coarser level pays.
     """
 
     linear: LinearThresholds = field(default_factory=LinearThresholds)
     following: FollowingThresholds = field(default_factory=FollowingThresholds)
     near: float = 1e-11
-    touching: float = 1e-7
     rounding_safety: float = 4.0
-    largest_rounding: float = 1e-4
     energy_rounding: float = 1e-10
     loose: float = 1e-2
     margin: float = 0.5
     coarse_tolerance: float = 1e-4
-    still: float = 1e-3
-    useless_steps: int = 10
-    few_steps: int = 8
+    few_steps: int = 10
     search_steps: int = 1_000
     most_changes: int = 200
     runaway: float = 1e8
     foundation: float = 1e-8
     first_ramp: float = 1e-2
     least_slip: float = 1e-6
-    widest: float = 100.0
     narrowest: float = 1e-3
-    narrowing: float = 0.5
     vertex_unknowns: int = 1_600
     curve_unknowns: int = 400
     most_events: int = 20_000
     largest_dense: int = 5_000
     nested_from: int = 5_000
-    inertia_plane: int = 50_000
 
 
 DEFAULT = Thresholds()

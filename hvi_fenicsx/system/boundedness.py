@@ -12,10 +12,10 @@ from ..laws import Superpotential
 from ..laws.convex_parts import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
+from ..problem.thresholds import DEFAULT
 from ..rigid import AnyBody, Resistance, RigidProblem, fields_at, gives_way
 from ..typing import Array
 from . import existence
-from .thresholds import DEFAULT, Thresholds
 
 
 def is_unbounded(
@@ -23,7 +23,6 @@ def is_unbounded(
     forces: Mapping[str, PETSc.Vec],
     laws: Sequence[Superpotential],
     xi: Sequence[Array],
-    thresholds: Thresholds = DEFAULT,
 ) -> bool:
     """Whether the convex energy with H - ξ in the place of each law j = H - G has no minimiser. Collective.
 
@@ -35,10 +34,9 @@ def is_unbounded(
         forces: its load vectors by name.
         laws: what is solved, by term.
         xi: ξ at the vertices, by term, (m,) each.
-        thresholds: what counts as infinite.
     """
     comm = problem.domain.mesh.comm
-    growths = [_growth(law, thresholds) for law in laws]
+    growths = [_growth(law) for law in laws]
     terms = list(zip(problem.terms, growths, xi, strict=True))
     majorants = (_majorant(problem, forces, body, terms) for body in problem.bodies)
     return any(gives_way(comm, one) for one in majorants)
@@ -63,9 +61,9 @@ def _majorant(
     )
 
 
-def _growth(law: Superpotential, thresholds: Thresholds) -> Directional:
+def _growth(law: Superpotential) -> Directional:
     """H^∞: the limits of H' on both sides."""
-    ends = np.array([-thresholds.infinite_displacement, thresholds.infinite_displacement])
+    ends = np.array([-1.0, 1.0]) * DEFAULT.largest_scale
     with np.errstate(over="ignore"):
         here, beyond = (law.convex.right(x) * np.sign(ends) for x in (ends, 2.0 * ends))
     minus, plus = np.where(beyond > here, np.inf, here)

@@ -248,7 +248,7 @@ class Factorisation:
 _FACTOR_FLOPS = 3  # RINFOG: operations of the elimination
 _FACTOR_ENTRIES = 29  # INFOG: numbers in the factors; in millions with a minus, where they are many
 _NEGATIVE_PIVOTS = 12  # INFOG
-_FLOPS_PER_ENTRY = 4.0  # a solve multiplies and adds each number twice, forth and back
+_FLOPS_PER_ENTRY = 4  # a solve multiplies and adds each number twice, forth and back
 _LEAST = 30.0  # solves; measured: 13 to 45 in the plane, where other things than operations take the time
 
 

@@ -105,7 +105,7 @@ class HeldPreconditioner:
         if self.settings.kind in ("lu", "mixed"):
             return changed == 0 and drift == 0.0
         thresholds = self.settings.thresholds
-        most = 0 if self.settings.kind == "mg" else max(2, thresholds.changed_held * len(held))
+        most = 0 if self.settings.kind == "mg" else max(2, thresholds.drift * len(held))
         return changed <= most and drift <= thresholds.drift
 
     def report(self, iterations: int, *, failed: bool = False) -> None:
@@ -142,7 +142,7 @@ class HeldPreconditioner:
         """Whether the body is to be condensed. Collective."""
         if not isinstance(self._preconditioner, Direct):
             return self._condensed
-        worth = self.settings.thresholds.condensing * factorisation.solves_worth(self._preconditioner.factors)
+        worth = factorisation.solves_worth(self._preconditioner.factors)
         return direct.is_worthwhile(self.system, self._factorised * worth)
 
     @property

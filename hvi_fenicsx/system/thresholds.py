@@ -20,9 +20,8 @@ class Thresholds:
         mixed_margin: factor of that residual, over λ/μ, to which the equations of displacements and pressures are
             solved.
         least_mixed_accuracy: relative residual of its own equations that rounding allows.
-        drift: change of a law's nodal stiffness, relative to an elastic one (about 1), up to which a Krylov method
-            keeps its preconditioner.
-        changed_held: part of the held unknowns that may change while algebraic multigrid keeps its preconditioner.
+        drift: change of a law's nodal stiffness, relative to an elastic one (about 1), or part of the held unknowns
+            that changes, up to which a Krylov method keeps its preconditioner.
         slow: iterations from which a direct solver takes over where it can: at 65 a Newton step costs twice as much as
             with it; and times that algebraic multigrid is made: most of its cost is then in its setup (on cells 1000
             times as long as high, ten times that of a factorisation).
@@ -30,7 +29,6 @@ class Thresholds:
         surplus: part of the relative tolerance at which a Krylov method ends though its goal is not reached.
         krylov_iterations: iterations of a Krylov method at most.
         replaced_iterations: the same where a direct solver can take over: 2,000 in vain took far longer than that.
-        condensing: cost of condensing to Γc, in terms of the factorisations so far, up to which it is done.
         dense_columns: right-hand sides that are solved at once where a body is condensed.
         rank_unknowns: unknowns of a rank, on average, from which a coarse level is on all ranks (docs/scaling.md).
         exchanges: columns that are exchanged in factorised equations of a load path before these are factorised anew.
@@ -41,7 +39,6 @@ class Thresholds:
         held_stiffness: diagonal of a held unknown, in units of an elastic stiffness (about 1): what the unknown moves
             is less than rounding.
         rounding: of the local components of a unit vector.
-        infinite_displacement: a displacement beyond all scales.
     """
 
     largest_direct: Mapping[int, int] = field(default_factory=lambda: {2: 60_000, 3: 15_000})
@@ -50,14 +47,12 @@ class Thresholds:
     mixed_accuracy: float = 1e-2
     mixed_margin: float = 0.05
     least_mixed_accuracy: float = 1e-13
-    drift: float = 0.3
-    changed_held: float = 0.1
+    drift: float = 0.2
     slow: int = 50
     slower: float = 1.5
     surplus: float = 1e-2
     krylov_iterations: int = 2_000
     replaced_iterations: int = 100
-    condensing: float = 1.0
     dense_columns: int = 64
     rank_unknowns: int = 500
     exchanges: int = 60
@@ -66,7 +61,6 @@ class Thresholds:
     held_weight: float = 0.2
     held_stiffness: float = 1e20
     rounding: float = 1e-12
-    infinite_displacement: float = 1e100
 
 
 DEFAULT = Thresholds()

@@ -149,7 +149,8 @@ def test_a_falling_law_is_decided_by_default_on_a_small_mesh() -> None:
     found = hvi.solve(scene, estimate=False)
     assert found.certificate is not None
     assert found.certificate.second_order == "local minimiser"
-    small = replace(DEFAULT, solvers=replace(DEFAULT.solvers, inertia_plane=2_000))
+    linear = replace(DEFAULT.solvers.linear, largest_direct={2: 2_000, 3: 2_000})
+    small = replace(DEFAULT, solvers=replace(DEFAULT.solvers, linear=linear))
     again = hvi.solve(scene, estimate=False, thresholds=small)
     assert again.certificate is not None
     assert again.certificate.second_order == "undecided"
