@@ -22,7 +22,6 @@ from . import coupled_errors
 from .bubbles import BubbleStiffness
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawTraces, Trace
-from .thresholds import DEFAULT, EstimateThresholds
 
 _PLACE = 1 / (2 * np.sqrt(12))
 """Standard deviation, over the distance of two nodes, of the place of a drop that may be anywhere in half of it."""
@@ -48,7 +47,6 @@ def estimate_contact_errors(
     levels: Levels,
     u: fem.Function,
     examination: Examination,
-    thresholds: EstimateThresholds = DEFAULT,
     known: ErrorField | None = None,
 ) -> ContactErrors:
     """Estimate the errors of slip and -σ_t, what smoothing changes included. Collective.
@@ -60,11 +58,10 @@ def estimate_contact_errors(
         levels: its coarser levels; none where there is no mesh hierarchy.
         u: its solution, nondimensional, ghosts updated.
         examination: of the same u.
-        thresholds: how accurately.
         known: the estimated error, where it is known as a field (:attr:`.Estimate.field`).
     """
-    traces = LawTraces(system.problem, u, examination.states, thresholds, exact=True)
-    inverse = DualNorm(system, levels, u, thresholds)
+    traces = LawTraces(system.problem, u, examination.states, exact=True)
+    inverse = DualNorm(system, levels, u)
     error = known or coupled_errors.of_solution(traces, inverse, BubbleStiffness(system.problem, traces.bubbles))[0]
     uncertain = _uncertainty(traces, inverse)
     inverse.destroy()

@@ -21,6 +21,7 @@ from . import defect
 from .bubbles import BlockForces, BubbleStiffness, summed
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces, Trace
+from .thresholds import DEFAULT
 
 
 def within_facets(traces: LawTraces) -> bool:
@@ -64,14 +65,14 @@ class Coupled:
 
     def __init__(self, traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> None:
         problem, space = traces.problem, traces.bubbles
-        self._traces, self._inverse, self._thresholds = traces, inverse, traces.thresholds
+        self._traces, self._inverse = traces, inverse
         self._longest = 0.0
         self.error = ErrorField(fem.Function(problem.space), fem.Function(space))
         load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
         self._laws, _ = traces.tested()
         load[self._laws.blocks] -= self._laws.values
         under = defect.constraints(problem, traces.u, space)
-        self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load, self._thresholds)
+        self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load)
         self._moved = fem.Function(problem.space)
         self._of_moved = problem.bulk.force_in(space, self._moved)
         self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
@@ -102,18 +103,18 @@ class Coupled:
         np.negative(nodes.x.array, out=self._moved.x.array)
         of_bubbles = self._of_bubbles.values()
         asked = traces.problem.combined(of_bubbles)
-        for number in range(self._thresholds.rounds):
+        for number in range(DEFAULT.rounds):
             _, laws = traces.tested(self.error)
             if self._settled(laws) and number > 0:
                 break
             unmet = -asked
             unmet -= self._force
             unmet[laws.blocks] += laws.values
-            step, length = inverse.solve(unmet, self._thresholds.rough_tolerance[1])
+            step, length = inverse.solve(unmet, DEFAULT.rough_tolerance[1])
             nodes.x.array[:] += step.x.array
             self._force = inverse.force(nodes)
             self._longest = max(self._longest, length)
-            if length <= self._thresholds.answer_change * self._longest:
+            if length <= DEFAULT.answer_change * self._longest:
                 break
         if inverse.keep_within_bounds(nodes):
             self._force = inverse.force(nodes)
@@ -126,7 +127,7 @@ class Coupled:
         comm = self._traces.problem.domain.mesh.comm
         changed = np.sqrt(total(comm, float(np.sum((laws - self._answer).values ** 2))))
         self._answer, self._strongest = laws, max(self._strongest, changed)
-        return bool(changed <= self._thresholds.coupled_change * self._strongest)
+        return bool(changed <= DEFAULT.coupled_change * self._strongest)
 
     def tell_bubbles(self) -> None:
         """Let the bubbles feel that nodes and laws have moved. Collective."""
@@ -155,11 +156,11 @@ def of_solution(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness
 def _found(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> ErrorField:
     """The estimated error. Collective."""
     coupled, size = Coupled(traces, inverse, stiffness), 0.0
-    for _ in range(traces.thresholds.coupled_rounds):
+    for _ in range(DEFAULT.coupled_rounds):
         coupled.find_bubbles()
         coupled.move_nodes()
         before, size = size, coupled.size
-        if abs(size - before) <= traces.thresholds.coupled_change * size:
+        if abs(size - before) <= DEFAULT.coupled_change * size:
             break
         coupled.tell_bubbles()
     return coupled.error

@@ -27,7 +27,7 @@ from ..runtime.mpi import total
 from ..typing import Array, Entities
 from .bubbles import of_facet, quadrature, shape
 from .contact_facets import ContactFacets, PartTrace, contact_facets
-from .thresholds import EstimateThresholds
+from .thresholds import DEFAULT
 
 
 def varies(value: SpatialValue | None) -> bool:
@@ -132,19 +132,16 @@ class FacetSamples:
         return np.asarray(self.of(value, at) - self.interpolated(at_nodes, at))
 
 
-def sample(
-    problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: EstimateThresholds
-) -> FacetSamples:
+def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities) -> FacetSamples:
     """Samples of boundary facets, exact for products of the modes of the data. Collective.
 
     Args:
         problem: the mesh.
         bubbles: the space of bubbles.
         facets: the local facets.
-        thresholds: the degree of the modes.
     """
     found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
-    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * thresholds.data_degree[d - 2])
+    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * DEFAULT.data_degree[d - 2])
     return FacetSamples(found, problem.positions[found.nodes], barycentric, weights)
 
 
@@ -188,19 +185,16 @@ class FacetModes(FacetSamples):
         return np.asarray(self.facets.areas / compliance * np.sum(squares, axis=1))
 
 
-def facet_modes(
-    problem: Problem, bubbles: fem.FunctionSpace, facets: Entities, thresholds: EstimateThresholds
-) -> FacetModes:
+def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities) -> FacetModes:
     """The modes on boundary facets. Collective.
 
     Args:
         problem: the mesh.
         bubbles: the space of bubbles.
         facets: the local facets.
-        thresholds: how many modes.
     """
-    at, d = sample(problem, bubbles, facets, thresholds), problem.scales.dimension
-    degree, kind = thresholds.data_degree[d - 2], basix.CellType.interval if d == 2 else basix.CellType.triangle
+    at, d = sample(problem, bubbles, facets), problem.scales.dimension
+    degree, kind = DEFAULT.data_degree[d - 2], basix.CellType.interval if d == 2 else basix.CellType.triangle
     legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, at.barycentric[:, 1:])
     values = legendre / math.sqrt(math.factorial(d - 1))
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
@@ -258,14 +252,7 @@ def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:
 
 
 def redistributed(
-    comm: MPI.Comm,
-    on: FacetModes,
-    pushes: Array,
-    gaps: Array,
-    compliance: Array,
-    *,
-    free: bool,
-    thresholds: EstimateThresholds,
+    comm: MPI.Comm, on: FacetModes, pushes: Array, gaps: Array, compliance: Array, *, free: bool
 ) -> Array:
     """Pressures p ≥ 0 with w ≤ gap and p (gap - w) = 0, w being what the pushes less p cause, (f, q). Collective.
 
@@ -276,14 +263,13 @@ def redistributed(
         gaps: how far the facets are from the obstacle, (f, q).
         compliance: of the facets along the normal, (f,).
         free: whether the body may move along the normal.
-        thresholds: how many rounds.
     """
     kernel = (on.values.T / (on.degrees + 0.5)) @ on.values * on.weights
     missing = np.eye(len(on.weights)) - on.values.T @ on.values * on.weights
     kernel += missing / (on.degrees[-1] + 1.5)
     within, pressure = gaps / compliance[:, None], pushes.copy()
     if not free:
-        return _solved(kernel, pushes, within, pressure, 4 * thresholds.coupled_rounds)
+        return _solved(kernel, pushes, within, pressure, 4 * DEFAULT.coupled_rounds)
     areas = on.facets.areas[:, None] * on.weights
     wanted = total(comm, float(np.sum(areas * pushes)))
     if wanted == 0.0:
@@ -291,9 +277,9 @@ def redistributed(
     reach = (pushes @ kernel.T) * compliance[:, None]
     low = comm.allreduce(float(np.min(gaps - reach, initial=0.0)), op=MPI.MIN)
     high = comm.allreduce(float(np.max(gaps, initial=0.0)), op=MPI.MAX)
-    for _ in range(thresholds.gap_shifts):
+    for _ in range(DEFAULT.gap_shifts):
         shift = (low + high) / 2
-        pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, thresholds.coupled_rounds)
+        pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, DEFAULT.coupled_rounds)
         more = total(comm, float(np.sum(areas * pressure))) > wanted
         low, high = (low, shift) if more else (shift, high)
     return pressure
@@ -311,16 +297,13 @@ def _solved(kernel: Array, pushes: Array, within: Array, pressure: Array, sweeps
     return p
 
 
-def squares(
-    problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState], thresholds: EstimateThresholds
-) -> Array:
+def squares(problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[ContactState]) -> Array:
     """η_K² of the owned cells that the data within facets add. Collective.
 
     Args:
         problem: what was solved.
         bubbles: the space of bubbles.
         states: of the parts of Γc at the solution.
-        thresholds: how finely the data are sampled.
     """
     found = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
 
@@ -328,7 +311,7 @@ def squares(
 
     def modes(facets: Entities) -> FacetModes:
         if id(facets) not in known:
-            known[id(facets)] = facet_modes(problem, bubbles, facets, thresholds)
+            known[id(facets)] = facet_modes(problem, bubbles, facets)
         return known[id(facets)]
 
     for facets, axis, value in tractions(problem):
@@ -342,7 +325,7 @@ def squares(
             on = modes(part.facets)
             np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
     for obstacle in _obstacles(problem, states, modes, CERTIFICATE.near):
-        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(problem, bubbles, obstacle, thresholds))
+        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(problem, bubbles, obstacle))
     return found
 
 
@@ -391,9 +374,7 @@ def _obstacles(
                 yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
 
 
-def _moved_pressure(
-    problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle, thresholds: EstimateThresholds
-) -> Array:
+def _moved_pressure(problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle) -> Array:
     """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
     surface, on = obstacle.bounds.surface, obstacle.on
     trace = PartTrace(problem, bubbles, surface, surface.normals[:, None, :], 1)
@@ -407,7 +388,6 @@ def _moved_pressure(
         pushes=pushes,
         compliance=compliance,
         free=not _held(problem, surface.normals),
-        thresholds=thresholds,
     )
     return on.energies(solve(gaps=gaps + obstacle.within) - solve(gaps=gaps), compliance, lowest=0)
 

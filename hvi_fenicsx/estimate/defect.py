@@ -24,7 +24,7 @@ from ..typing import Array, Entities, Mask
 from .bubbles import BubbleStiffness, Springs, of_cell
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
-from .thresholds import DEFAULT, EstimateThresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -222,22 +222,14 @@ class LeastEnergy:
         stiffness: a(e, e).
         under: what they must meet.
         load: ρ, (n, d); it becomes the residual.
-        thresholds: how accurately.
 
     Attributes:
         residual: ρ - a(e, ·), what is held included, (n, d); a change of the load is to be added to it.
         energy: a(e, e).
     """
 
-    def __init__(
-        self,
-        bubbles: fem.Function,
-        stiffness: BubbleStiffness,
-        under: Constraints,
-        load: Array,
-        thresholds: EstimateThresholds = DEFAULT,
-    ) -> None:
-        self._bubbles, self._stiffness, self._under, self._thresholds = bubbles, stiffness, under, thresholds
+    def __init__(self, bubbles: fem.Function, stiffness: BubbleStiffness, under: Constraints, load: Array) -> None:
+        self._bubbles, self._stiffness, self._under = bubbles, stiffness, under
         self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
         self._e = bubbles.x.array[: load.size].reshape(load.shape)
         self._special = _union([*(p.blocks for p in under.bounds), *(p.blocks for p in under.prescribed)])
@@ -246,14 +238,14 @@ class LeastEnergy:
 
     def find(self) -> None:
         """Find them; from the second time on from those that were found before. Collective."""
-        stiffness, limits, e = self._stiffness, self._thresholds, self._e
+        stiffness, e = self._stiffness, self._e
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
-        rough = limits.rough_tolerance[nodes.degree(stiffness.problem.space) - 1]
-        tolerance = rough if self._begun else limits.tolerance
-        goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), limits.rounding**2)
-        for _ in range(limits.rounds):
+        rough = DEFAULT.rough_tolerance[nodes.degree(stiffness.problem.space) - 1]
+        tolerance = rough if self._begun else DEFAULT.tolerance
+        goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), DEFAULT.rounding**2)
+        for _ in range(DEFAULT.rounds):
             self._put_on_bounds()
-            steps = limits.bubble_steps
+            steps = DEFAULT.bubble_steps
             self.energy += stiffness.solve(self.residual, e, self._descent, goal=goal, max_steps=steps)
             changed = tuple(p.updated(e[p.blocks], self.residual[p.blocks]) for p in self._parts)
             same = all(np.array_equal(a.side, b.side) for a, b in zip(self._parts, changed, strict=True))
@@ -305,25 +297,6 @@ def _union(parts: Iterable[Entities]) -> Entities:
     return np.unique(np.concatenate([np.empty(0, np.int32), *parts]))
 
 
-def find_least_energy(
-    bubbles: fem.Function,
-    stiffness: BubbleStiffness,
-    under: Constraints,
-    load: Array,
-    thresholds: EstimateThresholds = DEFAULT,
-) -> None:
-    """Find the admissible bubbles of least energy under a load. Collective.
-
-    Args:
-        bubbles: take the result, ghosts updated; zero before.
-        stiffness: a(e, e).
-        under: what they must meet.
-        load: ρ, (n, d), overwritten.
-        thresholds: how accurately.
-    """
-    LeastEnergy(bubbles, stiffness, under, load, thresholds).find()
-
-
 class VertexStiffness(BubbleStiffness):
     """The bubbles' stiffness with the nodes that follow them and the averaged volumetric energy of both.
 
@@ -333,18 +306,15 @@ class VertexStiffness(BubbleStiffness):
         problem: whose elastic operator it is.
         bubbles: the space of bubbles.
         inverse: of the system, for the nodes.
-        thresholds: how accurately.
 
     Attributes:
         at_nodes: the nodes' displacement, as :meth:`follow` found it last.
         pressures: the averaged volumetric stress of bubbles and nodes, by region.
     """
 
-    def __init__(
-        self, problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm, thresholds: EstimateThresholds
-    ) -> None:
+    def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, inverse: DualNorm) -> None:
         super().__init__(problem, bubbles)
-        self._node_inverse, self._tolerance = inverse, thresholds.vertex_tolerance
+        self._node_inverse, self._tolerance = inverse, DEFAULT.vertex_tolerance
         self.at_nodes = fem.Function(problem.space)
         bulk, moved = problem.bulk, self._in + self.at_nodes
         self.pressures = bulk.pressures(self.at_nodes)
@@ -416,7 +386,7 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
         inverse: of the system.
     """
     problem, u = traces.problem, traces.u
-    stiffness = VertexStiffness(problem, traces.bubbles, inverse, traces.thresholds)
+    stiffness = VertexStiffness(problem, traces.bubbles, inverse)
     load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
     between, left = traces.tested()
     load[between.blocks] -= between.values
@@ -425,7 +395,7 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
         load -= stiffness.on_bubbles(unmet)
     bubbles, under = fem.Function(traces.bubbles), constraints(problem, u, traces.bubbles)
     stiffness.hold(LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles)))
-    find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
+    LeastEnergy(bubbles, stiffness, under, load).find()
     stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(load)], unmet)
     shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)
     return shear + problem.bulk.pressure_energy(stiffness.pressures) + problem.bulk.dilatation_error(u)

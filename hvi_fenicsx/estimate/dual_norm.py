@@ -29,7 +29,7 @@ from ..system.linear_settings import LinearSettings
 from ..system.system import System
 from ..typing import Array, Entities, Integers
 from .law_traces import nearest
-from .thresholds import DEFAULT, EstimateThresholds
+from .thresholds import DEFAULT
 
 NEAR = CERTIFICATE.near
 
@@ -44,10 +44,8 @@ class DualNorm:
         held: the owned scalar dofs at which u is held.
     """
 
-    def __init__(
-        self, system: System, levels: Levels, u: fem.Function, thresholds: EstimateThresholds = DEFAULT
-    ) -> None:
-        self.system, self._before, self._tolerance = system, system.jacobian.rates, thresholds.tolerance
+    def __init__(self, system: System, levels: Levels, u: fem.Function) -> None:
+        self.system, self._before, self._tolerance = system, system.jacobian.rates, DEFAULT.tolerance
         self._x = system.unknowns(u)
         self.held = _held(system, self._x)
         at = self._x.array_r

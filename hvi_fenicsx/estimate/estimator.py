@@ -22,7 +22,7 @@ from . import coupled_errors, data_errors, defect, dual_norm, part_ends
 from .bubbles import BubbleStiffness
 from .contact_errors import ratio
 from .law_traces import ErrorField, LawTraces
-from .thresholds import DEFAULT, EstimateThresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,9 +73,7 @@ class Estimate:
         return f"Estimate({', '.join(f'{name}={value:.3g}' for name, value in self.as_dict().items())})"
 
 
-def estimate(
-    system: System, levels: Levels, u: fem.Function, examination: Examination, thresholds: EstimateThresholds = DEFAULT
-) -> Estimate:
+def estimate(system: System, levels: Levels, u: fem.Function, examination: Examination) -> Estimate:
     """Estimate the error of a displacement. Collective.
 
     Args:
@@ -83,18 +81,17 @@ def estimate(
         levels: its coarser levels; none where there is no mesh hierarchy.
         u: its solution, nondimensional, ghosts updated.
         examination: of the same u.
-        thresholds: how accurately.
     """
     problem = system.problem
-    traces = LawTraces(problem, u, examination.states, thresholds, exact=False)
-    inverse = dual_norm.DualNorm(system, levels, u, thresholds)
+    traces = LawTraces(problem, u, examination.states, exact=False)
+    inverse = dual_norm.DualNorm(system, levels, u)
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
-    cells += data_errors.squares(problem, traces.bubbles, examination.states, thresholds)
-    cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse, thresholds)
+    cells += data_errors.squares(problem, traces.bubbles, examination.states)
+    cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), thresholds.rough_tolerance[0])
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
@@ -104,7 +101,7 @@ def estimate(
         "algebraic": algebraic**2 + beyond,
         "energy_norm": energy,
     }
-    norms = {name: _norm(square, thresholds.rounding) for name, square in squares.items()}
+    norms = {name: _norm(square, DEFAULT.rounding) for name, square in squares.items()}
     return Estimate(cells=np.sqrt(cells), field=None if smoothed else field, **norms)
 
 
@@ -117,7 +114,7 @@ def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: floa
     """The error, where it is known as a field, and η_K² of the owned cells; a(u_h, u_h) is the energy. Collective."""
     if traces.problem.bulk.averages_dilatation:
         return None, defect.squares(traces, inverse)
-    stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), traces.thresholds.coupled[traces.degree - 1]
+    stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), DEFAULT.coupled[traces.degree - 1]
     if limit and not coupled_errors.within_facets(traces):
         cells = _between_nodes(traces, inverse, stiffness)
         if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:
@@ -132,7 +129,7 @@ def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm, stiffness: Bu
     between, unmet = traces.tested()
     load[between.blocks] -= between.values
     bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
-    defect.find_least_energy(bubbles, stiffness, under, load, traces.thresholds)
+    defect.LeastEnergy(bubbles, stiffness, under, load).find()
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
         owned = problem.space.dofmap.index_map.size_local

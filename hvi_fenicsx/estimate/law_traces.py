@@ -26,7 +26,7 @@ from . import bubbles, contact_facets
 from .bubbles import BlockForces, gathered, summed
 from .contact_facets import PartTrace
 from .interface_traces import InterfacePoints, InterfaceTrace
-from .thresholds import DEFAULT, EstimateThresholds
+from .thresholds import DEFAULT
 
 Trace = PartTrace | InterfaceTrace
 """The facets of a part, or of two bodies that meet, between their nodes."""
@@ -129,7 +129,6 @@ class LawTraces:
         problem: what was solved.
         u: its solution u_h, nondimensional, ghosts updated.
         states: of the parts of Γc at u_h.
-        thresholds: of the quadrature and of kinks.
         exact: whether an error meets the unsmoothed laws, so that it has what smoothing changes, too.
         degree: of the solution.
         bubbles: the space of bubbles.
@@ -140,11 +139,10 @@ class LawTraces:
         problem: Problem,
         u: fem.Function,
         states: Sequence[ContactState],
-        thresholds: EstimateThresholds = DEFAULT,
         *,
         exact: bool,
     ) -> None:
-        self.problem, self.u, self.states, self.thresholds, self.exact = problem, u, states, thresholds, exact
+        self.problem, self.u, self.states, self.exact = problem, u, states, exact
         self.degree = nodes.degree(problem.space)
         self.bubbles = bubbles.space(problem.space.mesh, self.degree)
         self._interfaces: dict[str, InterfacePoints] = {}
@@ -164,9 +162,9 @@ class LawTraces:
         return known[1]
 
     def _new_part(self, surface: Surface, directions: Array) -> Trace:
-        problem, space, degree = self.problem, self.bubbles, self.thresholds.facet_degree[self.degree - 1] // 2
+        problem, space, degree = self.problem, self.bubbles, DEFAULT.facet_degree[self.degree - 1] // 2
         if (interface := problem.interface_of(surface)) is None:
-            return PartTrace(problem, space, surface, directions, self.thresholds.facet_degree[self.degree - 1])
+            return PartTrace(problem, space, surface, directions, DEFAULT.facet_degree[self.degree - 1])
         if interface.name not in self._interfaces:
             self._interfaces[interface.name] = InterfacePoints(problem, space, interface, degree)
         return InterfaceTrace(problem, self._interfaces[interface.name], surface, directions)

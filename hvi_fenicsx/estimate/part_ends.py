@@ -29,7 +29,6 @@ from ..typing import Array, Entities, Mask
 from .bubbles import gathered, summed
 from .data_errors import FacetModes, facet_modes
 from .dual_norm import DualNorm
-from .thresholds import EstimateThresholds
 
 
 def energies(on: FacetModes, missing: Array, tractions: Array) -> Array:
@@ -205,12 +204,7 @@ _Lacking = tuple[_Piece, Array]
 
 
 def squares(
-    problem: Problem,
-    bubbles: fem.FunctionSpace,
-    u: fem.Function,
-    examination: Examination,
-    inverse: DualNorm,
-    thresholds: EstimateThresholds,
+    problem: Problem, bubbles: fem.FunctionSpace, u: fem.Function, examination: Examination, inverse: DualNorm
 ) -> Array:
     """η_K² of the owned cells that the ends of parts add. Collective.
 
@@ -220,10 +214,9 @@ def squares(
         u: the solution, ghosts updated.
         examination: of the same u.
         inverse: of the system's stiffness.
-        thresholds: how finely facets are sampled.
     """
     cells = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
-    parts = list(_parts(problem, bubbles, thresholds))
+    parts = list(_parts(problem, bubbles))
     if not parts:
         return cells
     holding = placed_forces.reactions(problem, u, examination.forces, examination.states)
@@ -264,13 +257,13 @@ def _held(problem: Problem, part: _Part, forces: Array, examination: Examination
     return lacking
 
 
-def _parts(problem: Problem, bubbles: fem.FunctionSpace, thresholds: EstimateThresholds) -> Iterator[_Part]:
+def _parts(problem: Problem, bubbles: fem.FunctionSpace) -> Iterator[_Part]:
     """The parts with `where`. Collective."""
     for name, piece in problem.pieces.items():
         if piece.where is not None:
             facets = problem.part_facets[name]
             beyond = np.setdiff1d(problem.domain.facets(piece.on), facets).astype(np.int32)
-            on = [facet_modes(problem, bubbles, some, thresholds) for some in (facets, beyond)]
+            on = [facet_modes(problem, bubbles, some) for some in (facets, beyond)]
             shares = [_share(one, piece.where) for one in on]
             meshed = np.ones_like(shares[0]), np.zeros_like(shares[1])
             yield _Part(name, facets, beyond, [_Piece(*one) for one in zip(on, shares, meshed, strict=True)])

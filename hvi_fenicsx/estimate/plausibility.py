@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from ..certify.certificate import Examination
 from ..certify.contact_state import ContactState
 from ..certify.law_state import LawState
-from ..certify.thresholds import DEFAULT, PLAUSIBILITY, PlausibilityThresholds
+from ..certify.thresholds import DEFAULT, PLAUSIBILITY
 from ..effects import Direction
 from ..mesh import facets, nodes
 from ..mesh.curved import CurvedMesh
@@ -58,34 +58,30 @@ def of_law(problem: Problem, term: LawTerm) -> str:
     return f"boundary.{part}.{next(keys)}"
 
 
-def before_solving(
-    problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds = PLAUSIBILITY
-) -> tuple[str, ...]:
+def before_solving(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[str, ...]:
     """What there is to warn of before anything is solved, in sentences. Collective; the same on all ranks.
 
     Args:
         problem: as composed.
         forces: its load vectors by name, nondimensional.
-        thresholds: what is plausible.
     """
     return (
         *problem.implausible,
-        *_scales(problem, thresholds),
-        *_uneven_parts(problem, thresholds),
-        *_polygons(problem, thresholds),
+        *_scales(problem),
+        *_uneven_parts(problem),
+        *_polygons(problem),
         *_straightened(problem),
-        *_weak_laws(problem, forces, thresholds),
+        *_weak_laws(problem, forces),
     )
 
 
-def of_existence(found: Solvability, thresholds: PlausibilityThresholds = PLAUSIBILITY) -> tuple[str, ...]:
+def of_existence(found: Solvability) -> tuple[str, ...]:
     """What there is to warn of in the factor of the load that is borne, in sentences. Local; the same on all ranks.
 
     Args:
         found: whether a solution can exist.
-        thresholds: what is plausible.
     """
-    peak, far = found.lambda_peak, thresholds.far_peak
+    peak, far = found.lambda_peak, PLAUSIBILITY.far_peak
     if not (0.0 < peak < 1.0 / far or far < peak < np.inf):
         return ()
     than = "far more" if peak > 1.0 else "far less"
@@ -95,18 +91,18 @@ def of_existence(found: Solvability, thresholds: PlausibilityThresholds = PLAUSI
     )
 
 
-def _scales(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _scales(problem: Problem) -> Iterator[str]:
     scales, strain = problem.scales, problem.scales.stress / problem.scales.modulus
-    if not thresholds.softest <= scales.modulus <= thresholds.stiffest:
+    if not PLAUSIBILITY.softest <= scales.modulus <= PLAUSIBILITY.stiffest:
         yield f"the largest Young's modulus is {scales.modulus:.3g} N/m²; is it in N/m²? (steel has 2.1e11)"
-    if strain > thresholds.largest_strain:
+    if strain > PLAUSIBILITY.largest_strain:
         yield (
             f"the load (or prescribed displacement, or thermal strain) is {strain:.3g} of Young's modulus, where small "
             "strains are assumed; are loads and modulus in N/m², displacements in m?"
         )
 
 
-def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _uneven_parts(problem: Problem) -> Iterator[str]:
     """Contact parts that seem to be meant flat, in a mesh with few digits in its coordinates."""
     comm = problem.domain.mesh.comm
     for surface in (bounds.surface for bounds in problem.bounds):
@@ -119,7 +115,7 @@ def _uneven_parts(problem: Problem, thresholds: PlausibilityThresholds) -> Itera
             )
 
 
-def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _polygons(problem: Problem) -> Iterator[str]:
     """Contact parts of degree 2 whose facets seem to be those of a curve that the program does not know. Collective."""
     domain, comm = problem.domain, problem.domain.mesh.comm
     if nodes.degree(problem.space) == 1:
@@ -127,8 +123,8 @@ def _polygons(problem: Problem, thresholds: PlausibilityThresholds) -> Iterator[
     known = np.concatenate([np.empty(0, np.int32), *(domain.sides[name] for name in domain.curves)])
     for surface in (bounds.surface for bounds in problem.bounds):
         turns = facets.turns(domain.mesh, np.setdiff1d(surface.facets, known).astype(np.int32))
-        bent = turns[(turns > thresholds.straight) & (turns < thresholds.corner)]
-        if total(comm, len(bent)) > thresholds.mostly_bent * total(comm, len(turns)):
+        bent = turns[(turns > PLAUSIBILITY.straight) & (turns < PLAUSIBILITY.corner)]
+        if total(comm, len(bent)) > PLAUSIBILITY.mostly_bent * total(comm, len(turns)):
             most = np.degrees(largest(comm, float(np.max(bent, initial=0.0))))
             yield (
                 f"{of_bounds(problem, surface.part)}: nearly all facets turn from one to the next, by up to "
@@ -158,13 +154,13 @@ def _straightened(problem: Problem) -> Iterator[str]:
         )
 
 
-def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec], thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Iterator[str]:
     comm = problem.domain.mesh.comm
     load = total(comm, sum(float(np.abs(force.array_r).sum()) for force in forces.values()))
     for term in problem.terms:
         peak = max(term.exact.peak.minus, term.exact.peak.plus)
         most = peak * total(comm, float(term.weights.sum()))
-        if most < thresholds.negligible * load and not _holds(problem, forces, term, DEFAULT.near):
+        if most < PLAUSIBILITY.negligible * load and not _holds(problem, forces, term, DEFAULT.near):
             unit = "N" if problem.scales.dimension == 3 else "N/m"
             yield (
                 f"{of_law(problem, term)}: the law can carry {most * problem.scales.force:.3g} {unit} at "
@@ -185,26 +181,23 @@ def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rou
     return largest(comm, work) > rounding
 
 
-def of_solution(
-    problem: Problem, examination: Examination, u: fem.Function, thresholds: PlausibilityThresholds = PLAUSIBILITY
-) -> tuple[str, ...]:
+def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> tuple[str, ...]:
     """What there is to warn of in a solution, in sentences. Collective; the same on all ranks.
 
     Args:
         problem: as composed.
         examination: its state at u.
         u: the displacement, nondimensional.
-        thresholds: what is plausible.
     """
-    warnings = [*_strain(problem, u, thresholds)]
+    warnings = [*_strain(problem, u)]
     if examination.certificate.passed:
         size = largest(problem.domain.mesh.comm, float(np.max(np.abs(u.x.array), initial=0.0)))
-        warnings += _dips(problem, examination, size, thresholds)
+        warnings += _dips(problem, examination, size)
         for state in examination.states:
-            warnings += _distant_obstacle(problem, state, size, thresholds)
+            warnings += _distant_obstacle(problem, state, size)
             for law in state.laws:
-                warnings += _slip_and_kink(problem, law, thresholds)
-                warnings += _wide_smoothing(problem, law, thresholds)
+                warnings += _slip_and_kink(problem, law)
+                warnings += _wide_smoothing(problem, law)
     return tuple(warnings)
 
 
@@ -224,20 +217,20 @@ def of_estimate(errors: Estimate) -> tuple[str, ...]:
     )
 
 
-def _strain(problem: Problem, u: fem.Function, thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _strain(problem: Problem, u: fem.Function) -> Iterator[str]:
     """By the edges: of P1, the strain along an edge is its change of length over its length."""
     comm, scales, d = problem.domain.mesh.comm, problem.scales, problem.scales.dimension
     values = u.x.array.reshape(-1, d)
     size = np.sqrt(d) * largest(comm, float(np.max(np.abs(values), initial=0.0))) * scales.displacement
     shortest = problem.once("shortest edge", None, lambda: _shortest_edge(problem))
-    if 2.0 * size <= thresholds.largest_strain * shortest:
+    if 2.0 * size <= PLAUSIBILITY.largest_strain * shortest:
         return
     most = 0.0
     for edge, change in zip(_along_edges(problem, problem.points[:, :d]), _along_edges(problem, values), strict=True):
         along = np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge)
         most = max(most, float(np.max(along, initial=0.0)))
     strain = largest(comm, most) * scales.displacement
-    if strain > thresholds.largest_strain:
+    if strain > PLAUSIBILITY.largest_strain:
         yield f"the largest strain is {strain:.3g}, where small strains are assumed; is the modulus in N/m²?"
 
 
@@ -256,25 +249,23 @@ def _along_edges(problem: Problem, values: Array) -> Iterator[Array]:
         yield corners[:, b] - corners[:, a]
 
 
-def _dips(problem: Problem, examination: Examination, size: float, thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _dips(problem: Problem, examination: Examination, size: float) -> Iterator[str]:
     """A penetration between the nodes that is not small."""
     dip = examination.between_nodes
-    if dip is not None and dip > thresholds.negligible * size > 0:
+    if dip is not None and dip > PLAUSIBILITY.negligible * size > 0:
         yield (
             f"between the nodes of Γc, where nothing bounds it, a body goes {dip * problem.scales.displacement:.3g} m "
             f"beyond its bound, {dip / size:.1e} of the largest displacement; a finer mesh there makes it smaller"
         )
 
 
-def _distant_obstacle(
-    problem: Problem, state: ContactState, size: float, thresholds: PlausibilityThresholds
-) -> Iterator[str]:
+def _distant_obstacle(problem: Problem, state: ContactState, size: float) -> Iterator[str]:
     """An obstacle that nothing comes near."""
     comm = problem.domain.mesh.comm
     if state.bounds is None:
         return
     gap = -largest(comm, -float(np.min(state.bounds.upper, initial=np.inf)))
-    if np.isfinite(gap) and thresholds.negligible * gap > size > 0:
+    if np.isfinite(gap) and PLAUSIBILITY.negligible * gap > size > 0:
         metres, displacement = (value * problem.scales.displacement for value in (gap, size))
         yield (
             f"{of_bounds(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
@@ -282,9 +273,9 @@ def _distant_obstacle(
         )
 
 
-def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _slip_and_kink(problem: Problem, law: LawState) -> Iterator[str]:
     """A law whose kinks are of another order than what the solution does to it."""
-    comm, term, far = problem.domain.mesh.comm, law.term, 1.0 / thresholds.negligible
+    comm, term, far = problem.domain.mesh.comm, law.term, 1.0 / PLAUSIBILITY.negligible
     kink, reached, weights = term.exact.length_scale, np.abs(law.argument), term.weights
     if term.exact.is_linear or np.any(term.exact.kinks == 0.0):
         return
@@ -300,22 +291,22 @@ def _slip_and_kink(problem: Problem, law: LawState, thresholds: PlausibilityThre
             f"{of_law(problem, term)}: the largest {what} is {sizes}: "
             "the law is on its first piece everywhere; are the law's displacements in m?"
         )
-    elif beyond > thresholds.nearly_all:
+    elif beyond > PLAUSIBILITY.nearly_all:
         yield (
             f"{of_law(problem, term)}: the {what} is up to {sizes}: "
             "the law is far beyond it nearly everywhere; are the law's displacements in m?"
         )
 
 
-def _wide_smoothing(problem: Problem, law: LawState, thresholds: PlausibilityThresholds) -> Iterator[str]:
+def _wide_smoothing(problem: Problem, law: LawState) -> Iterator[str]:
     """A smoothing so wide that the law which is solved is another one."""
     comm, term = problem.domain.mesh.comm, law.term
     if term.law is term.exact:
         return
     peak = max(term.exact.peak.minus, term.exact.peak.plus)
-    away, weights, limit = law.true_distance(), term.weights, thresholds.smoothing_change
+    away, weights, limit = law.true_distance(), term.weights, PLAUSIBILITY.smoothing_change
     share = total(comm, float(weights[away > limit * peak].sum())) / total(comm, float(weights.sum()))
-    if share > thresholds.smoothing_share:
+    if share > PLAUSIBILITY.smoothing_share:
         most, of_peak = (largest(comm, float(np.max(v, initial=0.0))) for v in (away * term.multiplier, away / peak))
         yield (
             f"{of_law(problem, term)}: smoothing changes the traction by up to "

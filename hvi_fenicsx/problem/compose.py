@@ -28,7 +28,6 @@ from .part_laws import Modification, unchanged
 from .problem import PlacedContribution, PrescribedComponent, Problem
 from .scaling import Placed, Scales
 from .spaces import coefficients_of
-from .thresholds import DEFAULT, CompositionThresholds
 
 _BETWEEN = ", between the vertices of the mesh"
 
@@ -54,13 +53,12 @@ class Formulation:
     volumetric_ratio: float = np.inf
 
 
-def compose(domain: Domain, model: Formulation, thresholds: CompositionThresholds = DEFAULT) -> Problem:
+def compose(domain: Domain, model: Formulation) -> Problem:
     """The problem of a model on a domain. Collective.
 
     Args:
         domain: the body and its mesh.
         model: the effects and their places.
-        thresholds: what counts as rounding.
 
     Raises:
         InputError: on all ranks alike: a part without facets, a load that is not finite somewhere on its part, a bound
@@ -69,11 +67,11 @@ def compose(domain: Domain, model: Formulation, thresholds: CompositionThreshold
     effects = model.effects
     facets = boundary_parts.find(domain, model.parts, effects)
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
-    scales = scaling.choose(sizes, domain.dimension, effects, evaluate, thresholds)
+    scales = scaling.choose(sizes, domain.dimension, effects, evaluate)
     context = DomainForms(domain, facets, scales, effects, model.degree)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
-    return _problem(context, scales, contributions, model, tuple(implausible), thresholds)
+    return _problem(context, scales, contributions, model, tuple(implausible))
 
 
 def _evaluation(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> Evaluate:
@@ -137,19 +135,18 @@ def _problem(
     contributions: Sequence[PlacedContribution],
     model: Formulation,
     implausible: tuple[str, ...],
-    thresholds: CompositionThresholds,
 ) -> Problem:
     """All contributions together. Collective."""
-    conditions, held, fixed = _conditions(context, scales, contributions, thresholds)
+    conditions, held, fixed = _conditions(context, scales, contributions)
     prescribed = constraints.values(context, conditions)
-    surfaces, found = _surfaces(context, contributions, fixed, model, thresholds)
+    surfaces, found = _surfaces(context, contributions, fixed, model)
     fixed = np.unique(np.concatenate([fixed, *(one.tied for one in found)])).astype(np.int32)
     gaps = {one.name: one.gap for one in found}
     bounds = constraints.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
-    constraints.check_bounds(context, bounds, prescribed, fixed, thresholds)
-    constraints.check_contradictions(context, scales, bounds, thresholds)
+    constraints.check_bounds(context, bounds, prescribed, fixed)
+    constraints.check_contradictions(context, scales, bounds)
     part_laws.check_laws(contributions)
-    part_laws.check_moved(context.domain.mesh.comm, contributions, surfaces, thresholds)
+    part_laws.check_moved(context.domain.mesh.comm, contributions, surfaces)
     terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(
@@ -177,25 +174,21 @@ def _problem(
 
 
 def _surfaces(
-    context: DomainForms,
-    contributions: Sequence[PlacedContribution],
-    fixed: Entities,
-    model: Formulation,
-    thresholds: CompositionThresholds,
+    context: DomainForms, contributions: Sequence[PlacedContribution], fixed: Entities, model: Formulation
 ) -> tuple[dict[str, Surface], tuple[interfaces.Interface, ...]]:
     """The parts of Γc by name, those of interfaces too, and the interfaces. Collective."""
-    surfaces = constraints.make_surfaces(context, contributions, fixed, model.interfaces, thresholds)
+    surfaces = constraints.make_surfaces(context, contributions, fixed, model.interfaces)
     occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
-    found = interfaces.find(context, model.interfaces, occupied.astype(np.int32), thresholds)
+    found = interfaces.find(context, model.interfaces, occupied.astype(np.int32))
     return surfaces | {one.name: one.surface for one in found}, found
 
 
 def _conditions(
-    context: DomainForms, scales: Scales, contributions: Sequence[PlacedContribution], thresholds: CompositionThresholds
+    context: DomainForms, scales: Scales, contributions: Sequence[PlacedContribution]
 ) -> tuple[tuple[fem.DirichletBC, ...], tuple[tuple[str, Entities], ...], Entities]:
     """Dirichlet conditions, the dofs of each with its part, and all these dofs. Collective."""
     wanted = [(str(where), c) for where, _, contribution in contributions for c in contribution.conditions]
-    conditions = constraints.make_conditions(context, scales, wanted, thresholds)
+    conditions = constraints.make_conditions(context, scales, wanted)
     held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, conditions, strict=True))
     fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
     return conditions, held, fixed

@@ -23,15 +23,11 @@ from .domain_forms import DomainForms
 from .problem import Bounds, BoundsForce, BoundsMove, PlacedContribution
 from .scaling import Scales
 from .spaces import contact_rule, edge_share
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 
 def make_surfaces(
-    context: DomainForms,
-    contributions: Sequence[PlacedContribution],
-    fixed: Entities,
-    interfaces: Collection[str],
-    thresholds: CompositionThresholds,
+    context: DomainForms, contributions: Sequence[PlacedContribution], fixed: Entities, interfaces: Collection[str]
 ) -> dict[str, Surface]:
     """The surfaces of the boundary parts with bounds or laws, by part, in the scene's order. Collective.
 
@@ -40,7 +36,6 @@ def make_surfaces(
         contributions: of all effects.
         fixed: local scalar dofs that are prescribed.
         interfaces: names of interfaces, which are no boundary parts.
-        thresholds: what is rounding of a normal, and how far it may be turned.
 
     Raises:
         InputError: on all ranks alike: a facet lies inside the body, two sides of a part face each other, or two
@@ -52,8 +47,8 @@ def make_surfaces(
     towards = {w: b.towards for w, _, c in contributions for b in c.bounds if w in parts and b.towards is not None}
     stated = {name: _stated(context, surfaces[name], obstacle) for name, obstacle in towards.items()}
     if not context.domain.one_piece:
-        interface_sides.refuse(context.domain.mesh.comm, surfaces.values(), context.length, thresholds)
-    return contact_surface.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length, thresholds)
+        interface_sides.refuse(context.domain.mesh.comm, surfaces.values(), context.length)
+    return contact_surface.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length)
 
 
 def _surface(context: DomainForms, where: str) -> Surface:
@@ -208,13 +203,7 @@ def _coefficients(context: DomainForms, where: Surface, formula: SpatialValue) -
     return np.asarray((found - share * (formula.at(ends[:, 0]) + formula.at(ends[:, 1]))) / (1 - 2 * share))
 
 
-def check_bounds(
-    context: DomainForms,
-    bounds: Sequence[Bounds],
-    prescribed: Array,
-    fixed: Entities,
-    thresholds: CompositionThresholds,
-) -> None:
+def check_bounds(context: DomainForms, bounds: Sequence[Bounds], prescribed: Array, fixed: Entities) -> None:
     """Refuse bounds that exclude a prescribed value: PETSc would silently change it (solver-notes.md). Collective.
 
     Args:
@@ -222,7 +211,6 @@ def check_bounds(
         bounds: the bounds.
         prescribed: the prescribed values at the local scalar dofs, zero at the others.
         fixed: local scalar dofs that are prescribed.
-        thresholds: how far a value may be outside of its bounds.
 
     Raises:
         InputError: on all ranks alike.
@@ -232,42 +220,39 @@ def check_bounds(
         un = np.sum(b.surface.values(prescribed) * b.surface.normals, axis=1)
         axis = np.argmax(np.abs(b.surface.normals), axis=1)
         held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
-        out = held & ((un < b.lower - thresholds.outside_bounds) | (un > b.upper + thresholds.outside_bounds))
+        out = held & ((un < b.lower - DEFAULT.outside_bounds) | (un > b.upper + DEFAULT.outside_bounds))
         bad += [f"{b.surface.part} at {b.surface.spot(i)}" for i in np.flatnonzero(out)[:1]]
     found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
     if found:
         raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
 
 
-def check_contradictions(
-    context: DomainForms, scales: Scales, bounds: Sequence[Bounds], thresholds: CompositionThresholds
-) -> None:
+def check_contradictions(context: DomainForms, scales: Scales, bounds: Sequence[Bounds]) -> None:
     """Refuse bounds that no displacement satisfies: within a part, or of two parts at a vertex of both. Collective.
 
     Args:
         context: spaces, parts and vertices.
         scales: what one unit is in SI.
         bounds: the bounds.
-        thresholds: by how much bounds may contradict each other.
 
     Raises:
         InputError: on all ranks alike, with the first such vertex.
     """
     pairs = combinations_with_replacement(bounds, 2)
-    bad = [text for one, other in pairs for text in _contradiction(one, other, scales.displacement, thresholds)]
+    bad = [text for one, other in pairs for text in _contradiction(one, other, scales.displacement)]
     found = [text for rank in agree(context.domain.mesh.comm, bad) for text in rank]
     if found:
         raise InputError(f"boundary.{found[0]}; change one of them, or leave the vertex out of one part")
 
 
-def _contradiction(one: Bounds, other: Bounds, unit: float, thresholds: CompositionThresholds) -> list[str]:
+def _contradiction(one: Bounds, other: Bounds, unit: float) -> list[str]:
     """The first vertex at which two bounds (or one and itself) contradict each other, in words."""
     _, i, j = np.intersect1d(one.surface.blocks, other.surface.blocks, return_indices=True)
     along = np.sum(one.surface.normals[i] * other.surface.normals[j], axis=1)  # 1, -1, or 0: independent bounds
     low = np.where(along > 0, other.lower[j], -other.upper[j])
     high = np.where(along > 0, other.upper[j], -other.lower[j])
     low, high = np.maximum(low, one.lower[i]), np.minimum(high, one.upper[i])
-    bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > thresholds.outside_bounds * (1.0 + np.abs(low))))
+    bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > DEFAULT.outside_bounds * (1.0 + np.abs(low))))
     shared = "" if one is other else f", a vertex of boundary.{other.surface.part} too"
     return [
         f"{one.surface.part}: at {one.surface.spot(i[k])}{shared}, u·n would have to be at least "
@@ -277,10 +262,7 @@ def _contradiction(one: Bounds, other: Bounds, unit: float, thresholds: Composit
 
 
 def make_conditions(
-    context: DomainForms,
-    scales: Scales,
-    wanted: Sequence[tuple[str, Condition]],
-    thresholds: CompositionThresholds = DEFAULT,
+    context: DomainForms, scales: Scales, wanted: Sequence[tuple[str, Condition]]
 ) -> tuple[fem.DirichletBC, ...]:
     """The conditions, nondimensional. Collective.
 
@@ -288,14 +270,13 @@ def make_conditions(
         context: spaces, parts and vertices.
         scales: what one unit is in SI.
         wanted: the conditions in SI, each with the part it stands on.
-        thresholds: which values are the same.
 
     Raises:
         InputError: on all ranks alike: two parts prescribe different values where they meet.
     """
     found = tuple(_condition(context, scales, part, condition) for part, condition in wanted)
     named = [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)]
-    _check_agreement(context, scales, named, thresholds.same)
+    _check_agreement(context, scales, named, DEFAULT.same)
     return found
 
 

@@ -20,7 +20,7 @@ from ..geometry import spot, tangents
 from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
 from . import facet_overlaps
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 from .vectors import nodal
 
 
@@ -148,12 +148,7 @@ class _Row:
 
 
 def decide(
-    comm: MPI.Comm,
-    surfaces: Mapping[str, Surface],
-    stated: Mapping[str, Array],
-    fixed: Entities,
-    length: float,
-    thresholds: CompositionThresholds = DEFAULT,
+    comm: MPI.Comm, surfaces: Mapping[str, Surface], stated: Mapping[str, Array], fixed: Entities, length: float
 ) -> dict[str, Surface]:
     """The surfaces with the normals that count. Collective.
 
@@ -163,14 +158,13 @@ def decide(
         stated: the unit normals that the scene states (those towards an obstacle), by part, (m, d) each.
         fixed: local scalar dofs that are prescribed.
         length: of the body, m.
-        thresholds: what is rounding, and by which angles a normal may be turned.
 
     Raises:
         InputError: on all ranks alike: two directions at a vertex are neither orthogonal nor equal.
     """
-    own = {name: _own(s, stated.get(name), length, thresholds.rounding) for name, s in surfaces.items()}
-    flat = {name for name, surface in own.items() if largest_turn(comm, surface) <= thresholds.same}
-    normals = _at_shared_vertices(comm, own, flat, fixed, thresholds)
+    own = {name: _own(s, stated.get(name), length, DEFAULT.rounding) for name, s in surfaces.items()}
+    flat = {name for name, surface in own.items() if largest_turn(comm, surface) <= DEFAULT.same}
+    normals = _at_shared_vertices(comm, own, flat, fixed)
     return {name: replace(s, normals=normals[name], tangents=tangents(normals[name])) for name, s in own.items()}
 
 
@@ -208,11 +202,7 @@ def _without_rounding(normals: Array, rounding: Array | float) -> Array:
 
 
 def _at_shared_vertices(
-    comm: MPI.Comm,
-    surfaces: Mapping[str, Surface],
-    flat: Collection[str],
-    fixed: Entities,
-    thresholds: CompositionThresholds,
+    comm: MPI.Comm, surfaces: Mapping[str, Surface], flat: Collection[str], fixed: Entities
 ) -> dict[str, Array]:
     """The normals (m, d) by part, orthogonal or equal to what else a vertex has. Collective."""
     normals = {name: surface.normals.copy() for name, surface in surfaces.items()}
@@ -220,7 +210,7 @@ def _at_shared_vertices(
     for places, held in _shared(surfaces, fixed):
         rows = [_Row(f"u_{'xyz'[i]}", e, True, True) for i, e in held]
         for name, i in sorted(places, key=lambda place: place[0] not in flat):
-            found = _turned(_Row(f"boundary.{name}", normals[name][i], name in flat, False), rows, thresholds)
+            found = _turned(_Row(f"boundary.{name}", normals[name][i], name in flat, False), rows)
             if isinstance(found, str):
                 bad.append(f"boundary.{name}: at the vertex {surfaces[name].spot(i)} {found}")
                 break
@@ -267,11 +257,11 @@ def _candidates(surfaces: Mapping[str, Surface], fixed: Entities) -> Integers:
     return np.intersect1d(np.concatenate(slanted), shared)
 
 
-def _turned(normal: _Row, rows: Sequence[_Row], thresholds: CompositionThresholds) -> _Row | str:
+def _turned(normal: _Row, rows: Sequence[_Row]) -> _Row | str:
     """The normal, orthogonal or equal to each row; or why not."""
     rest = normal.direction
     for row in rows:
-        limit, along = _largest_turn(normal, row, thresholds), float(row.direction @ normal.direction)
+        limit, along = _largest_turn(normal, row), float(row.direction @ normal.direction)
         if math.hypot(*(normal.direction - along * row.direction)) <= limit:
             return replace(normal, direction=math.copysign(1.0, along) * row.direction)
         if abs(along) > limit:
@@ -298,8 +288,8 @@ def _refusal(normal: _Row, row: _Row, limit: float) -> str:
     )
 
 
-def _largest_turn(normal: _Row, row: _Row, thresholds: CompositionThresholds) -> float:
+def _largest_turn(normal: _Row, row: _Row) -> float:
     """By which angle a normal may be turned to be orthogonal or equal to another direction."""
     if not normal.exact:
-        return thresholds.uneven
-    return thresholds.turned_to_prescribed if row.prescribed else thresholds.same
+        return DEFAULT.uneven
+    return DEFAULT.turned_to_prescribed if row.prescribed else DEFAULT.same

@@ -17,7 +17,7 @@ from typing_extensions import override
 from ..typing import Array, Integers, Mask
 from . import facet_overlaps, facet_polygons, spaces
 from .facet_overlaps import Facets, OverlapPoints, Overlaps
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 
 def places(nodes: Array, barycentric: Array) -> Array:
@@ -104,15 +104,14 @@ class CurvedOverlaps(Overlaps):
         return replace(straight, weights=part * speed, on_second=np.column_stack([1.0 - t, t]))
 
 
-def in_plane(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> CurvedOverlaps:
+def in_plane(first: Facets, second: Facets) -> CurvedOverlaps:
     """The intersections of the facets of two sides.
 
     Args:
         first: the side onto which is projected.
         second: the other one.
-        thresholds: which facets face each other, and what is rounding.
     """
-    chords = facet_overlaps.in_plane(first, second, thresholds)
+    chords = facet_overlaps.in_plane(first, second)
     nodes, own = first.points[chords.first], _along(first, chords.first, first.points[chords.first])
     other = _along(first, chords.first, second.points[chords.second])
     places = chords.on_first[:, :, 1]
@@ -194,18 +193,17 @@ class CurvedPolygons(Overlaps):
         )
 
 
-def in_space(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> CurvedPolygons:
+def in_space(first: Facets, second: Facets) -> CurvedPolygons:
     """The intersections of the curved facets of two sides in space.
 
     Args:
         first: the side onto which is projected.
         second: the other one.
-        thresholds: which facets face each other, how fine polygons are, and what is rounding.
     """
-    pairs = _pairs(first, second, thresholds)
-    pair, of_second = _parts(second, pairs.other, thresholds.rim_parts)
-    outlines = _outlines(first, second, pairs, pair, of_second, thresholds.rim)
-    one_rim = replace(thresholds, uncovered=max(thresholds.uncovered, thresholds.rim))
+    pairs = _pairs(first, second)
+    pair, of_second = _parts(second, pairs.other, DEFAULT.rim_parts)
+    outlines = _outlines(first, second, pairs, pair, of_second, DEFAULT.rim)
+    one_rim = replace(uncovered=max(DEFAULT.uncovered, DEFAULT.rim))
     clipped = facet_polygons.clip(outlines, pairs.number[pair], pairs.distance[pair], len(first.nodes), one_rim)
     own, part = pair[clipped.outline], facet_polygons.barycentric(outlines[clipped.outline], clipped.corners)
     number, x, y = pairs.number[own], *np.moveaxis(clipped.corners, 2, 0)
@@ -219,7 +217,7 @@ def in_space(first: Facets, second: Facets, thresholds: CompositionThresholds = 
         own=pairs.own[number],
         others=pairs.local[own],
         nodes=first.points[number],
-        degree=thresholds.curved_degree,
+        degree=DEFAULT.curved_degree,
     )
 
 
@@ -242,8 +240,8 @@ class _Pairs:
     own: Array
 
 
-def _pairs(first: Facets, second: Facets, thresholds: CompositionThresholds) -> _Pairs:
-    number, other = facet_polygons.candidates(first, second, thresholds)
+def _pairs(first: Facets, second: Facets) -> _Pairs:
+    number, other = facet_polygons.candidates(first, second)
     frames, starts = facet_polygons.frames_of(first), first.corners[:, 0]
     local = facet_polygons.in_frames(second.points[other], starts[number], frames[number])
     return _Pairs(

@@ -17,7 +17,7 @@ from .. import compat
 from ..mesh import nodes
 from ..typing import Array, Entities, Integers, Mask
 from . import spaces
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 _DEGREE = 12
 """Degree of the quadrature: areas are square roots of polynomials, nearly constant ones."""
@@ -199,33 +199,32 @@ _KINDS = {2: "interval", 3: "triangle"}
 """Facets by dimension."""
 
 
-def in_plane(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> Overlaps:
+def in_plane(first: Facets, second: Facets) -> Overlaps:
     """The intersections of the facets of two sides in the plane.
 
     Args:
         first: the side onto which is projected.
         second: the other one.
-        thresholds: which facets face each other, and what is rounding.
     """
     pieces = [np.empty((0, 6))]
     covered = np.zeros((len(first.nodes), 2), dtype=bool)
     for number in range(len(first.nodes)):
-        found = _nearest(_intervals(first, second, number, thresholds))
+        found = _nearest(_intervals(first, second, number))
         pieces.append(np.column_stack([np.full(len(found), number), found]))
         begin, end = found[:, 1].min(initial=np.inf), found[:, 2].max(initial=-np.inf)
-        covered[number] = begin <= thresholds.uncovered, end >= 1.0 - thresholds.uncovered
+        covered[number] = begin <= DEFAULT.uncovered, end >= 1.0 - DEFAULT.uncovered
     whole = np.vstack(pieces)
     return _pieces(first, whole, covered)
 
 
-def _intervals(first: Facets, second: Facets, number: int, thresholds: CompositionThresholds) -> Array:
+def _intervals(first: Facets, second: Facets, number: int) -> Array:
     """Facets over one of the first side: number, begin, end on it, and where these ends are on the facet, (k, 5)."""
     start, end = first.corners[number]
     length, normal = np.linalg.norm(end - start), first.normals[number]
-    facing = np.flatnonzero(second.normals @ normal < -thresholds.facing)
+    facing = np.flatnonzero(second.normals @ normal < -DEFAULT.facing)
     along = (second.corners[facing] - start) @ (end - start) / length**2
     low, high = np.maximum(along.min(axis=1), 0.0), np.minimum(along.max(axis=1), 1.0)
-    over = high - low > thresholds.rounding
+    over = high - low > DEFAULT.rounding
     facing, along, low, high = facing[over], along[over], low[over], high[over]
     width = along[:, 1] - along[:, 0]
     at = (np.stack([low, high], axis=1) - along[:, :1]) / width[:, None]

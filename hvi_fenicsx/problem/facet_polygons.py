@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from ..geometry import tangents
 from ..typing import Array, Integers, Mask
 from .facet_overlaps import Facets, Overlaps
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 """The triangle that clips."""
@@ -157,18 +157,17 @@ def barycentric(triangles: Array, points: Array) -> Array:
 _ANGLES = np.array([np.pi / 2, np.pi / 4, np.pi / 4])
 
 
-def in_space(first: Facets, second: Facets, thresholds: CompositionThresholds = DEFAULT) -> Overlaps:
+def in_space(first: Facets, second: Facets) -> Overlaps:
     """The intersections of the facets of two sides in space.
 
     Args:
         first: the side onto which is projected.
         second: the other one.
-        thresholds: which facets face each other, and what is rounding.
     """
-    number, other = candidates(first, second, thresholds)
+    number, other = candidates(first, second)
     frames = frames_of(first)[number]
     local = in_frames(second.corners[other], first.corners[number, 0], frames)
-    clipped = clip(local[:, :, :2], number, np.abs(local[:, :, 2].mean(axis=1)), len(first.nodes), thresholds)
+    clipped = clip(local[:, :, :2], number, np.abs(local[:, :, 2].mean(axis=1)), len(first.nodes))
     pair = clipped.outline
     return Overlaps(
         first=number[pair],
@@ -195,7 +194,7 @@ class Clipped:
     covered: Mask
 
 
-def clip(outlines: Array, number: Integers, distance: Array, count: int, thresholds: CompositionThresholds) -> Clipped:
+def clip(outlines: Array, number: Integers, distance: Array, count: int) -> Clipped:
     """Outlines clipped by the first side's facets, without what lies behind nearer ones.
 
     Args:
@@ -203,26 +202,24 @@ def clip(outlines: Array, number: Integers, distance: Array, count: int, thresho
         number: the facet of each, (p,).
         distance: from it, (p,).
         count: of the first side's facets, f.
-        thresholds: what is rounding.
     """
     over = np.flatnonzero(np.all((outlines.min(axis=1) < 1.0) & (outlines.max(axis=1) > 0.0), axis=1))
     pieces = clip_triangles(outlines[over])
-    solid = pieces.areas > thresholds.rounding
+    solid = pieces.areas > DEFAULT.rounding
     pieces, outline = pieces.chosen(solid), over[solid]
-    near = _nearest(pieces, number[outline], distance[outline], thresholds)
+    near = _nearest(pieces, number[outline], distance[outline])
     pieces, outline = pieces.chosen(near), outline[near]
-    corners, of_piece = pieces.fans(thresholds.rounding)
-    covered = _covered(pieces, number[outline], count, thresholds)
+    corners, of_piece = pieces.fans(DEFAULT.rounding)
+    covered = _covered(pieces, number[outline], count)
     return Clipped(corners=corners, outline=outline[of_piece], covered=covered)
 
 
-def candidates(first: Facets, second: Facets, thresholds: CompositionThresholds) -> tuple[Integers, Integers]:
+def candidates(first: Facets, second: Facets) -> tuple[Integers, Integers]:
     """Pairs of facets that may lie over each other: the first side's facets, the second's, (p,) each.
 
     Args:
         first: the side onto which is projected.
         second: the other one.
-        thresholds: which facets face each other.
     """
     (centres, radii), (others, other_radii) = _balls(first), _balls(second)
     normals, group = np.unique(np.round(first.normals, 12), axis=0, return_inverse=True)
@@ -230,7 +227,7 @@ def candidates(first: Facets, second: Facets, thresholds: CompositionThresholds)
     pairs: list[Integers] = [np.empty((0, 2), dtype=np.int64)]
     for own in np.split(order, np.flatnonzero(np.diff(group.ravel()[order])) + 1):
         normal = normals[group.ravel()[own[0]]]
-        facing = np.flatnonzero(second.normals @ normal < -thresholds.facing)
+        facing = np.flatnonzero(second.normals @ normal < -DEFAULT.facing)
         plane = tangents(normal[None])[0].T
         # A tree for few points would cost more than it saves.
         tree = KDTree(others[facing] @ plane, leafsize=max(16, len(facing) // len(own)))
@@ -268,7 +265,7 @@ def in_frames(points: Array, starts: Array, frames: Array) -> Array:
     return np.asarray(np.einsum("pvi,pij->pvj", points - starts[:, None], frames))
 
 
-def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: CompositionThresholds) -> Mask:
+def _nearest(pieces: Polygons, number: Integers, distance: Array) -> Mask:
     """Which pieces do not lie behind nearer ones, (k,)."""
     kept, areas = np.ones(len(number), dtype=bool), pieces.areas
     sums = np.bincount(number, weights=areas, minlength=1)
@@ -276,16 +273,16 @@ def _nearest(pieces: Polygons, number: Integers, distance: Array, thresholds: Co
         here = np.flatnonzero(number == crowded)
         nearer: Array = np.empty((0, 3, 2))
         for one in here[np.argsort(distance[here], kind="stable")]:
-            fan = pieces.chosen(np.array([one])).fans(thresholds.rounding)[0]
+            fan = pieces.chosen(np.array([one])).fans(DEFAULT.rounding)[0]
             kept[one] = common_area(fan, nearer) < 0.5 * areas[one]
             nearer = np.concatenate([nearer, fan]) if kept[one] else nearer
     return kept
 
 
-def _covered(pieces: Polygons, number: Integers, count: int, thresholds: CompositionThresholds) -> Mask:
+def _covered(pieces: Polygons, number: Integers, count: int) -> Mask:
     """Whether the pieces fill the angle at each corner of the first side's facets, (count, 3)."""
     filled = np.zeros((count, 3))
     for corner, place in enumerate(CORNERS):
-        polygon, angles = pieces.angles_at(place, thresholds.uncovered)
+        polygon, angles = pieces.angles_at(place, DEFAULT.uncovered)
         np.add.at(filled[:, corner], number[polygon], angles)
-    return np.asarray(filled >= (1.0 - thresholds.uncovered) * _ANGLES)
+    return np.asarray(filled >= (1.0 - DEFAULT.uncovered) * _ANGLES)

@@ -19,17 +19,16 @@ from . import curved_overlaps, facet_overlaps, facet_polygons, spaces
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .facet_overlaps import Facets, Overlaps, is_curved
-from .thresholds import CompositionThresholds
+from .thresholds import DEFAULT
 
 
-def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, thresholds: CompositionThresholds) -> None:
+def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float) -> None:
     """Refuse a part with two vertices at one point whose outward normals face each other. Collective.
 
     Args:
         comm: the ranks.
         surfaces: of the parts with contact or laws.
         length: of the body, m.
-        thresholds: what is rounding of a coordinate.
 
     Raises:
         InputError: on all ranks alike, with the first such point.
@@ -37,7 +36,7 @@ def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float, threshold
     for surface in surfaces:
         gathered = agree(comm, (surface.points, surface.normals))
         points, normals = (np.concatenate(arrays) for arrays in zip(*gathered, strict=True))
-        found = _facing(points, normals, thresholds.same * length)
+        found = _facing(points, normals, DEFAULT.same * length)
         if found is not None:
             raise InputError(
                 f"boundary.{surface.part}: two sides lie on each other at {spot(found[: normals.shape[1]])} and face "
@@ -76,13 +75,13 @@ class Pair:
     second: Facets
     curved: bool = False
 
-    def overlaps(self, thresholds: CompositionThresholds) -> Overlaps:
+    def overlaps(self) -> Overlaps:
         """The intersections of the facets of both sides."""
         if self.first.points.shape[2] == 2:
             flat = curved_overlaps if self.curved else facet_overlaps
-            return flat.in_plane(self.first, self.second, thresholds)
+            return flat.in_plane(self.first, self.second)
         in_space = curved_overlaps.in_space if self.curved else facet_polygons.in_space
-        return in_space(self.first, self.second, thresholds)
+        return in_space(self.first, self.second)
 
     def covered(self, overlaps: Overlaps) -> Mask:
         """Whether each node of the first side lies over the second, a midpoint with both ends of its edge, (f, n)."""

@@ -26,7 +26,7 @@ from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
 from .facet_overlaps import Facets, Overlaps
 from .interface_sides import Pair
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 
 def check_facing(pair: Pair, overlaps: Overlaps) -> None:
@@ -74,7 +74,7 @@ def check_carried(pair: Pair, overlaps: Overlaps, kept: Mask, busy: Mask) -> Non
         )
 
 
-def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array, thresholds: CompositionThresholds) -> None:
+def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array) -> None:
     """Refuse bodies that overlap by more than the facets of their curved sides do. Collective.
 
     Args:
@@ -82,14 +82,13 @@ def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array, thresh
         pair: the sides.
         surface: the nodes of the first side that carry something.
         gap: the distance of the sides there, m, (m,).
-        thresholds: what is allowed, relative to the first side's facets.
 
     Raises:
         InputError: on all ranks alike, with the place where they overlap most.
     """
     deepest = [(float(gap[i]), surface.spot(i)) for i in _lowest(gap)]
     depth, at = min((place for rank in agree(comm, deepest) for place in rank), default=(0.0, ""))
-    if depth < -thresholds.overlap * pair.first.width:
+    if depth < -DEFAULT.overlap * pair.first.width:
         raise InputError(
             f'interface.{pair.name}.between: at {at} "{pair.sides.second}" lies {-depth:.3g} m inside of the body '
             f'of "{pair.sides.first}": move one of the bodies, name the sides that face each other, or mesh '
@@ -132,19 +131,13 @@ class Interface:
     curved: bool
 
 
-def find(
-    context: DomainForms,
-    wanted: Mapping[str, InterfaceSides],
-    occupied: Entities,
-    thresholds: CompositionThresholds = DEFAULT,
-) -> tuple[Interface, ...]:
+def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: Entities) -> tuple[Interface, ...]:
     """The interfaces of a problem. Collective.
 
     Args:
         context: spaces, parts and vertices.
         wanted: what the scene says of each, by name.
         occupied: local vertices that are prescribed, or on a part with contact or laws.
-        thresholds: which facets face each other.
 
     Raises:
         InputError: on all ranks alike: sides that do not face each other or overlap, or what is not supported.
@@ -154,18 +147,16 @@ def find(
     pairs = {name: interface_sides.pair(context, name, sides) for name, sides in wanted.items()}
     taken = context.space.dofmap.index_map.local_to_global(np.asarray(occupied, dtype=np.int32))
     taken = np.unique(np.concatenate(agree(context.domain.mesh.comm, taken)))
-    return tuple(_interface(context, name, pairs, taken, thresholds) for name in wanted)
+    return tuple(_interface(context, name, pairs, taken) for name in wanted)
 
 
-def _interface(
-    context: DomainForms, name: str, pairs: Mapping[str, Pair], taken: Integers, thresholds: CompositionThresholds
-) -> Interface:
+def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken: Integers) -> Interface:
     """One interface: its intersections, which nodes of its first side carry something, normals, gaps. Collective.
 
     Nodes that are taken, by other interfaces too, or that the second side does not cover, carry nothing.
     """
     pair = pairs[name]
-    overlaps = pair.overlaps(thresholds)
+    overlaps = pair.overlaps()
     check_facing(pair, overlaps)
     others = [taken, np.unique(pair.second.nodes)]
     others += [np.unique([*p.first.nodes.flat, *p.second.nodes.flat]) for n, p in pairs.items() if n != name]
@@ -176,7 +167,7 @@ def _interface(
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)
     surface = _surface(context, pair, overlaps, rows)
     gap = _gaps(context, surface, pair, rows)
-    check_apart(context.domain.mesh.comm, pair, surface, gap, thresholds)
+    check_apart(context.domain.mesh.comm, pair, surface, gap)
     tied = _dofs(context, surface) if pair.sides.tied else np.empty(0, np.int32)
     return Interface(
         name=name,

@@ -19,7 +19,7 @@ from .domain_forms import DomainForms
 from .law_term import LawTerm
 from .problem import PlacedContribution
 from .scaling import Scales
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 Modification = Callable[[Superpotential], Superpotential]
 """The law that is solved in the place of a law, SI: the same law, smoothed for example."""
@@ -47,19 +47,13 @@ def check_laws(contributions: Sequence[PlacedContribution]) -> None:
         )
 
 
-def check_moved(
-    comm: MPI.Comm,
-    contributions: Sequence[PlacedContribution],
-    surfaces: Mapping[str, Surface],
-    thresholds: CompositionThresholds,
-) -> None:
+def check_moved(comm: MPI.Comm, contributions: Sequence[PlacedContribution], surfaces: Mapping[str, Surface]) -> None:
     """Refuse laws beside an obstacle that is moved along what they act on: the body's own displacement. Collective.
 
     Args:
         comm: the ranks.
         contributions: of all effects.
         surfaces: by part.
-        thresholds: up to which angle an obstacle moves along the normals.
 
     Raises:
         InputError: on all ranks alike.
@@ -71,7 +65,7 @@ def check_moved(
             continue
         move, normals = moves[where], surfaces[where].normals
         across = np.linalg.norm(move - (normals @ move)[:, None] * normals, axis=1)
-        slips = bool(np.any(across > thresholds.turned_to_prescribed * np.linalg.norm(move)))
+        slips = bool(np.any(across > DEFAULT.turned_to_prescribed * np.linalg.norm(move)))
         normal = any(law.direction.normal for law in contribution.laws)
         if any(agree(comm, normal or slips)):
             mend = "let it stand still" if normal else "move it along the normal, or give it a direction"
@@ -142,15 +136,13 @@ def _term(
     )
 
 
-def _factor(
-    context: DomainForms, where: Surface, key: str, given: SpatialValue, thresholds: CompositionThresholds = DEFAULT
-) -> Array:
+def _factor(context: DomainForms, where: Surface, key: str, given: SpatialValue) -> Array:
     """What tractions or lengths of a law are multiplied by at the vertices of its part, (m,). Collective.
 
     Raises:
         InputError: on all ranks alike: it is not a positive number somewhere.
     """
-    found, most = given.at(where.points), thresholds.largest_scale
+    found, most = given.at(where.points), DEFAULT.largest_scale
     bad = np.flatnonzero(~((found >= 1.0 / most) & (found <= most)))
     said = [f"{found[i]:g} at {where.spot(i)}" for i in bad[:1]]
     for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
@@ -162,9 +154,7 @@ def _factor(
     return found
 
 
-def _scaled(
-    law: Superpotential, scales: Scales, place: str, slip: float, thresholds: CompositionThresholds = DEFAULT
-) -> Superpotential:
+def _scaled(law: Superpotential, scales: Scales, place: str, slip: float) -> Superpotential:
     """The law in the problem's units.
 
     Args:
@@ -172,12 +162,11 @@ def _scaled(
         scales: what one unit is in SI.
         place: where the scene states it.
         slip: what its slips are multiplied by.
-        thresholds: which numbers can be computed with.
 
     Raises:
         InputError: its parameters are too large or too small for these.
     """
-    most = thresholds.largest_scale
+    most = DEFAULT.largest_scale
     try:
         scaled = law.scaled(scales.displacement, scales.stress)
         if not all(1.0 / most <= size <= most for size in (scaled.length_scale, slip)) or scaled.energy_scale > most:

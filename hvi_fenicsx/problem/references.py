@@ -22,7 +22,7 @@ from ..typing import Array, Entities, Mask
 from . import facet_overlaps, spaces
 from .law_term import LawTerm
 from .problem import Problem
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,6 @@ class References:
         moved: whether something else than loads drives the body, by body.
         driven: whether anything drives it, by body.
         holding: which scalar dofs of this rank's vertices supports, contact and laws act on, (n,).
-        thresholds: what is the least force that forces are relative to.
     """
 
     problem: Problem
@@ -45,7 +44,6 @@ class References:
     moved: Mask
     driven: Mask
     holding: Mask
-    thresholds: CompositionThresholds = DEFAULT
 
     def norms(self, values: Array) -> Array:
         """Euclidean norms of values at this rank's vertices, any shape of (vertices, d), by body. Collective."""
@@ -99,7 +97,7 @@ class References:
         held: Array = np.zeros(self.count)
         if np.any(self.moved):
             held = np.where(self.moved, self.norms(np.where(self.holding, internal.ravel(), 0.0)), 0.0)
-        least = self.thresholds.least_force * self.displacements(u) * self.surface
+        least = DEFAULT.least_force * self.displacements(u) * self.surface
         return np.maximum(np.maximum(self.load, held), least)
 
     @functools.cached_property
@@ -116,18 +114,15 @@ class References:
 
     def traction_scale(self, term: LawTerm) -> Array:
         """What a law's j' is judged by at its vertices: its own size, but at least a share of the body's, (m,)."""
-        return np.maximum(
-            term.exact.traction_scale, self.thresholds.law_scale * self.at(term.surface.blocks) / term.multiplier
-        )
+        return np.maximum(term.exact.traction_scale, DEFAULT.law_scale * self.at(term.surface.blocks) / term.multiplier)
 
 
-def of(problem: Problem, load: Array, thresholds: CompositionThresholds = DEFAULT) -> References:
+def of(problem: Problem, load: Array) -> References:
     """The references of a problem. Collective.
 
     Args:
         problem: the problem.
         load: the nodal loads at this rank's vertices, not lifted, (vertices, d).
-        thresholds: what is the least force that forces are relative to.
     """
     n, d = load.shape
     holding = np.zeros(n * d, dtype=bool)
@@ -137,7 +132,7 @@ def of(problem: Problem, load: Array, thresholds: CompositionThresholds = DEFAUL
     free = load.copy()
     free.reshape(-1)[problem.fixed_here] = 0.0
     everywhere = np.ones(len(problem.bodies.bodies))
-    found = References(problem, everywhere, everywhere, everywhere > 0, everywhere > 0, holding, thresholds)
+    found = References(problem, everywhere, everywhere, everywhere > 0, everywhere > 0, holding)
     loaded, moved = _total(problem, _sums(problem, np.linalg.norm(load, axis=1))), demanded(problem)
     drive = np.maximum(loaded, moved)
     scale = np.where(drive > 0.0, drive / (np.max(drive) or 1.0), 1.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..effects import Drive, Effect, Evaluate, Place, Sizes
 from ..errors import InputError
-from .thresholds import DEFAULT, CompositionThresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,13 +68,7 @@ def place(placed: Placed) -> str:
     return ".".join(filter(None, (effect.place.value, name, effect.key)))
 
 
-def choose(
-    sizes: Sizes,
-    dimension: int,
-    effects: Sequence[Placed],
-    evaluate: Callable[[Placed], Evaluate],
-    thresholds: CompositionThresholds = DEFAULT,
-) -> Scales:
+def choose(sizes: Sizes, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]) -> Scales:
     """The scales of a problem. Collective where ``evaluate`` is.
 
     The stress scale is that of the largest driving effect: a load, or the strain of a prescribed displacement or of
@@ -86,7 +80,6 @@ def choose(
         dimension: 2 or 3.
         effects: those in force, with their places.
         evaluate: gives, for an effect with its place, the function that finds a formula's largest absolute value there.
-        thresholds: which scales can be computed with.
 
     Raises:
         InputError: an effect is so large, or all are so small, that their energies are no numbers.
@@ -94,13 +87,13 @@ def choose(
     found = [(placed[1].stress_scale(evaluate(placed), sizes), placed) for placed in effects]
     driving = [pair for pair in found if pair[0] != 0.0]
     for stress, placed in driving:
-        _check(Scales(sizes.length, stress, sizes.modulus, dimension), placed, thresholds.largest_scale, 0.0)
+        _check(Scales(sizes.length, stress, sizes.modulus, dimension), placed, DEFAULT.largest_scale, 0.0)
     if not driving:
         return Scales(sizes.length, 1.0, sizes.modulus, dimension)
     active = [pair for pair in driving if pair[1][1].drive is not Drive.RESISTANCE]
     stress, placed = max(active or driving, key=lambda pair: pair[0])
     chosen = Scales(sizes.length, stress, sizes.modulus, dimension)
-    _check(chosen, placed, thresholds.largest_scale, 1.0 / thresholds.largest_scale)
+    _check(chosen, placed, DEFAULT.largest_scale, 1.0 / DEFAULT.largest_scale)
     return chosen
 
 
