@@ -15,6 +15,7 @@ from dolfinx import fem
 from ..certify.certificate import Examination
 from ..problem.problem import Problem
 from ..runtime.mpi import total
+from ..runtime.terminal import percent
 from ..system.levels import Levels
 from ..system.system import System
 from ..typing import Array
@@ -141,3 +142,19 @@ def _energy(problem: Problem, u: fem.Function, examination: Examination) -> floa
     """a(u, u). Collective."""
     internal = examination.forces.reaction + examination.forces.load
     return total(problem.domain.mesh.comm, float(problem.relative(u.x.array)[: internal.size] @ internal.ravel()))
+
+
+def warnings(errors: Estimate) -> tuple[str, ...]:
+    """What there is to warn of in an estimated error, in sentences. Local; the same on all ranks.
+
+    Args:
+        errors: of the solution.
+    """
+    if not errors.coarse:
+        return ()
+    share = ratio(errors.discretisation, errors.energy_norm)
+    size = f"{percent(share)} of the solution" if np.isfinite(share) else "as large as the solution"
+    return (
+        f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "
+        "are solved and certified; refine the mesh",
+    )

@@ -11,9 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..certify import certificate
+from ..certify import certificate, plausibility
 from ..errors import InputError, SolverError
-from ..estimate import plausibility
 from ..model import PathTable
 from ..paths.state import End
 from ..problem.factored_problem import FactoredProblem

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from mpi4py import MPI
 
-from ..estimate import plausibility
+from ..certify import plausibility
 from ..mesh import nodes
 from ..mesh.domain import Domain, check_affordable
 from ..mesh.thresholds import Thresholds as MeshThresholds

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..certify import certificate
+from ..certify import certificate, plausibility
 from ..certify.certificate import Examination
 from ..certify.uniqueness import Uniqueness, uniqueness
 from ..errors import SolverError
-from ..estimate import plausibility
+from ..estimate import estimator
 from ..estimate.estimator import estimate
 from ..model import Model
 from ..runtime.log import logger, newton_step, warn
@@ -108,7 +108,7 @@ class FoundSolution:
             return found
         with prepared.timer("estimate"):
             errors = estimate(prepared.system, self.levels, found.solve_result.u, found.examination)
-        return replace(found, estimate=errors, warnings=found.warnings + plausibility.of_estimate(errors))
+        return replace(found, estimate=errors, warnings=found.warnings + estimator.warnings(errors))
 
     def free(self) -> None:
         """Free the systems, and what solving them has left. Collective."""

@@ -9,10 +9,6 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..certify.certificate import Examination
-from ..certify.contact_state import ContactState
-from ..certify.law_state import LawState
-from ..certify.thresholds import DEFAULT, PLAUSIBILITY
 from ..effects import Direction
 from ..mesh import facets, nodes
 from ..mesh.curved import CurvedMesh
@@ -25,8 +21,10 @@ from ..runtime.mpi import largest, total
 from ..runtime.terminal import percent
 from ..system import existence
 from ..typing import Array
-from .contact_errors import ratio
-from .estimator import Estimate
+from .certificate import Examination
+from .contact_state import ContactState
+from .law_state import LawState
+from .thresholds import DEFAULT, PLAUSIBILITY
 
 
 def of_bounds(problem: Problem, part: str) -> str:
@@ -199,22 +197,6 @@ def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> 
                 warnings += _slip_and_kink(problem, law)
                 warnings += _wide_smoothing(problem, law)
     return tuple(warnings)
-
-
-def of_estimate(errors: Estimate) -> tuple[str, ...]:
-    """What there is to warn of in an estimated error, in sentences. Local; the same on all ranks.
-
-    Args:
-        errors: of the solution.
-    """
-    if not errors.coarse:
-        return ()
-    share = ratio(errors.discretisation, errors.energy_norm)
-    size = f"{percent(share)} of the solution" if np.isfinite(share) else "as large as the solution"
-    return (
-        f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "
-        "are solved and certified; refine the mesh",
-    )
 
 
 def _strain(problem: Problem, u: fem.Function) -> Iterator[str]:
