@@ -15,7 +15,6 @@ from petsc4py import PETSc
 
 from ..estimate import bubbles, data_errors
 from ..estimate.estimator import Estimate
-from ..estimate.thresholds import DEFAULT as SAMPLING
 from ..mesh import nodes, refinement
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
@@ -273,7 +272,7 @@ def unresolved(problem: Problem, thresholds: ControlThresholds = CONTROL) -> Ent
     space = bubbles.space(problem.space.mesh, nodes.degree(problem.space))
     found: list[Entities] = [np.empty(0, dtype=np.int32)]
     for facets, value in data_errors.everything(problem):
-        at = data_errors.sample(problem, space, facets, SAMPLING)
+        at = data_errors.sample(problem, space, facets)
         squares, area = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas
         allowed = _allowed(problem.domain.mesh.comm, at.of(value), thresholds) ** 2
         whole, deviation = (total(problem.domain.mesh.comm, float(np.sum(x))) for x in (area, area * squares))

@@ -229,9 +229,6 @@ def space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
 _WEAK = 0.05
 """Springs below this part of a bubble's own stiffness need not hold it."""
 
-_PIECE = 8192
-"""Blocks of which a few vectors fit into a processor's cache."""
-
 
 class Held(Protocol):
     """What holds bubbles at some blocks, as the bounds of a part do."""
@@ -375,8 +372,8 @@ class BubbleStiffness:
     def _moved(self, r: Array, e: Array, alpha: float, p: Array, q: Array) -> float:
         """Add α p to e, and -α q to r, q being A p: 2 e·A (α p) before. Collective."""
         mixed = 2 * alpha * self._dot(e, q)
-        _add(e, alpha, p)
-        _add(r, -alpha, q)
+        e += alpha * p
+        r -= alpha * q
         return mixed
 
     def square(self, r: Array, descent: Callable[[Array], Array]) -> float:
@@ -407,7 +404,7 @@ class BubbleStiffness:
             rho, before = self._dot(r, z), rho
             if rho <= goal:
                 break
-            _combine(p, z, rho / before if step else 0.0)
+            p[:] = z + rho / before * p if step else z
             q = self._product()
             alpha = rho / self._dot(p, q)
             growth += alpha * rho + self._moved(r, e, alpha, p, q)
@@ -415,27 +412,6 @@ class BubbleStiffness:
 
     def _dot(self, a: Array, b: Array) -> float:
         return float(self.comm.allreduce(float(np.vdot(a, b)), op=MPI.SUM))
-
-
-def _pieces(count: int) -> Iterator[slice]:
-    """Slices of so few blocks that what is done with one stays in the processor's cache."""
-    return (slice(start, start + _PIECE) for start in range(0, count, _PIECE))
-
-
-def _add(y: Array, factor: float, x: Array) -> None:
-    """Add factor x to y, without a temporary array of their size."""
-    for at in _pieces(len(y)):
-        y[at] += factor * x[at]
-
-
-def _combine(p: Array, z: Array, factor: float) -> None:
-    """Set p to z + factor p; p is not read where the factor is 0."""
-    if factor == 0.0:
-        np.copyto(p, z)
-        return
-    for at in _pieces(len(p)):
-        p[at] *= factor
-        p[at] += z[at]
 
 
 def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:

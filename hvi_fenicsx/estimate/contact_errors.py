@@ -21,7 +21,8 @@ from ..typing import Array
 from . import coupled_errors
 from .bubbles import BubbleStiffness
 from .dual_norm import DualNorm
-from .law_traces import ErrorField, LawTraces, Trace
+from .law_traces import ErrorField, LawTraces
+from .traces import Trace
 
 _PLACE = 1 / (2 * np.sqrt(12))
 """Standard deviation, over the distance of two nodes, of the place of a drop that may be anywhere in half of it."""

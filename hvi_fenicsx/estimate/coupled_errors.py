@@ -20,8 +20,9 @@ from ..typing import Array
 from . import defect
 from .bubbles import BlockForces, BubbleStiffness, summed
 from .dual_norm import DualNorm
-from .law_traces import ErrorField, LawSprings, LawTraces, Trace
+from .law_traces import ErrorField, LawSprings, LawTraces
 from .thresholds import DEFAULT
+from .traces import Trace
 
 
 def within_facets(traces: LawTraces) -> bool:

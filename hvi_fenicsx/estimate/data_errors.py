@@ -26,8 +26,9 @@ from ..problem.thresholds import DEFAULT as composition
 from ..runtime.mpi import total
 from ..typing import Array, Entities
 from .bubbles import of_facet, quadrature, shape
-from .contact_facets import ContactFacets, PartTrace, contact_facets
+from .contact_facets import ContactFacets, contact_facets
 from .thresholds import DEFAULT
+from .traces import PartPoints
 
 
 def varies(value: SpatialValue | None) -> bool:
@@ -377,10 +378,10 @@ def _obstacles(
 def _moved_pressure(problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle) -> Array:
     """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
     surface, on = obstacle.bounds.surface, obstacle.on
-    trace = PartTrace(problem, bubbles, surface, surface.normals[:, None, :], 1)
-    normals = trace.at_nodes(surface.normals).mean(axis=1)
+    at = PartPoints(problem, bubbles, surface, 1)
+    normals = at.of_nodes(surface.normals).mean(axis=1)
     compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
-    pushes, gaps = (on.interpolated(trace.at_nodes(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
+    pushes, gaps = (on.interpolated(at.of_nodes(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
     solve = functools.partial(
         redistributed,
         comm=problem.domain.mesh.comm,

@@ -24,12 +24,9 @@ from ..problem.problem import Problem
 from ..typing import Array, Entities, Mask
 from . import bubbles, contact_facets
 from .bubbles import BlockForces, gathered, summed
-from .contact_facets import PartTrace
-from .interface_traces import InterfacePoints, InterfaceTrace
+from .interface_points import InterfacePoints
 from .thresholds import DEFAULT
-
-Trace = PartTrace | InterfaceTrace
-"""The facets of a part, or of two bodies that meet, between their nodes."""
+from .traces import PartPoints, Trace
 
 
 def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
@@ -162,12 +159,12 @@ class LawTraces:
         return known[1]
 
     def _new_part(self, surface: Surface, directions: Array) -> Trace:
-        problem, space, degree = self.problem, self.bubbles, DEFAULT.facet_degree[self.degree - 1] // 2
+        problem, degree = self.problem, DEFAULT.facet_degree[self.degree - 1]
         if (interface := problem.interface_of(surface)) is None:
-            return PartTrace(problem, space, surface, directions, DEFAULT.facet_degree[self.degree - 1])
+            return Trace(problem, PartPoints(problem, self.bubbles, surface, degree), surface, directions)
         if interface.name not in self._interfaces:
-            self._interfaces[interface.name] = InterfacePoints(problem, space, interface, degree)
-        return InterfaceTrace(problem, self._interfaces[interface.name], surface, directions)
+            self._interfaces[interface.name] = InterfacePoints(problem, self.bubbles, interface, degree // 2)
+        return Trace(problem, self._interfaces[interface.name], surface, directions)
 
     def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> LawTrace:
         """One law between the nodes. Collective.

@@ -59,7 +59,7 @@ class Thresholds:
     loose: float = 1e-2
     margin: float = 0.5
     coarse_tolerance: float = 1e-4
-    few_steps: int = 10
+    few_steps: int = 8
     search_steps: int = 1_000
     most_changes: int = 200
     runaway: float = 1e8
