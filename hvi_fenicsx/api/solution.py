@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MethodType
 
 from dolfinx import fem
 from matplotlib.figure import Figure
@@ -19,15 +21,17 @@ from ..problem import spaces
 from ..problem.scaling import Scales
 from ..problem.stress import cell_stress, space_of_stress
 from ..report.contact_part import ContactPart
-from ..results import ResultFolder
+from ..report.pictures.xserver import x_server
+from ..report.reader import Result
+from ..results import ResultFolder, gathering
 from ..results.contact_parts import contact_parts
 from ..results.output_folder import existing
 from ..results.whole import picture_process, write_whole
 from ..runtime import log
+from ..runtime.mpi import on_root
 from ..solvers.method import SolveResult
 from ..typing import Array
 from ..workflow import Solution
-from . import plotting
 
 _LOG = log.logger("api")
 GIVEN = {"command": None, "petsc": None}
@@ -144,7 +148,7 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: there is no such picture of it.
         """
         require_kind("picture", picture, (str, type(None)), "the name of a picture, or None")
-        return plotting.draw(self, picture or ("escape" if self.solve_result is None else "body"))
+        return _draw(self, picture or ("escape" if self.solve_result is None else "body"))
 
     def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
         """Write the folder that ``hvi run`` writes. Collective.
@@ -187,3 +191,35 @@ class ModelSolution(Solution):
 
     def __repr__(self) -> str:
         return "\n".join([*console.outcome(self), *console.warnings(self.warnings)])
+
+
+def _draw(solution: Solution, picture: str) -> Figure | None:
+    """One picture of a solution on rank 0, None elsewhere. Collective."""
+    result, figures = gathering.result(solution), list[Figure]()
+
+    def make() -> None:
+        assert result is not None
+        figures.append(_figure(result, picture))
+
+    on_root(solution.problem.domain.mesh.comm, make)
+    return figures[0] if figures else None
+
+
+def _figure(result: Result, wanted: str) -> Figure:
+    """Draw on rank 0."""
+    from ..report.pictures.drawings import drawings
+
+    known = {drawing.path.stem: drawing for drawing in drawings(result)}
+    if wanted not in known:
+        raise InputError(f"plot: there is no picture {wanted!r} of this solution; there are: {', '.join(known)}")
+    with x_server(wanted=known[wanted].rendered):
+        figure = known[wanted].make()
+    # A figure that pyplot did not make has no other way to show itself in a notebook.
+    figure._repr_png_ = MethodType(_png, figure)  # type: ignore[attr-defined]
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()

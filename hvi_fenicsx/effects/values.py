@@ -3,20 +3,207 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Any, Self
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
+import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, SerializerFunctionWrapHandler, model_serializer, model_validator
 from typing_extensions import override
 
 from ..errors import InputError
 from ..formula import Formula, SpatialValue
 from ..schema import refusal
+from ..typing import Array
 from .base import Effect
+
+if TYPE_CHECKING:
+    from dolfinx import fem
+    from dolfinx import mesh as dmesh
 
 Value = Any
 """A number, a formula in x, y, z, a Python function of x (3, n), a scalar UFL expression or fem.Function; SI."""
 Vector = Any
 """A list of values, one for each component; or a Python function with values (d, n), a UFL vector, a fem.Function."""
+
+
+_OTHER_MESH = "a UFL expression or fem.Function is of another mesh than the body; make it on body.mesh"
+
+
+class PythonFunction(SpatialValue):
+    """A Python function of space, as dolfinx interpolates it: x of shape (3, n) in m, values of shape (n,).
+
+    In forms it is its interpolation by quadratic functions.
+
+    Args:
+        function: the function.
+    """
+
+    __slots__ = ("_function", "source")
+
+    def __init__(self, function: Callable[[Array], Any]) -> None:
+        self._function = function
+        self.source = f"Python function {getattr(function, '__name__', type(function).__name__)}"
+
+    @override
+    def at(self, points: Array) -> Array:
+        values = np.asarray(self._function(np.ascontiguousarray(points.T)))
+        if values.dtype.kind not in "iuf" or values.shape not in ((), (len(points),)):
+            text = f"returns {values.dtype} values {values.shape} at {len(points)} points; return real numbers, (n,)"
+            raise InputError(f"{self.source}: {text}")
+        return np.broadcast_to(values, (len(points),)).astype(np.float64)
+
+    @override
+    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        from dolfinx import fem
+
+        found = fem.Function(fem.functionspace(mesh, ("Lagrange", 2)))
+        found.interpolate(lambda x: self.at(x.T))
+        return found
+
+
+class Expression(SpatialValue):
+    """A scalar UFL expression, or fem.Function, on the body's own mesh or one of the same cells, straight or curved.
+
+    On the mesh itself it stands in forms as it is, on one of the same cells as it is at their nodes. At vertices,
+    and on coarser meshes, which only give start values, it is sampled at the nearest vertex.
+
+    Args:
+        expression: in SI.
+        mesh: its own.
+    """
+
+    __slots__ = ("_expression", "_mesh", "source")
+
+    def __init__(self, expression: Any, mesh: dmesh.Mesh) -> None:
+        self._expression, self._mesh = expression, mesh
+        self.source = f"UFL expression {textwrap.shorten(str(expression), 40, placeholder='...')}"
+
+    @property
+    @override
+    def everywhere(self) -> bool:
+        return False
+
+    def check_mesh(self, mesh: dmesh.Mesh) -> None:
+        """Refuse another mesh than a body's.
+
+        Args:
+            mesh: of the body.
+
+        Raises:
+            InputError: it has other cells.
+        """
+        from .. import compat
+
+        if not compat.same_topology(self._mesh, mesh):
+            raise InputError(_OTHER_MESH)
+
+    @override
+    def at(self, points: Array) -> Array:
+        from dolfinx import fem
+        from scipy.spatial import cKDTree
+
+        from .. import compat
+
+        space = fem.functionspace(self._mesh, ("Lagrange", 2))
+        sampled = fem.Function(space)
+        sampled.interpolate(compat.expression(self._expression, space))
+        known = space.tabulate_dof_coordinates()
+        if not len(known):
+            return np.zeros(len(points))
+        return np.asarray(sampled.x.array[cKDTree(known).query(points)[1]], dtype=np.float64)
+
+    @override
+    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        from dolfinx import fem
+
+        from .. import compat
+
+        if mesh._cpp_object is self._mesh._cpp_object:
+            return self._expression
+        if compat.same_topology(mesh, self._mesh):
+            return self._on_same_cells(mesh)
+        found = fem.Function(fem.functionspace(mesh, ("Lagrange", 1)))
+        found.interpolate(lambda x: self.at(x.T))
+        return found
+
+    def _on_same_cells(self, mesh: dmesh.Mesh) -> fem.Function:
+        """The expression at the nodes of a mesh of the same cells, straight or curved: their numbers are the same."""
+        import ufl
+        from dolfinx import fem
+
+        from .. import compat
+
+        own, other = (fem.functionspace(one, ("Lagrange", 2)) for one in (self._mesh, mesh))
+        d = mesh.geometry.dim
+        position = fem.Function(fem.functionspace(self._mesh, ("Lagrange", 2, (d,))))
+        position.x.array[:] = other.tabulate_dof_coordinates()[:, :d].ravel()
+        moved = ufl.replace(self._expression, {ufl.SpatialCoordinate(self._mesh): position})
+        sampled, found = fem.Function(own), fem.Function(other)
+        sampled.interpolate(compat.expression(moved, own))
+        found.x.array[:] = sampled.x.array
+        return found
+
+
+class VectorFunction(PythonFunction):
+    """A Python function of space with all components, (d, n)."""
+
+    __slots__ = ()
+
+    def components(self, count: int) -> tuple[PythonFunction, ...]:
+        """Each of ``count`` components."""
+        return tuple(PythonFunction(self._component(i, count)) for i in range(count))
+
+    def _component(self, i: int, count: int) -> Callable[[Array], Any]:
+        def component(x: Array) -> Any:
+            values = self._function(x)
+            if not isinstance(values, Sequence | np.ndarray) or len(values) != count:
+                raise InputError(f"{self.source}: must return {count} components, ({count}, n)")
+            return values[i]
+
+        component.__name__ = f"{self.source.removeprefix('Python function ')}[{i}]"
+        return component
+
+
+def expression(given: Any) -> SpatialValue:
+    """A scalar UFL expression as a value in space.
+
+    Args:
+        given: the expression, or a fem.Function.
+
+    Raises:
+        InputError: it is no scalar, or of several meshes.
+    """
+    import ufl
+    from dolfinx import mesh as dmesh
+
+    if given.ufl_shape != ():
+        raise InputError(f"a scalar is wanted; the UFL expression has the shape {given.ufl_shape}")
+    domains = ufl.domain.extract_domains(given)
+    if not domains:
+        return Formula(float(given(())))  # a number needs no mesh
+    own = [dmesh.Mesh(domain.ufl_cargo(), domain) for domain in domains]
+    if any(one._cpp_object is not own[0]._cpp_object for one in own):
+        raise InputError(_OTHER_MESH)
+    return Expression(given, own[0])
+
+
+def components(given: Any) -> tuple[SpatialValue, ...]:
+    """The components of a whole vector.
+
+    Args:
+        given: a Python function with values (d, n), whose components are known by their number only; a UFL expression
+            or a fem.Function.
+    """
+    import ufl
+
+    if not isinstance(given, ufl.core.expr.Expr):
+        return (VectorFunction(given),)
+    if len(given.ufl_shape) != 1:
+        raise refusal(
+            f"a vector has a component for each dimension; the UFL expression has the shape {given.ufl_shape}"
+        )
+    return tuple(expression(given[i]) for i in range(given.ufl_shape[0]))
 
 
 def as_value(given: Any) -> SpatialValue:
@@ -31,7 +218,9 @@ def as_value(given: Any) -> SpatialValue:
     try:
         if isinstance(given, SpatialValue):
             return given
-        return _of_python(given) if callable(given) or _is_ufl(given) else Formula(given)
+        if _is_ufl(given):
+            return expression(given)
+        return PythonFunction(given) if callable(given) else Formula(given)
     except InputError as error:
         raise refusal(str(error)) from None
 
@@ -39,12 +228,6 @@ def as_value(given: Any) -> SpatialValue:
 def _is_ufl(given: Any) -> bool:
     ufl = sys.modules.get("ufl")  # a scene is read without it
     return ufl is not None and isinstance(given, ufl.core.expr.Expr)
-
-
-def _of_python(given: Any) -> SpatialValue:
-    from . import python_values
-
-    return python_values.expression(given) if _is_ufl(given) else python_values.PythonFunction(given)
 
 
 FormulaField = Annotated[SpatialValue, BeforeValidator(as_value), PlainSerializer(lambda f: f.source)]
@@ -104,9 +287,7 @@ class Listed(Bare):
         if isinstance(data, list | tuple):
             return tuple(data)
         if callable(data) or _is_ufl(data):
-            from . import python_values
-
-            return python_values.components(data)
+            return components(data)
         raise refusal("must be a list, one entry for each component, like [1e6, 0.0]")
 
     @override
