@@ -91,7 +91,7 @@ class Curve(Events):
     def _ends(self) -> tuple[Array, Array]:
         """Along the tangent, the ways of all points to the ends of their segments, and these ends, (m,) each."""
         points, s = self.points, self.here.values.s
-        rates = self.points.rates(self.here.y[:-1], self.here.tangent[:-1])
+        rates = self.directions
         largest = float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, points.high, points.low)
         there = np.abs(ends - s) <= points.allowances(self.here.values, rates, largest)
@@ -132,7 +132,7 @@ class Curve(Events):
         largest = float(np.max(np.abs(self.here.tangent)))
         if not self.points.bent:
             return np.inf
-        rates = np.abs(self.points.rates(self.here.y[:-1], self.here.tangent[:-1]))
+        rates = np.abs(self.directions)
         reach = np.min(self.points.reach(self.here.values) / np.maximum(rates, 1e-300), initial=np.inf)
         return float(min(self.length / largest, reach))
 
@@ -286,7 +286,7 @@ class Curve(Events):
     def _turns_back(self, after: Place) -> bool:
         """Whether the tangent there leads back in units of the laws: a long spring beside them hides a fold."""
         way = (after.values.s - self.here.values.s) / self.points.reach(after.values)
-        rates = self.points.rates(after.y[:-1], after.tangent[:-1]) / self.points.reach(after.values)
+        rates = self.rates_at(after) / self.points.reach(after.values)
         return float(way @ rates) < 0.0
 
     def _checked(self, move: Arc, way: float) -> Arc:

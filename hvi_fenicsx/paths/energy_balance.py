@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,9 +34,9 @@ class Stored:
     constant: float
     dissipated: float
     size: float
-    elastic: float = 0.0
-    lost: Array = field(default_factory=lambda: np.zeros(0))
-    scales: Array = field(default_factory=lambda: np.zeros(0))
+    elastic: float
+    lost: Array
+    scales: Array
 
 
 class EnergyBalance:
@@ -45,6 +45,8 @@ class EnergyBalance:
     Args:
         problem: the problem.
         points: its points.
+        values: of the points where it starts.
+        factor: λ there.
         work: done before.
         dissipated: before.
 
@@ -54,13 +56,20 @@ class EnergyBalance:
     """
 
     def __init__(
-        self, problem: CondensedProblem, points: ContactPoints, work: float = 0.0, dissipated: float = 0.0
+        self,
+        problem: CondensedProblem,
+        points: ContactPoints,
+        values: Values,
+        factor: float,
+        *,
+        work: float = 0.0,
+        dissipated: float = 0.0,
     ) -> None:
         self._problem, self._points, self.work = problem, points, work
         self._size = sum(float(b.weights.sum()) * b.law.energy_scale for b in problem.bonds)
         self._bonds = BondEnergies(problem, points)
         self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
-        self.stored = Stored(energy=0.0, potential=0.0, constant=0.0, dissipated=0.0, size=0.0)
+        self.stored = self.at(values, factor)
 
     def at(self, values: Values, factor: float) -> Stored:
         """The energies of a state.
@@ -85,15 +94,6 @@ class EnergyBalance:
             lost=lost,
             scales=scales,
         )
-
-    def begin(self, values: Values, factor: float) -> None:
-        """Start at a state.
-
-        Args:
-            values: of the points.
-            factor: λ.
-        """
-        self.stored = self.at(values, factor)
 
     def go(self, values: Values, factor: float, driven: float) -> None:
         """Along a step.

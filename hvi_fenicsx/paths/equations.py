@@ -91,7 +91,15 @@ class CurveEquations(Branch):
     @property
     @override
     def directions(self) -> Array:
-        return self.points.rates(self.here.y[:-1], self.here.tangent[:-1])
+        return self.rates_at(self.here)
+
+    def rates_at(self, place: Place) -> Array:
+        """How fast the points go along their graphs at a place, (m,).
+
+        Args:
+            place: the place.
+        """
+        return self.points.rates(place.y[:-1], place.tangent[:-1])
 
     @property
     @override

@@ -145,7 +145,7 @@ class Events(CurveEquations):
     def _arrives(self, move: Arc) -> bool:
         """Whether the point at an end of its segment goes outwards there, and does not come back to it."""
         k, after = move.point, move.after
-        rate = float(self.points.rates(after.y[:-1], after.tangent[:-1])[k])
+        rate = float(self.rates_at(after)[k])
         middle_up = after.values.s[k] - self.points.low[k] > self.points.high[k] - after.values.s[k]
         return bool(rate > 0.0) == bool(middle_up)
 
@@ -186,7 +186,7 @@ class Events(CurveEquations):
         largest = float(np.max(np.abs(after.tangent)))
         if self.trend * after.tangent[-1] < -self.limits.undecided * largest:
             return Outcome.FOLD, None
-        rates = self.points.rates(after.y[:-1], after.tangent[:-1])
+        rates = self.rates_at(after)
         clear = np.abs(rates) > self.limits.undecided * largest
         back = np.flatnonzero(self.points.turning_back(after.values, rates) & clear)
         return (Outcome.TURNED, int(back[0])) if back.size else None
@@ -196,7 +196,7 @@ class Events(CurveEquations):
             return self._mean_rate
         if outcome is Outcome.FOLD or point is None:
             return lambda place: float(place.tangent[-1])
-        return lambda place: float(self.points.rates(place.y[:-1], place.tangent[:-1])[point])
+        return lambda place: float(self.rates_at(place)[point])
 
     def _mean_rate(self, place: Place) -> float:
         """How the factor changes on the way from here to a place of the same step."""

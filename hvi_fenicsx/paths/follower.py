@@ -129,8 +129,7 @@ class Follower(LoadHistory):
         if z is None:
             return
         self._follow_from(z, 0.0)
-        self._balance = EnergyBalance(self._problem, self._points)
-        self._balance.begin(self._branch.values, 0.0)
+        self._balance = EnergyBalance(self._problem, self._points, self._branch.values, 0.0)
         self._branch.unstable = self._points.unstable_directions(self._branch.values)
         yield self._state(Event.START)
 
@@ -190,8 +189,8 @@ class Follower(LoadHistory):
         """Go on after a state."""
         self._follow_from(coordinates_at(self._problem, self._points, state), state.factor, state)
         self._branch.unstable, self._leg, self._last = state.unstable, state.position.leg, state
-        self._balance = EnergyBalance(self._problem, self._points, state.work, state.dissipated)
-        self._balance.begin(self._branch.values, self.factor)
+        start = self._problem, self._points, self._branch.values, self.factor
+        self._balance = EnergyBalance(*start, work=state.work, dissipated=state.dissipated)
 
     # -- one leg of the load history
 

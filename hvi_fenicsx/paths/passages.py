@@ -105,19 +105,15 @@ class Crossing:
     def _outwards(self, k: int) -> float:
         """The rate of a point that is at an end of its segment, out of it."""
         points, s = self._points, float(self._curve.here.values.s[k])
-        rate = abs(float(self._all_rates()[k])) or np.finfo(float).tiny
+        rate = abs(float(self._curve.directions[k])) or np.finfo(float).tiny
         return rate if points.high[k] - s < s - points.low[k] else -rate
-
-    def _all_rates(self) -> Array:
-        here = self._curve.here
-        return self._points.rates(here.y[:-1], here.tangent[:-1])
 
     def _rates(self) -> Array:
         """How fast the points go; 0 for those that stand but for rounding, (m,): a slow one that goes to and fro does.
 
         So does the one that arrived where its rate may have either sign: it was the step that took it out.
         """
-        rates, allowed = self._all_rates(), np.full(len(self._points), self._limits.standing)
+        rates, allowed = self._curve.directions.copy(), np.full(len(self._points), self._limits.standing)
         if self._arrived is not None and self._points.bent:
             allowed[self._arrived] = self._limits.undecided
         rates[np.abs(rates) <= allowed * np.max(np.abs(self._curve.here.tangent))] = 0.0
@@ -165,7 +161,7 @@ class Crossing:
         On a steep segment the force changes fast where the displacement hardly does.
         """
         values, stiffest = self._curve.here.values, float(np.max(np.diag(self._points.stiffness)))
-        forces = (stiffest * np.abs(values.moves) + np.abs(values.rises)) * np.abs(self._all_rates())
+        forces = (stiffest * np.abs(values.moves) + np.abs(values.rises)) * np.abs(self._curve.directions)
         return bool(forces[k] <= self._limits.slow * np.max(forces))
 
     def _turned_back(self, k: int, *, forward: bool) -> Array:

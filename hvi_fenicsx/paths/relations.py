@@ -71,42 +71,31 @@ class ContactPoints(PointStatuses):
         Args:
             z: the coordinates, (n,).
         """
-        if self.straight:
-            return self._straight_values(z)
-        s, e = self.polar(z)
+        s, e = (z, np.empty(0)) if self.straight else self.polar(z)
         tau = s - self._base
-        lengths, tractions = self._x + self._moves * tau, self._force + self._rises * tau
-        more, slopes = self._deviations.values(lengths)
-        tractions, rises = tractions + more, self._rises + slopes * self._moves
-        energies = np.ones(len(s))
-        energies[self.of_lengths] = self.vectors.energies(e)
-        forces, spread = tractions * energies, self.point_of[self.vectors.flat]
-        return Values(
-            x=self._by_unknown(lengths, lengths[spread] * e),
-            force=self._by_unknown(forces, forces[spread] * e),
-            lengths=lengths,
-            tractions=tractions,
-            moves=self._moves,
-            rises=rises,
-            s=s,
-            directions=e,
-            energies=energies,
-        )
-
-    def _straight_values(self, z: Array) -> Values:
-        """The same where all graphs are straight."""
-        x, force = self._x + self._moves * z, self._force + self._rises * z
-        return Values(
+        x, force = self._x + self._moves * tau, self._force + self._rises * tau
+        found = Values(
             x=x,
             force=force,
             lengths=x,
             tractions=force,
             moves=self._moves,
             rises=self._rises,
-            s=z,
-            directions=np.empty(0),
-            energies=np.ones(len(z)),
+            s=s,
+            directions=e,
+            energies=np.ones(len(s)),
         )
+        return found if self.straight else self._of_curves(found)
+
+    def _of_curves(self, chords: Values) -> Values:
+        """The values with what chords of curved laws lack, and of vectors."""
+        lengths, e, energies = chords.lengths, chords.directions, chords.energies
+        more, slopes = self._deviations.values(lengths)
+        energies[self.of_lengths] = self.vectors.energies(e)
+        tractions = chords.tractions + more
+        forces, spread = tractions * energies, self.point_of[self.vectors.flat]
+        x, force = self._by_unknown(lengths, lengths[spread] * e), self._by_unknown(forces, forces[spread] * e)
+        return replace(chords, x=x, force=force, tractions=tractions, rises=chords.rises + slopes * chords.moves)
 
     def setting_out(self, values: Values, direction: Array) -> Values | None:
         """The values with the mode in which lengths of 0, but for rounding, grow; None where no mode matters.

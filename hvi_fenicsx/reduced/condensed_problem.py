@@ -5,11 +5,10 @@ Nondimensional, and the same on all ranks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
 from ..effects import Direction
 from ..laws import Mixity, Superpotential, VertexLaws
@@ -164,14 +163,7 @@ class CondensedProblem:
         Args:
             factor: λ.
         """
-        standing, moved = self._prescribed
-        return _polynomial(self.constant, factor) + standing + sum(b.energy(factor) for b in moved)
-
-    @cached_property
-    def _prescribed(self) -> tuple[float, tuple[PrescribedBonds, ...]]:
-        """The energy of bonds at displacements that the factor does not move, and the other bonds."""
-        moved = tuple(bonds for bonds in self.prescribed_bonds if np.any(bonds.arguments[1]))
-        return sum(b.energy(0.0) for b in self.prescribed_bonds if not np.any(b.arguments[1])), moved
+        return float(polyval(factor, self.constant)) + sum(bonds.energy(factor) for bonds in self.prescribed_bonds)
 
     def potential(self, x: Array, factor: float) -> float:
         """<g, u>: the loads times the displacements of the body in equilibrium with x.
@@ -180,8 +172,4 @@ class CondensedProblem:
             x: the unknowns, (n,).
             factor: λ.
         """
-        return float((self.applied[0] + factor * self.applied[1]) @ x) + _polynomial(self.applied_constant, factor)
-
-
-def _polynomial(coefficients: Sequence[float] | Array, factor: float) -> float:
-    return float(coefficients[0] + factor * (coefficients[1] + factor * coefficients[2]))
+        return float((self.applied[0] + factor * self.applied[1]) @ x + polyval(factor, self.applied_constant))

@@ -199,16 +199,12 @@ class DenseStiffness(CondensedStiffness):
 
     @override
     def inverse(self, columns: CellColumns) -> CellInverse:
-        return DenseInverse(np.asarray(np.linalg.inv(self._matrix(columns))))
-
-    def _matrix(self, columns: CellColumns) -> Array:
-        """The equations, (n, n)."""
         moving = columns.moving
         matrix = np.where(moving, self._array, 0.0)
         matrix[np.diag_indices(len(matrix))] += np.where(moving, columns.slope, columns.rise)
         if columns.driver is not None:
             matrix[:, columns.driver] = columns.factor
-        return matrix
+        return DenseInverse(np.asarray(np.linalg.inv(matrix)))
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:

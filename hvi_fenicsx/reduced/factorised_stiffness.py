@@ -43,7 +43,7 @@ class FactorisedStiffness(CondensedStiffness):
         self._interior, self._form, self._own = interior, interior.form.suiting(_PREFIX), interior.own()
         self._system = self._form.system
         self._matrix, self._stiffness = self._form.matrix(), self._system.jacobian.matrix.copy()
-        self._diagonal = self._everywhere(np.asarray(self._own_diagonal()))
+        self._diagonal = self._everywhere(np.asarray(self._own[:, interior.here].diagonal()))
         sums = np.asarray(np.abs(self._own).sum(axis=1)).ravel()
         self._size = float(np.max(self._everywhere(sums), initial=0.0))
         self._add(0.0)
@@ -57,9 +57,6 @@ class FactorisedStiffness(CondensedStiffness):
 
     def _everywhere(self, own: Array) -> Array:
         return np.concatenate(agree(self._system.comm, own))
-
-    def _own_diagonal(self) -> Array:
-        return np.asarray(self._own[:, self._interior.here].diagonal())
 
     @property
     @override
