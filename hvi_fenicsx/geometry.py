@@ -32,7 +32,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Arc:
+class CircularArc:
     """A circle that a side lies on.
 
     Attributes:
@@ -48,7 +48,7 @@ class Arc:
         away = x - np.asarray(self.centre)
         return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
 
-    def moved(self, origin: Array, rotation: Array) -> Arc:
+    def moved(self, origin: Array, rotation: Array) -> CircularArc:
         """The circle turned about the origin of coordinates, and then moved.
 
         Args:
@@ -56,7 +56,7 @@ class Arc:
             rotation: (2, 2).
         """
         x, y = rotation @ np.asarray(self.centre) + origin
-        return Arc((float(x), float(y)), self.radius)
+        return CircularArc((float(x), float(y)), self.radius)
 
 
 def _swept(p: Point, q: Point, centre: Point | None) -> float:
@@ -125,10 +125,12 @@ class Outline:
         sides = [(name, None if centre is None else at(centre)) for name, centre in self.sides]
         return Outline([at(p) for p in self.points], sides, [round(size / unit, digits) for size in self.sizes])
 
-    def arcs(self) -> dict[str, Arc]:
+    def arcs(self) -> dict[str, CircularArc]:
         """The curved sides by name."""
         starts = zip(self.points, self.sides, strict=True)
-        return {name: Arc(c, float(np.hypot(p[0] - c[0], p[1] - c[1]))) for p, (name, c) in starts if c is not None}
+        return {
+            name: CircularArc(c, float(np.hypot(p[0] - c[0], p[1] - c[1]))) for p, (name, c) in starts if c is not None
+        }
 
 
 def spot(point: Array) -> str:

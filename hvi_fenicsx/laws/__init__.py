@@ -7,7 +7,7 @@ from .convex_parts import ConvexPart, DifferentiablePart, Directional
 from .lengths import BenzeggaghKenane, Length, Mixity, PowerLaw, mixities
 from .polyline import PolylineLaw, PolylinePart, SampledLaw, sample_traction
 from .registry import available, create, describe
-from .traction_bounds import Thresholds
+from .traction_bounds import LawThresholds
 from .traction_graph import TractionGraph
 from .vertex_laws import VertexLaws
 from .weakening import Exponential, WeakeningLaw
@@ -19,6 +19,7 @@ __all__ = [
     "Directional",
     "Exponential",
     "Graph",
+    "LawThresholds",
     "Length",
     "LinearSpring",
     "Mixity",
@@ -30,7 +31,6 @@ __all__ = [
     "SampledLaw",
     "Sawtooth",
     "Superpotential",
-    "Thresholds",
     "TractionGraph",
     "Tresca",
     "VertexLaws",

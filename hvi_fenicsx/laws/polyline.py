@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..typing import Array, Integers
 from .base import Superpotential
 from .convex_parts import ConvexPart, Directional
-from .traction_bounds import DEFAULT, Extremes, Thresholds
+from .traction_bounds import DEFAULT, Extremes, LawThresholds
 from .traction_graph import TractionGraph
 
 
@@ -295,7 +295,7 @@ class SampledLaw(PolylineLaw):
 
 
 def sample_traction(
-    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200, thresholds: Thresholds = DEFAULT
+    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200, thresholds: LawThresholds = DEFAULT
 ) -> tuple[tuple[float, float], ...]:
     """Points (displacement, traction) of a graph law from a function.
 

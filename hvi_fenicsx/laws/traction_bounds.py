@@ -17,7 +17,7 @@ from .convex_parts import SplitLaw
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
+class LawThresholds:
     """Limits of the search for extreme tractions, and of sampling.
 
     Attributes:
@@ -38,7 +38,7 @@ class Thresholds:
     most_drops: int = 1_000
 
 
-DEFAULT = Thresholds()
+DEFAULT = LawThresholds()
 
 
 _Objective = Callable[[Array, Array, Array], Array]
@@ -62,7 +62,7 @@ class Extremes:
     c4: float
 
 
-def extremes(law: SplitLaw, thresholds: Thresholds = DEFAULT) -> Extremes:
+def extremes(law: SplitLaw, thresholds: LawThresholds = DEFAULT) -> Extremes:
     """Bounds from above of a law's extreme tractions.
 
     Args:
@@ -88,7 +88,7 @@ def extremes(law: SplitLaw, thresholds: Thresholds = DEFAULT) -> Extremes:
     )
 
 
-def _grid(law: SplitLaw, thresholds: Thresholds) -> Array:
+def _grid(law: SplitLaw, thresholds: LawThresholds) -> Array:
     """Displacements ≥ 0: zero, every kink, and a geometric progression out to where nothing happens."""
     unit = law.length_scale
     kinks = np.abs(law.kinks)
@@ -100,7 +100,7 @@ def _grid(law: SplitLaw, thresholds: Thresholds) -> Array:
     )
 
 
-def _supremum(law: SplitLaw, grid: Array, objective: _Objective, thresholds: Thresholds) -> float:
+def _supremum(law: SplitLaw, grid: Array, objective: _Objective, thresholds: LawThresholds) -> float:
     """A bound from above of the objective's supremum over the range of the grid."""
     a, b = grid[:-1], grid[1:]
     best = _sample(law, grid, objective)

@@ -23,7 +23,7 @@ from petsc4py import PETSc
 from .. import compat
 from ..typing import Array, Entities, Integers, Mask
 from .domain import Domain
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, MeshThresholds
 from .transfer import Numbers, Rows, Transfer, mean_rows, weighted_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
@@ -34,7 +34,7 @@ def block(
     comm: MPI.Comm,
     size: Sequence[float],
     cells: Sequence[int],
-    thresholds: Thresholds = DEFAULT,
+    thresholds: MeshThresholds = DEFAULT,
 ) -> Domain:
     """The rectangle or box [0, size], in cells cut into triangles or tetrahedra. Collective.
 
@@ -66,7 +66,7 @@ def block(
     )
 
 
-def coarser_cells(cells: Sequence[int], thresholds: Thresholds = DEFAULT) -> list[int] | None:
+def coarser_cells(cells: Sequence[int], thresholds: MeshThresholds = DEFAULT) -> list[int] | None:
     """The cells each way of the next coarser block; None where it would not pay.
 
     They are halved, so that the blocks are nested. Of a large block of which they cannot be halved, the coarser one has

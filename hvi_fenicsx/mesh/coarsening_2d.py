@@ -21,7 +21,7 @@ from ..typing import Array, Entities, Integers
 from . import gmsh_arrays, gmsh_file
 from .domain import Domain
 from .facets import cell_facets
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, MeshThresholds
 
 NONE = -1
 """Stands for no side, or no region."""
@@ -81,7 +81,7 @@ class Face:
     area: float
 
 
-def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
+def coarsen(domain: Domain, factor: float, thresholds: MeshThresholds = DEFAULT) -> Domain | None:
     """The plane body on a mesh of longer edges. Collective.
 
     Args:
@@ -132,7 +132,7 @@ def _numbered(named: Mapping[str, Entities], names: Sequence[str], size: int) ->
 
 
 def _outline(
-    parts: Sequence[HalfEdges], factor: float, thresholds: Thresholds
+    parts: Sequence[HalfEdges], factor: float, thresholds: MeshThresholds
 ) -> tuple[list[Chain], list[Face]] | None:
     """The outline with fewer vertices, and what it encloses.
 

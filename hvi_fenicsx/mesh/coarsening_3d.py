@@ -22,7 +22,7 @@ from ..runtime.mpi import agree, on_root, total
 from ..typing import Array, Entities, Integers, Mask
 from . import refinement
 from .domain import Domain
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, MeshThresholds
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class _Surface:
     on: Mask
 
 
-def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> Domain | None:
+def coarsen(domain: Domain, factor: float, thresholds: MeshThresholds = DEFAULT) -> Domain | None:
     """The body on a mesh of larger cells. Collective.
 
     Args:
@@ -81,7 +81,7 @@ def coarsen(domain: Domain, factor: float, thresholds: Thresholds = DEFAULT) -> 
     return found if _similar(domain, found, thresholds.remeshed_size) else None
 
 
-def _sample(domain: Domain, thresholds: Thresholds) -> _CellSample:
+def _sample(domain: Domain, thresholds: MeshThresholds) -> _CellSample:
     """The same cells in the same order for any number of ranks. Collective."""
     comm, topology = domain.mesh.comm, domain.mesh.topology
     every = max(1, topology.index_map(3).size_global // thresholds.sampled_cells)
@@ -135,7 +135,7 @@ def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
 
 
 def _remeshed(
-    surface: _Surface, cells: _CellSample, factor: float, thresholds: Thresholds
+    surface: _Surface, cells: _CellSample, factor: float, thresholds: MeshThresholds
 ) -> tuple[Array, Integers] | None:
     """Vertices (n, 3) and cells (c, 4), or None where gmsh fails, or takes too long. On rank 0."""
     _, first, inverse = np.unique(surface.nodes, return_index=True, return_inverse=True)

@@ -21,7 +21,7 @@ from ..runtime.mpi import total
 from ..typing import Array, Entities, Integers
 from . import nodes, transfer
 from .domain import Domain
-from .thresholds import DEFAULT, ROUNDING, Thresholds
+from .thresholds import DEFAULT, ROUNDING, MeshThresholds
 
 _MORE_SWEEPS = 2
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
@@ -43,7 +43,7 @@ class CurvedMesh(dmesh.Mesh):
         self.straight_cells = straight_cells
 
 
-def mesh_of(domain: Domain, degree: int, thresholds: Thresholds = DEFAULT) -> dmesh.Mesh:
+def mesh_of(domain: Domain, degree: int, thresholds: MeshThresholds = DEFAULT) -> dmesh.Mesh:
     """The mesh that displacements of a degree live on. Collective.
 
     Args:

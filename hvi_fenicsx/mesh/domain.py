@@ -47,7 +47,7 @@ class Domain:
     one_piece: bool = False
     bends: bool = True
     coarsening: Coarsening | None = None
-    shared: Shared | None = field(default=None, compare=False, repr=False)
+    shared: SharedObjects | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def from_mesh(
@@ -169,7 +169,7 @@ def _bounding_box(mesh: dmesh.Mesh) -> tuple[Array, Array]:
 Kept = TypeVar("Kept")
 
 
-class Shared:
+class SharedObjects:
     """Objects by name; of each name the last one, so that memory does not grow from problem to problem."""
 
     def __init__(self) -> None:

@@ -26,14 +26,16 @@ from .curved import CurvedFacets
 from .domain import Domain, check_affordable
 from .gmsh_arrays import MeshArrays, extract, start
 from .gmsh_reader import Request
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, MeshThresholds
 
 _SCRIPTS = (".geo", ".geo_unrolled")
 _HEADER = b"$MeshFormat"
 """How a mesh begins; all else gmsh would take for a script."""
 
 
-def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresholds: Thresholds = DEFAULT) -> Domain:
+def read(
+    comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresholds: MeshThresholds = DEFAULT
+) -> Domain:
     """The mesh of a file, its physical groups being sides and regions. Collective.
 
     Args:
@@ -66,7 +68,7 @@ def _curves(found: MeshArrays, names: Mapping[str, int], scale: float, dimension
 
 
 def _read(
-    path: Path, dimension: int, scale: float, found: list[MeshArrays], thresholds: Thresholds
+    path: Path, dimension: int, scale: float, found: list[MeshArrays], thresholds: MeshThresholds
 ) -> tuple[dict[int, dict[str, int]], int]:
     """Read the file in a process of its own. Rank 0 only.
 

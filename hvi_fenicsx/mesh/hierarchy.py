@@ -26,11 +26,11 @@ from . import coarsening_2d, coarsening_3d, refinement
 from . import facets as cell_facets
 from .domain import Domain
 from .joined import PlacedBody, coarsening
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, MeshThresholds
 from .transfer import InterpolationTransfer
 
 
-def with_hierarchy(domain: Domain, thresholds: Thresholds = DEFAULT) -> Domain:
+def with_hierarchy(domain: Domain, thresholds: MeshThresholds = DEFAULT) -> Domain:
     """The domain with coarser levels, where it is large enough and gmsh can make them. Collective.
 
     Args:
@@ -53,7 +53,7 @@ def with_hierarchy(domain: Domain, thresholds: Thresholds = DEFAULT) -> Domain:
     return replace(domain, coarsening=lambda: (coarser, InterpolationTransfer()))
 
 
-def with_hierarchies(domains: Sequence[Domain], thresholds: Thresholds = DEFAULT) -> list[Domain]:
+def with_hierarchies(domains: Sequence[Domain], thresholds: MeshThresholds = DEFAULT) -> list[Domain]:
     """The domains of bodies that are solved together, with coarser levels: it is their common size that counts.
 
     A small body beside a large one has coarser levels too, or it would be a large part of the coarsest common level,
@@ -74,7 +74,7 @@ def _unknowns(domain: Domain) -> int:
     return int(domain.dimension * domain.mesh.topology.index_map(0).size_global)
 
 
-def _in_pieces(domain: Domain, pieces: Sequence[Piece], thresholds: Thresholds) -> Domain:
+def _in_pieces(domain: Domain, pieces: Sequence[Piece], thresholds: MeshThresholds) -> Domain:
     """The domain with the coarser meshes of its pieces; those that have none stay as they are. Collective."""
     d = domain.dimension
     domains = with_hierarchies([piece.domain for piece in pieces], thresholds)

@@ -148,14 +148,14 @@ def _coarser(
     others = [_numbers(mesh.comm, coarse, i) for i in range(len(coarse))]
     pairs = zip(bodies, coarse, numbers, others, steps, strict=True)
     transfers = [
-        BodyTransfer(fine=b.domain.mesh, coarse=c.domain.mesh, numbers=(n, m), transfer=step[1])
+        PlacedTransfer(fine=b.domain.mesh, coarse=c.domain.mesh, numbers=(n, m), transfer=step[1])
         for b, c, n, m, step in pairs
     ]
     return below, JoinedTransfer(tuple(transfers))
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodyTransfer:
+class PlacedTransfer:
     """The transfer between the meshes of one body.
 
     Attributes:
@@ -191,7 +191,7 @@ class JoinedTransfer(Transfer):
         bodies: the transfer of each body.
     """
 
-    bodies: tuple[BodyTransfer, ...]
+    bodies: tuple[PlacedTransfer, ...]
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex has the weights that its body's transfer gives it. Collective."""

@@ -19,7 +19,7 @@ from ..typing import Array, Entities
 from . import curved
 from .domain import Domain, check_affordable
 from .facets import cell_facets
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT, MeshThresholds
 from .transfer import Halves, ParentCellTransfer, Transfer
 
 _SKEWED = np.eye(3) + 1e-6 * np.sqrt([[2.0, 3.0, 5.0], [3.0, 7.0, 11.0], [5.0, 11.0, 13.0]])
@@ -72,7 +72,7 @@ def _with_coarser(coarse: Domain, step: Refinement) -> Domain:
     return replace(step.domain, coarsening=coarsening)
 
 
-def marked(domain: Domain, cells: Entities, thresholds: Thresholds = DEFAULT) -> Refinement:
+def marked(domain: Domain, cells: Entities, thresholds: MeshThresholds = DEFAULT) -> Refinement:
     """Bisect the long edges of the marked cells, and others as far as a conforming mesh needs it. Collective.
 
     Args:

@@ -10,7 +10,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
+class MeshThresholds:
     """When coarser meshes are made, which of them are used, and what counts as rounding.
 
     Attributes:
@@ -50,4 +50,4 @@ class Thresholds:
     least_jacobian: float = 0.2
 
 
-DEFAULT = Thresholds()
+DEFAULT = MeshThresholds()

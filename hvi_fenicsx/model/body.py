@@ -280,9 +280,9 @@ def _sorted_out(
 
 def _remembering(domain: Domain) -> Domain:
     """The domain for many problems, whose coarser ones are made once."""
-    from ..mesh.domain import Shared
+    from ..mesh.domain import SharedObjects
 
-    domain = replace(domain, shared=Shared())
+    domain = replace(domain, shared=SharedObjects())
     if domain.coarsening is None:
         return domain
     make = domain.coarsening

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 
 from ..effects import Averaged, Contribution, Effect, Place
 from ..mesh import nodes
-from ..mesh.domain import Shared
+from ..mesh.domain import SharedObjects
 from ..rigid import RigidBody, rigid_fields
 from ..runtime import forms
 from ..typing import Array, Entities
@@ -153,7 +153,7 @@ class Bulk:
     strains: Mapping[str, Any]
     across: tuple[Any, ...]
     origin: tuple[Any, ...] = ()
-    shared: Shared | None = None
+    shared: SharedObjects | None = None
 
     @functools.cached_property
     def compiled(self) -> fem.Form:
@@ -361,7 +361,7 @@ def make_bulk(
     scales: Scales,
     made: Sequence[tuple[str | None, Effect, Contribution]],
     strains: Mapping[str, Any],
-    shared: Shared | None = None,
+    shared: SharedObjects | None = None,
     volumetric_ratio: float = np.inf,
 ) -> Bulk:
     """The elastic operator that effects contribute. Collective.

@@ -3,8 +3,9 @@
 A law whose growth falls below zero on both sides together makes a slip integral with a negative factor, which is
 concave. On a cone with as many edges as dimensions, a concave positively homogeneous function is nowhere below the
 linear one with the same values on the edges. So on each cone of slips a convex functional bounds the true one from
-below, and :class:`.Programme` minimises it. The cone with the lowest bound is divided through the motion that attains
-it, until the bound meets the lowest value attained. Slips of one dimension, as on a straight floor, need no division.
+below, and :class:`.CuttingPlanes` minimises it. The cone with the lowest bound is divided through the motion that
+attains it, until the bound meets the lowest value attained. Slips of one dimension, as on a straight floor, need no
+division.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .cutting_planes import Functional, Minimum, Programme, Region, ball, faces, idle
+from .cutting_planes import CuttingPlanes, Functional, Minimum, Polytope, ball, faces, idle
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,11 @@ class ConcavePart:
     """
 
     functional: Functional
-    programme: Programme
+    programme: CuttingPlanes
     basis: Array
 
     @classmethod
-    def of(cls, f: Functional, programme: Programme) -> ConcavePart:
+    def of(cls, f: Functional, programme: CuttingPlanes) -> ConcavePart:
         """Find the slips of the negative factors.
 
         Args:
@@ -100,13 +101,13 @@ class ConcavePart:
 
 @dataclass(frozen=True)
 class GlobalProgramme:
-    """What :class:`.Programme` does, for factors of any sign.
+    """What :class:`.CuttingPlanes` does, for factors of any sign.
 
     Attributes:
         convex: for functionals without negative factors.
     """
 
-    convex: Programme
+    convex: CuttingPlanes
 
     def evaluate(self, f: Functional, y: Array) -> float:
         """The value of f at y, all vertices summed; the cone is not looked at.
@@ -117,7 +118,9 @@ class GlobalProgramme:
         """
         return self.convex.evaluate(f, y)
 
-    def minimise(self, f: Functional, region: Region, give_up: float = np.inf, aim: float = -np.inf) -> Minimum | None:
+    def minimise(
+        self, f: Functional, region: Polytope, give_up: float = np.inf, aim: float = -np.inf
+    ) -> Minimum | None:
         """Minimum of f over region and cone; None if that is empty or nothing in it is small enough.
 
         Args:
@@ -185,7 +188,7 @@ class GlobalProgramme:
             factor, y = lower, found.y
         raise SolverError(f"rigid motions: no load factor after {limits.max_rounds} minima")
 
-    def _search(self, part: ConcavePart, region: Region, give_up: float) -> Minimum | None:
+    def _search(self, part: ConcavePart, region: Polytope, give_up: float) -> Minimum | None:
         limits, numbers, depth = self.convex.thresholds, count(), 0
         best, gap = Minimum(give_up, np.empty(0), -np.inf), np.inf
         waiting: list[tuple[float, int, Array, Array, int]] = []

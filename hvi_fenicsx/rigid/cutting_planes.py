@@ -102,7 +102,7 @@ class Functional:
 
 
 @dataclass(frozen=True)
-class Region:
+class Polytope:
     """The bounded set {upper @ y <= 1, equal @ y = value} to search.
 
     Attributes:
@@ -116,10 +116,10 @@ class Region:
     value: Array
 
 
-def ball(frame: Array) -> Region:
+def ball(frame: Array) -> Polytope:
     """|y| <= 1 in the largest of the rigid coefficients z = frame @ y, frame (n, k)."""
     none = np.zeros((0, frame.shape[1]))
-    return Region(np.vstack([frame, -frame]), none, np.zeros(0))
+    return Polytope(np.vstack([frame, -frame]), none, np.zeros(0))
 
 
 def vertices(frame: Array, rank: float) -> Array:
@@ -136,7 +136,7 @@ def vertices(frame: Array, rank: float) -> Array:
     return np.asarray(corners[np.abs(corners @ frame.T).max(axis=1) <= 1.0 + rank])
 
 
-def idle(frame: Array, load: Array) -> Region:
+def idle(frame: Array, load: Array) -> Polytope:
     """The motions with |y| <= 1 on which a load does no work.
 
     Args:
@@ -146,13 +146,13 @@ def idle(frame: Array, load: Array) -> Region:
     return replace(ball(frame), equal=load[None], value=np.zeros(1))
 
 
-def cross(frame: Array) -> Region:
+def cross(frame: Array) -> Polytope:
     """Σ|z_j| <= 1: its corners are pure translations and rotations, so it yields directions easy to name."""
     signs = np.array(list(product((1.0, -1.0), repeat=frame.shape[0])))
     return replace(ball(frame), upper=signs @ frame)
 
 
-def faces(frame: Array, across: Array) -> Iterator[Region]:
+def faces(frame: Array, across: Array) -> Iterator[Polytope]:
     """The faces of the sphere |y| = 1 in the space orthogonal to some motions.
 
     Args:
@@ -206,7 +206,7 @@ class GapHistory:
 
 
 @dataclass
-class Programme:
+class CuttingPlanes:
     """The motions with rigid coefficients frame @ y, their slip integrals, and the cuts found so far.
 
     Attributes:
@@ -242,7 +242,7 @@ class Programme:
         return float(f.linear @ y + slip)
 
     def minimise(
-        self, f: Functional, region: Region, give_up: float = np.inf, enough: float = 0.0, aim: float = -np.inf
+        self, f: Functional, region: Polytope, give_up: float = np.inf, enough: float = 0.0, aim: float = -np.inf
     ) -> Minimum | None:
         """Minimum of a convex f over region and cone; None if that is empty or nothing in it is small enough.
 
@@ -282,7 +282,7 @@ class Programme:
         self._cut(y)
         self._cut(0.5 * (y + best))
 
-    def _solve(self, f: Functional, region: Region, active: list[int]) -> Minimum | None:
+    def _solve(self, f: Functional, region: Polytope, active: list[int]) -> Minimum | None:
         """Minimum of the cut model; `value` and `lower` are both the model's."""
         self.solved += 1
         if self.frame.shape[1] == 1:
@@ -299,7 +299,7 @@ class Programme:
             raise SolverError(f"HiGHS on the rigid motions: {found.message}")
         return Minimum(found.fun * size, np.asarray(found.x[:k]), found.fun * size)
 
-    def _rows(self, f: Functional, region: Region, active: list[int]) -> tuple[Array, Array, Array]:
+    def _rows(self, f: Functional, region: Polytope, active: list[int]) -> tuple[Array, Array, Array]:
         """Cost and inequality rows of the cut model in (y, one height for each part with factor > 0).
 
         Heights are in units of the part's largest cut: HiGHS' tolerances are absolute, and parts may be small.
@@ -318,7 +318,7 @@ class Programme:
         right[: len(region.upper)] = 1.0
         return np.r_[f.linear, f.factors[parts] * sizes], np.hstack([left, heights]), right
 
-    def _solve_line(self, f: Functional, region: Region) -> Minimum | None:
+    def _solve_line(self, f: Functional, region: Polytope) -> Minimum | None:
         """One motion only: two rays and the origin, no linear programme."""
         reach = 1.0 / np.abs(self.frame).max()
         points = [np.array([t]) for t in (reach, -reach, 0.0)]
@@ -327,7 +327,7 @@ class Programme:
         i = int(np.argmin(values)) if values else 0
         return Minimum(values[i], inside[i], values[i]) if values else None
 
-    def _inside(self, f: Functional, region: Region, y: Array) -> bool:
+    def _inside(self, f: Functional, region: Polytope, y: Array) -> bool:
         feasible = self.thresholds.exact
         held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= feasible
         return bool(held and (f.cone @ y).max(initial=0.0) <= feasible)

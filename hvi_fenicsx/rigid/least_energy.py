@@ -38,7 +38,7 @@ class OneSidedSupports:
 
 
 @dataclass(frozen=True)
-class Rest:
+class RestingPosition:
     """A position at rest.
 
     Attributes:
@@ -147,7 +147,7 @@ class _CutModel:
         found = self.thresholds.linear_programme(cost, rows, limits, None, None, bounds)
         return found if found.status == 0 else None
 
-    def rest(self, a: Array, reactions: Array) -> Rest:
+    def rest(self, a: Array, reactions: Array) -> RestingPosition:
         """The position, and the sides that bear the load: the largest reactions first.
 
         Args:
@@ -157,12 +157,12 @@ class _CutModel:
         room = self.sides.limits - self.sides.rows @ a
         touching = np.flatnonzero(room <= self.thresholds.touching * self.size)
         first = touching[np.argsort(-reactions[touching], kind="stable")]
-        return Rest(a, _independent(self.sides.rows, first, self.thresholds.independent))
+        return RestingPosition(a, _independent(self.sides.rows, first, self.thresholds.independent))
 
 
 def least_energy(
     comm: MPI.Comm, work: Array, energy: Energy, sides: OneSidedSupports, thresholds: RigidThresholds = DEFAULT
-) -> Rest | None:
+) -> RestingPosition | None:
     """Minimise work·a + Σ_p energy_p(a) over rows @ a <= limits. Collective; the same on all ranks.
 
     Args:
@@ -180,7 +180,7 @@ def least_energy(
     return None if first is None else _descend(comm, model, energy, first)
 
 
-def _descend(comm: MPI.Comm, model: _CutModel, energy: Energy, best: Array) -> Rest | None:
+def _descend(comm: MPI.Comm, model: _CutModel, energy: Energy, best: Array) -> RestingPosition | None:
     """From an admissible position to the one of least energy. Collective."""
     thresholds = model.thresholds
     reactions: Array = np.zeros(len(model.sides.limits))

@@ -14,7 +14,7 @@ from ..errors import InputError, SolverError
 from ..runtime.mpi import on_root
 from ..typing import Array
 from .branch_and_bound import GlobalProgramme
-from .cutting_planes import Functional, Minimum, Programme, Region, ball, cross, vertices
+from .cutting_planes import CuttingPlanes, Functional, Minimum, Polytope, ball, cross, vertices
 from .motions import Mode, mode_of, modes, natural_basis, null_space, triangle
 from .reduction import ReducedProblem, RigidProblem, reduce
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to, undecided
@@ -62,7 +62,7 @@ class Analysis:
     def programme(self) -> GlobalProgramme:
         """The shared cuts."""
         scale = self.reduced.load_scale + self._law_scale or 1.0
-        return GlobalProgramme(Programme(self.reduced.frame, self.reduced.slips, scale, self.thresholds))
+        return GlobalProgramme(CuttingPlanes(self.reduced.frame, self.reduced.slips, scale, self.thresholds))
 
     @cached_property
     def loose(self) -> Array:
@@ -169,7 +169,7 @@ class Analysis:
         inner = self._lowest(f, ball(self.reduced.frame))
         return inner if inner.value < -self.tie else self._sphere(f, self.free[:, :0])
 
-    def _lowest(self, f: Functional, region: Region) -> Minimum:
+    def _lowest(self, f: Functional, region: Polytope) -> Minimum:
         """Minimum over a region that contains the origin."""
         return self.programme.minimise(f.minus(self.work), region) or Minimum(0.0, np.zeros_like(self.work), 0.0)
 

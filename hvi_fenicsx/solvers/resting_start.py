@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from ..laws import Superpotential
 from ..problem.law_term import LawTerm
-from ..rigid import OneSidedSupports, Rest, least_energy
+from ..rigid import OneSidedSupports, RestingPosition, least_energy
 from ..rigid.thresholds import DEFAULT as RIGID
 from ..runtime.mpi import agree
 from ..system import existence, free_motions
@@ -246,7 +246,7 @@ def settle(
     x: PETSc.Vec,
     moves: Sequence[PETSc.Vec],
     sides: OneSidedSupports | None = None,
-) -> Rest | None:
+) -> RestingPosition | None:
     """Move x rigidly to where the energy of unbroken laws is least. Collective.
 
     Args:

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from ..certify import plausibility
 from ..mesh import nodes
 from ..mesh.domain import Domain, check_affordable
-from ..mesh.thresholds import Thresholds as MeshThresholds
+from ..mesh.thresholds import MeshThresholds
 from ..model import Model
 from ..problem.compose import Formulation
 from ..problem.problem import Problem

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 
 
 def main() -> None:

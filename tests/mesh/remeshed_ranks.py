@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 
 COMM = MPI.COMM_WORLD
 

@@ -22,7 +22,7 @@ from hvi_fenicsx import read_tables, workflow
 from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.transfer import InterpolationTransfer
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 

@@ -23,7 +23,7 @@ from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.gmsh_reader import Request
-from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.runtime import memory, processes
 from hvi_fenicsx.runtime.mpi import Interrupt
 

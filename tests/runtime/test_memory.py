@@ -12,7 +12,7 @@ from scenes import model
 
 from hvi_fenicsx import InputError, prepare, read_tables
 from hvi_fenicsx.mesh.shapes import DomainShape
-from hvi_fenicsx.mesh.thresholds import Thresholds
+from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.runtime import memory
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
-    from ..thresholds import Thresholds as MeshThresholds
+    from ..thresholds import MeshThresholds
 
 
 FEWEST_ADAPTIVE = 3

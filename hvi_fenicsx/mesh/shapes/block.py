@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
-    from ..thresholds import Thresholds as MeshThresholds
+    from ..thresholds import MeshThresholds
 
 _MOST_UNKNOWNS = 2**31 - 1
 """What PETSc's default integers can number."""

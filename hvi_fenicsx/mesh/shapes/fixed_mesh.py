@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
-    from ..thresholds import Thresholds as MeshThresholds
+    from ..thresholds import MeshThresholds
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
-    from ..thresholds import Thresholds as MeshThresholds
+    from ..thresholds import MeshThresholds
 
 
 MOST_REFINEMENTS = 10

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from ..domain import Domain
     from ..joined import PlacedBody
-    from ..thresholds import Thresholds as MeshThresholds
+    from ..thresholds import MeshThresholds
 
 Coordinate = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
 _SEVERAL = "set of bodies"
