@@ -103,18 +103,6 @@ class AdaptiveSolver:
     existence: bool = False
     thresholds: Thresholds = DEFAULT
 
-    def begin(self, scene: Model, comm: MPI.Comm) -> AdaptiveLevel:
-        """Solve a scene on its own mesh, without a coarser one. Collective.
-
-        Args:
-            scene: what to solve.
-            comm: the ranks.
-
-        Raises:
-            InputError: the scene does not fit its mesh, on all ranks alike.
-        """
-        return self._begun(prepare(scene, comm, self.timer, thresholds=self.thresholds))
-
     def first_domain(self, scene: Model, comm: MPI.Comm) -> Domain:
         """The body on the mesh to begin with. Collective.
 
@@ -128,8 +116,8 @@ class AdaptiveSolver:
         with self.timer("mesh"):
             return coarsest(scene).domain.build_hierarchy(comm, scene.dimension, self.thresholds.mesh)
 
-    def begin_resolved(self, scene: Model, domain: Domain, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
-        """As :meth:`begin`, on a mesh that is refined where the data on the boundary ask for it. Collective.
+    def begin(self, scene: Model, domain: Domain, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
+        """Solve a scene on a first mesh, which is refined where the data on the boundary ask for it. Collective.
 
         Args:
             scene: what to solve.
@@ -147,9 +135,6 @@ class AdaptiveSolver:
                 break
             domain = refinement.marked(prepared.problem.domain, cells).domain
             prepared = prepare(scene, comm, self.timer, domain, thresholds=self.thresholds)
-        return self._begun(prepared)
-
-    def _begun(self, prepared: Preparation) -> AdaptiveLevel:
         found = find_solution(prepared, self.progress, self.interrupted)
         return AdaptiveLevel(prepared=prepared, solution=found.estimated(), levels=found.levels, step=None)
 

@@ -93,7 +93,7 @@ class AdaptiveRun:
         """
         self.comm, start = domain.mesh.comm, time.perf_counter()
         self.room = memory.room(self.comm) - memory.peak(self.comm)
-        level = self.solver.begin_resolved(adaptive.coarsest(self.scene), domain, self.thresholds)
+        level = self.solver.begin(adaptive.coarsest(self.scene), domain, self.thresholds)
         why = self._record(level, start)
         while why is None and not (self._known and self.steps[-1].error <= self.goal.accuracy):
             start, stopped = time.perf_counter(), self._estimated is not None and self.solver.interrupted()

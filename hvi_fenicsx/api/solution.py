@@ -26,7 +26,7 @@ from ..report.reader import Result
 from ..results import ResultFolder, gathering
 from ..results.contact_parts import contact_parts
 from ..results.output_folder import existing
-from ..results.whole import picture_process, write_whole
+from ..results.whole import begin_whole, picture_process
 from ..runtime import log
 from ..runtime.mpi import on_root
 from ..solvers.method import SolveResult
@@ -169,7 +169,7 @@ class ModelSolution(Solution):
             ResultFolder(comm, Path(folder), existing(force=force)) as target,
             picture_process(target, dimension, _LOG.warning, wanted=pictures) as process,
         ):
-            write_whole(target, self, self.timer, GIVEN, _LOG.warning, process)
+            begin_whole(target, self, self.timer, _LOG.warning, process).finish(self, GIVEN)
             target.commit(self.scene)
 
     @property

@@ -14,7 +14,7 @@ from ..equilibrium_search.found import Found, Saved, certified_in_words, counted
 from ..errors import ExitCode, NotWrittenError
 from ..report import page
 from ..report.pictures.draw import draw as draw_pictures
-from ..results.whole import made, picture_process, write_whole
+from ..results.whole import begin_whole, made, picture_process
 from ..runtime import journal
 from ..runtime.mpi import on_root, time_over
 from ..runtime.timing import Timer
@@ -161,7 +161,7 @@ def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.R
         results.ResultFolder(COMM, call.folder.work / name) as own,
         picture_process(own, call.scene.dimension, LOG.info, wanted=drawn) as pictures,
     ):
-        write_whole(own, solution, call.timer, call.given, LOG.info, pictures)
+        begin_whole(own, solution, call.timer, LOG.info, pictures).finish(solution, call.given)
         own.commit(call.scene)
     return files.row(i + 1, bodies, found.points[i], solution, name)
 

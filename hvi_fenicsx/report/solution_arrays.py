@@ -35,8 +35,6 @@ from .errors import ResultError
 Singles = npt.NDArray[np.float32]
 """Real numbers in single precision, whose seven digits are enough for a stress."""
 FILE = "solution.npz"
-_PARTS = {(1, 2): 1, (1, 3): 1, (2, 2): 4, (2, 3): 8}
-"""Parts of a cell by degree and dimension."""
 _OF_PART = {"vertices": "vertices", "facets": "facets", "weights": "weight", "normals": "normal", "drops": "drops"}
 """The attributes of a part that are no columns, by their keys."""
 _SIDE, _REGION, _LOAD, _PART = "side:", "region:", "load:", "part:"
@@ -125,9 +123,7 @@ def load(path: Path) -> SolutionArrays:
     """
     try:
         with np.load(path) as stored:
-            arrays = of_members({key: stored[key] for key in stored.files})
-        _check(arrays)
-        return arrays
+            return of_members({key: stored[key] for key in stored.files})
     except FileNotFoundError:
         raise ResultError(
             f"{path}: there is no such file; results of earlier versions do not have it: run the scene again"
@@ -163,24 +159,3 @@ def _grouped(members: Mapping[str, Any], kind: str) -> dict[str, dict[str, Any]]
 def _part(name: str, members: dict[str, Any]) -> ContactPart:
     own = {attribute: members.pop(key) for key, attribute in _OF_PART.items()}
     return ContactPart(name=name, columns=members, **own)
-
-
-def _check(arrays: SolutionArrays) -> None:
-    """Refuse arrays that do not belong together."""
-    n, parts = len(arrays.points), _PARTS[arrays.degree, arrays.points.shape[1]]
-    if len(arrays.cells) % parts:
-        raise ValueError("its cells are no parts of cells of degree 2")
-    numbers = [arrays.cells, *arrays.sides.values()]
-    numbers += [values for part in arrays.parts.values() for values in (part.vertices, part.facets)]
-    numbers += [load.vertices for load in arrays.loads.values()]
-    by_vertex = [values for values in (arrays.displacement, arrays.escape_mode) if values is not None]
-    lengths = [(n, len(values)) for values in by_vertex]
-    lengths += [(len(arrays.cells), len(arrays.von_mises))] if arrays.von_mises is not None else []
-    lengths += [(len(load.vertices), len(v)) for load in arrays.loads.values() for v in (load.traction, load.pressure)]
-    for part in arrays.parts.values():
-        lengths += [(len(part.vertices), len(v)) for v in (part.weight, part.normal, *part.columns.values())]
-    fits = [(values, n) for values in numbers] + [(cells, len(arrays.cells)) for cells in arrays.regions.values()]
-    if any(one != other for one, other in lengths) or any(
-        values.size and not 0 <= values.min() <= values.max() < count for values, count in fits
-    ):
-        raise ValueError("its arrays do not belong together")

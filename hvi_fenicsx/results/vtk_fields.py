@@ -22,7 +22,7 @@ from ..rigid import Mode
 from ..typing import Array, Entities, Integers
 from ..workflow import Solution
 from . import vtk_files
-from .vtk_files import Grid
+from .vtk_files import Entry, Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
 _STRESSES = ("stress", "von_mises", "sigma_n", "friction_t1", "friction_t2", "inclusion_distance", "traction")
@@ -91,7 +91,7 @@ def _in_parts(problem: Problem, values: npt.NDArray[Any]) -> Array:
 
 def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> None:
     """Write fields at all local nodes and, in single precision, in the parts of the owned cells. Collective."""
-    vtk_files.write(path, problem.domain.mesh.comm, _grid(problem, at_points, in_cells))
+    vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", _grid(problem, at_points, in_cells))])
 
 
 def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
@@ -129,12 +129,13 @@ def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, flo
     """
     count = len(nodes.linear_cells(problem.space))
 
-    def grids() -> Iterator[tuple[float, Grid]]:
-        for time, factor, u in states:
+    def entries() -> Iterator[Entry]:
+        for number, (time, factor, u) in enumerate(states):
             field = spaces.values(problem.space, u.x.array) * problem.scales.displacement
-            yield time, _grid(problem, {"displacement": field}, {"factor": np.full(count, factor)})
+            grid = _grid(problem, {"displacement": field}, {"factor": np.full(count, factor)})
+            yield time, 0, f"-{number:05d}", grid
 
-    vtk_files.write_series(path, problem.domain.mesh.comm, grids())
+    vtk_files.write(path, problem.domain.mesh.comm, entries())
 
 
 def _units(problem: Problem) -> dict[str, str]:
@@ -181,12 +182,12 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
         InputError: it cannot be written, on all ranks alike.
     """
     facets = np.unique(np.concatenate([state.surface.facets for state in states])).astype(np.int32)
-    first = _on_facets(problem, facets, _nodal(problem, states))
-    second = {}
+    entries: list[Entry] = [(0.0, 0, "", _on_facets(problem, facets, _nodal(problem, states)))]
     if problem.interfaces:
         facets = problem.domain.facets([interface.sides.second for interface in problem.interfaces])
-        second["second"] = _on_facets(problem, facets, {"traction": _second_tractions(problem, states)})
-    vtk_files.write(path, problem.domain.mesh.comm, first, **second)
+        second = _on_facets(problem, facets, {"traction": _second_tractions(problem, states)})
+        entries.append((0.0, 1, "-second", second))
+    vtk_files.write(path, problem.domain.mesh.comm, entries)
 
 
 def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -> Grid:

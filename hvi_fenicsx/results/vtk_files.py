@@ -47,49 +47,31 @@ class Grid:
     units: Mapping[str, str]
 
 
-def write(path: Path, comm: MPI.Comm, grid: Grid, **others: Grid) -> None:
-    """Write NAME.pvd, its NAME.pvtu, and NAME_RANK.vtu of each rank. Collective.
+Entry = tuple[float, int, str, Grid]
+"""Its time, its number among the blocks of that time, the ending of its name, and this rank's part."""
+
+
+def write(path: Path, comm: MPI.Comm, entries: Iterable[Entry]) -> None:
+    """Write NAME.pvd, and for each entry NAME-ENDING.pvtu with NAME-ENDING_RANK.vtu of each rank. Collective.
 
     Without VTK nothing is written, and a warning says so.
 
     Args:
         path: the first of them.
         comm: the ranks.
-        grid: this rank's part.
-        others: further blocks, as NAME-KEY.pvtu.
-
-    Raises:
-        NotWrittenError: a file cannot be written, on all ranks alike.
-    """
-    if _is_there(path, comm):
-        files = {path.with_suffix(".pvtu"): grid}
-        files |= {path.with_name(f"{path.stem}-{name}.pvtu"): other for name, other in others.items()}
-        for file, block in files.items():
-            _write_parallel(file, comm, block)
-        on_root(comm, lambda: _write_collection(path, [(0.0, i, file.name) for i, file in enumerate(files)]))
-
-
-def write_series(path: Path, comm: MPI.Comm, series: Iterable[tuple[float, Grid]]) -> None:
-    """Write NAME.pvd, and for each time NAME-NUMBER.pvtu with its NAME-NUMBER_RANK.vtu of each rank. Collective.
-
-    Without VTK nothing is written, and a warning says so.
-
-    Args:
-        path: the first of them.
-        comm: the ranks.
-        series: times, rising, and this rank's part at each.
+        entries: times rise.
 
     Raises:
         NotWrittenError: a file cannot be written, on all ranks alike.
     """
     if not _is_there(path, comm):
         return
-    entries = []
-    for number, (time, grid) in enumerate(series):
-        file = path.with_name(f"{path.stem}-{number:05d}.pvtu")
+    listed = []
+    for time, block, ending, grid in entries:
+        file = path.with_name(f"{path.stem}{ending}.pvtu")
         _write_parallel(file, comm, grid)
-        entries.append((time, 0, file.name))
-    on_root(comm, lambda: _write_collection(path, entries))
+        listed.append((time, block, file.name))
+    on_root(comm, lambda: _write_collection(path, listed))
 
 
 def _is_there(path: Path, comm: MPI.Comm) -> bool:

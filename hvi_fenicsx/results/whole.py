@@ -114,27 +114,6 @@ def begin_whole(
     return BegunResult(folder=folder, timer=timer, tell=tell, pictures=pictures, sigma=sigma)
 
 
-def write_whole(
-    folder: ResultFolder,
-    solution: Solution,
-    timer: Timer,
-    given: Mapping[str, Any],
-    tell: Callable[[str], None],
-    pictures: PictureProcess | None,
-) -> None:
-    """Write all files of a result but ``run.log``; arguments as of :func:`begin_whole`. Collective.
-
-    Args:
-        folder: being written.
-        solution: what was found.
-        timer: where time goes.
-        given: further entries of the summary.
-        tell: is given a line on rank 0 where pictures or page cannot be made; that does not cost the run.
-        pictures: what draws.
-    """
-    begin_whole(folder, solution, timer, tell, pictures).finish(solution, given)
-
-
 def _write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None:
     """Write the fields for ParaView and ``boundary.csv``. Collective."""
     problem, mode = solution.problem, solution.solvability.direction

@@ -139,9 +139,10 @@ def l_shape() -> Model:
 
 def slope(bulk: float, most: int, degree: int = 1) -> float:
     """Observed order in unknowns of the estimated error, over the last factor of about ten."""
-    level, points = AdaptiveSolver(timer=Timer()).begin(l_shape().with_solver(degree=degree), COMM), []
+    scene, solver, points = l_shape().with_solver(degree=degree), AdaptiveSolver(timer=Timer()), []
+    level = solver.begin(scene, solver.first_domain(scene, COMM))
     while level.dofs < most:
-        level = AdaptiveSolver(timer=Timer()).refine(level, adaptive.refined(level, bulk), level.solution.scene)
+        level = solver.refine(level, adaptive.refined(level, bulk), level.solution.scene)
         points.append((level.dofs, level.solution.estimate.relative))  # type: ignore[union-attr]
     kept = np.log([p for p in points if p[0] >= points[-1][0] / 20])
     return float(np.polyfit(kept[:, 0], kept[:, 1], 1)[0])

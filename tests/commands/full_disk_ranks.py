@@ -32,6 +32,6 @@ found = [told(room, lambda: solution.write(folder / "r", pictures=False)) for ro
 points = np.random.default_rng(0).random((3_000 if COMM.rank else 3, 3))
 cells = np.arange(len(points)).reshape(-1, 3)
 grid = vtk_files.Grid(points=points, cells=cells, at_points={}, in_cells={}, units={})
-found.append(told(2_000, lambda: vtk_files.write(folder / "piece.pvd", COMM, grid)))
+found.append(told(2_000, lambda: vtk_files.write(folder / "piece.pvd", COMM, [(0.0, 0, "", grid)])))
 if COMM.rank == 0:
     print(json.dumps(found))

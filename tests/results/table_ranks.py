@@ -19,7 +19,7 @@ from hvi_fenicsx.errors import HviError, NotWrittenError
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.pictures.draw import PictureProcess
 from hvi_fenicsx.results import ResultFolder
-from hvi_fenicsx.results.whole import begin_whole, write_whole
+from hvi_fenicsx.results.whole import begin_whole
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.workflow import Solution, finish, prepare
 
@@ -59,7 +59,7 @@ def solved(scene: Table) -> Solution:
 def written(folder: Path, scene: Table) -> dict[str, Any] | None:
     """The tables of a result; of its arrays the sums, by which numbers of vertices do not count. None but on rank 0."""
     with ResultFolder(COMM, folder) as target:
-        write_whole(target, solved(scene), Timer(), {}, print, None)
+        begin_whole(target, found := solved(scene), Timer(), print, None).finish(found, {})
         target.commit(read_tables(scene))
     if COMM.rank:
         return None
@@ -82,7 +82,7 @@ def without_room(folder: Path) -> list[Any]:
             ResultFolder(COMM, folder / "full") as target,
             room_for(1 << 10) if COMM.rank == 0 else contextlib.nullcontext(),
         ):
-            write_whole(target, solution, Timer(), {}, print, None)
+            begin_whole(target, solution, Timer(), print, None).finish(solution, {})
     except NotWrittenError as error:
         return [COMM.allgather(error.reason), sorted(file.name for file in folder.glob("*full*"))]
     raise AssertionError
