@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import sys
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -229,13 +230,9 @@ def _shown(value: object) -> str:
 
 
 def _finite(value: float | int) -> float:
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise InputError(f"must be a finite number (is {number})")
-    return number
+    if not abs(value) <= sys.float_info.max:
+        raise InputError(f"must be a finite number (is {value if isinstance(value, float) else math.inf})")
+    return float(value)
 
 
 def _parse(text: str) -> ast.expr:
@@ -268,7 +265,8 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
         case ast.Constant(value=bool()) | ast.Constant(value=complex()):
             raise InputError(f"{_source(node, text)} in {text!r} is not a real number")
         case ast.Constant(value=int() | float() as value):
-            _check_finite(value, text)
+            if not abs(value) <= sys.float_info.max:
+                raise InputError(f"a number in {text!r} is not finite")
             return
         case ast.Name(id=name):
             _check_name(name, text)
@@ -292,15 +290,6 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
             )
     for child in children:
         _check(child, text, depth + 1)
-
-
-def _check_finite(value: float, text: str) -> None:
-    try:
-        finite = math.isfinite(float(value))
-    except OverflowError:
-        finite = False
-    if not finite:
-        raise InputError(f"a number in {text!r} is not finite")
 
 
 def _check_name(name: str, text: str) -> None:

@@ -140,8 +140,8 @@ def _message(error: ErrorDetails, table: type[BaseModel]) -> str:
         return _not_among(value, context.get("expected", ""))
     if kind == "value_error":
         return str(context["error"])
-    if kind in _TEXTS:
-        return f"{_TEXTS[kind].format(**context)} (is {shown(value)}){_mend(kind, value)}"
+    if text := _TEXTS.get(kind) or _KINDS.get(kind.split("_")[0]):
+        return f"{text.format(**context)} (is {shown(value)}){_mend(kind, value)}"
     return str(error["msg"])
 
 
@@ -157,24 +157,23 @@ _TEXTS = {
     "less_than": "must be less than {lt:g}",
     "less_than_equal": "must be {le:g} or less",
     "finite_number": "must be a finite number",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "int_type": "must be a whole number",
-    "int_parsing": "must be a whole number",
-    "int_parsing_size": "must be a whole number of reasonable size",
-    "int_from_float": "must be a whole number",
-    "bool_type": "must be true or false",
-    "callable_type": "must be a function",
-    "string_type": "must be a text in quotes",
-    "tuple_type": "must be a list, as in [..., ...]",
-    "list_type": "must be a list, as in [..., ...]",
-    "dict_type": "must be a table",
-    "model_type": "must be a table",
-    "model_attributes_type": "must be a table",
     "too_long": "must have {max_length} entries, not {actual_length}",
     "too_short": "must have {min_length} entries, not {actual_length}",
     "string_too_long": "must have {max_length} characters at most",
 }
+"""Messages by pydantic's kind of error."""
+_KINDS = {
+    "float": "must be a number",
+    "int": "must be a whole number",
+    "bool": "must be true or false",
+    "callable": "must be a function",
+    "string": "must be a text in quotes",
+    "tuple": "must be a list, as in [..., ...]",
+    "list": "must be a list, as in [..., ...]",
+    "dict": "must be a table",
+    "model": "must be a table",
+}
+"""The same on a value of another kind, by the first word of pydantic's."""
 
 
 def _mend(kind: str, value: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,10 +24,8 @@ from . import equilibria_files as files
 from . import session
 from .session import COMM, LOG, Command, Session, say, tell_moving
 
-BETWEEN = 0.2
-"""Seconds between two reports of progress."""
-KEPT_EVERY = 20
-"""Keeping what a search has so far takes a part in so many of its time at most; so many reports lie between."""
+KEPT_EVERY = 10
+"""Seconds between two times at which a search keeps what it has; where that takes longer, so many times as long."""
 MOST_TOLD = 20
 """Equilibria that are told on the terminal."""
 MOST_DRAWN = 10
@@ -62,7 +61,7 @@ def _run(call: Session) -> int:
         lowest=options.lowest,
         gap=options.gap,
         stop=lambda: call.interrupted() or late(),
-        report=_reporter(),
+        report=functools.partial(tell_moving, "%s"),
         saved=saved,
         keep=kept.keep,
     )
@@ -83,7 +82,7 @@ class _StateFile:
 
     def __init__(self, call: Session) -> None:
         self._call, self._identity = call, on_root(COMM, lambda: call.identity)
-        self._next, self._broken = time.monotonic() + KEPT_EVERY * BETWEEN, False
+        self._next, self._broken = time.monotonic() + KEPT_EVERY, False
 
     def saved(self) -> Saved | None:
         """What an earlier search has left, if this one shall go on from it. Rank 0 only."""
@@ -106,7 +105,7 @@ class _StateFile:
             self._broken = True
             LOG.info("%s; a kill would lose the search", error)
         now = time.monotonic()
-        self._next = now + KEPT_EVERY * max(BETWEEN, now - began)
+        self._next = now + KEPT_EVERY * max(1.0, now - began)
 
     def write_left(self, state: Saved) -> None:
         """Write what a search that was stopped has left, as a file of the result. Rank 0 only.
@@ -116,17 +115,6 @@ class _StateFile:
         """
         if state:
             journal.replace(self._call.folder.work / JOURNAL, self._identity, [state])
-
-
-def _reporter() -> Callable[[str], None]:
-    last = [0.0]
-
-    def report(text: str) -> None:
-        if time.monotonic() - last[0] > BETWEEN:
-            last[0] = time.monotonic()
-            tell_moving("%s", text)
-
-    return report
 
 
 def _picture_and_page(folder: Path, *, draw: bool) -> None:
@@ -146,10 +134,10 @@ def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> Exi
 
 def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[files.Row]:
     """Write all equilibria, and tell how many are written; their rows. Collective."""
-    report, count = _reporter(), len(found.points)
+    count = len(found.points)
     for i in range(count):
         yield _written(call, bodies, found, i)
-        report(certified_in_words(i + 1, count))
+        tell_moving("%s", certified_in_words(i + 1, count))
 
 
 def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.Row:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, PlainSerializer, SerializationInfo, model_serializer, model_validator
+from pydantic import BeforeValidator, PlainSerializer, model_validator
 from typing_extensions import override
 
 from ..formula import Formula, SpatialValue
@@ -112,15 +112,6 @@ class Contact(Effect):
         if len(ends) == 2 and ends[0] > ends[1]:  # type: ignore[operator]
             raise refusal(f"lower = {ends[0]:g} is above upper = {ends[1]:g}; swap them")
         return self
-
-    @model_serializer(mode="plain")
-    def _as_table(self, info: SerializationInfo) -> dict[str, Any]:
-        if self.obstacle is not None:
-            return {"obstacle": self.obstacle.table(info.context)}
-        if self.gap == MEASURED:
-            return {"gap": MEASURED}
-        found = {k: f.source for k in ("gap", "lower", "upper") if (f := getattr(self, k)) is not None}
-        return found | ({"direction": list(self.direction)} if self.direction else {})
 
     @override
     def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:

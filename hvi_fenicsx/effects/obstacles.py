@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, PlainSerializer, ValidationInfo, model_validator
 from pydantic.fields import FieldInfo
 from typing_extensions import override
 
@@ -206,11 +206,6 @@ class Plane(Obstacle):
     def constant(self) -> tuple[float, ...] | None:
         return super().constant or tuple(map(float, 0.0 - unit(self.normal)))
 
-    @override
-    def table(self, context: Any = None) -> dict[str, Any]:
-        """Without the shape, which may be left out."""
-        return {key: value for key, value in super().table(context).items() if key != "shape"}
-
 
 class _Round(Obstacle):
     """All points up to a distance from a centre, or beyond it."""
@@ -333,7 +328,7 @@ def read(value: Any, info: ValidationInfo) -> Obstacle:
     return Obstacle.registry[name].model_validate(keys, context=info.context)
 
 
-ObstacleField = Annotated[Obstacle, BeforeValidator(read)]
+ObstacleField = Annotated[Obstacle, BeforeValidator(read), PlainSerializer(lambda o, info: o.table(info.context))]
 """An obstacle as a field of a scene."""
 
 
