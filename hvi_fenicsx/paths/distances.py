@@ -54,6 +54,10 @@ class Distances:
         parts = zip(self._laws, np.split(state.memory, ends), strict=True)
         return [laws if laws.memory is None else replace(laws, memory=memory) for laws, memory in parts]
 
+    def _near(self, laws: VertexLaws, x: Array) -> float:
+        """A difference of displacements that is none: beside a law's length, and as rounding of the largest one."""
+        return self._rounding * laws.law.length_scale + ROUNDING * float(np.max(np.abs(x), initial=0.0))
+
     def _largest(self, x: Array, force: Array, present: Sequence[VertexLaws]) -> float:
         """The largest distance of a force that laws and bounds should give."""
         low, high, worst = np.zeros(len(x)), np.zeros(len(x)), 0.0
@@ -62,11 +66,13 @@ class Distances:
             unknowns = bonds.unknowns
             if bonds.radial:
                 lower = problem.lower[unknowns[:, 0]] if bonds.opens else np.full(len(unknowns), -np.inf)
-                off = _off(bonds, laws, x[unknowns], force[unknowns], lower, self._rounding)
+                near = self._rounding * np.max(np.abs(x[unknowns]), axis=1) + self._near(laws, x)
+                off = _off(bonds, laws, x[unknowns], force[unknowns], lower, near)
                 worst = max(worst, float(np.max(off, initial=0.0)))
                 rest[unknowns] = 0.0
             else:
-                least, most = _interval(laws, x[unknowns[:, 0]], self._rounding)
+                at = x[unknowns[:, 0]]
+                least, most = _interval(laws, at, self._rounding * np.abs(at) + self._near(laws, x))
                 np.add.at(low, unknowns[:, 0], least)
                 np.add.at(high, unknowns[:, 0], most)
         allowed = self._rounding * float(np.max(np.abs(x), initial=0.0))
@@ -76,32 +82,30 @@ class Distances:
         return max(worst, float(np.max(away, initial=0.0)))
 
 
-def _interval(laws: VertexLaws, x: Array, rounding: float) -> tuple[Array, Array]:
+def _interval(laws: VertexLaws, x: Array, near: Array) -> tuple[Array, Array]:
     """The least and the greatest forces at coordinates, but for their rounding, (r,) each."""
-    near = rounding * (np.abs(x) + laws.law.length_scale)
     ends = laws.traction(x - near, "left"), laws.traction(x + near, "right")
     return laws.weights * np.minimum(*ends), laws.weights * np.maximum(*ends)
 
 
-def _off(bonds: Bonds, laws: VertexLaws, u: Array, force: Array, lower: Array, rounding: float) -> Array:
+def _off(bonds: Bonds, laws: VertexLaws, u: Array, force: Array, lower: Array, near: Array) -> Array:
     """How far forces are from those that a law on a length gives: along u, of a size of its graph, (r,).
 
     An opening that is not positive has none, but for what its bound pushes.
     """
-    near = rounding * (np.max(np.abs(u), axis=1) + laws.law.length_scale)
     pushed = np.zeros(len(u))
     if bonds.opens:
         shut, pressed = u[:, 0] <= near, u[:, 0] <= lower + near
         pushed[shut & ~pressed] = np.maximum(-force[shut & ~pressed, 0], 0.0)
         force[shut, 0], u[shut, 0] = np.maximum(force[shut, 0], 0.0), 0.0
     length = np.linalg.norm(u, axis=1)
-    least, most = (_energies(bonds, u) * end for end in _interval(laws, length, rounding))
+    least, most = (_energies(bonds, u) * end for end in _interval(laws, length, near))
     at_rest = np.maximum(np.linalg.norm(force, axis=1) - np.maximum(np.abs(least), np.abs(most)), 0.0)
     directions = np.divide(u, length[:, None], out=np.zeros_like(u), where=length[:, None] > 0.0)
     along = np.sum(force * directions, axis=1)
     across = np.linalg.norm(force - along[:, None] * directions, axis=1)
     moved = np.maximum(np.maximum(least - along, along - most), 0.0) + across
-    return np.asarray(np.where(length <= rounding * laws.law.length_scale, at_rest, moved) + pushed)
+    return np.asarray(np.where(length <= near, at_rest, moved) + pushed)
 
 
 def _energies(bonds: Bonds, u: Array) -> Array:

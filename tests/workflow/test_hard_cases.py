@@ -181,7 +181,6 @@ def test_a_path_that_found_no_step_short_enough_reaches_its_end(key: str) -> Non
     assert record["outcome"] == "certified", record
 
 
-@pytest.mark.xfail(reason="5 of 128 rows of the path are not certified")
 def test_a_slender_body_that_slides_under_its_limit_load_meets_nothing_far_off() -> None:
     """Rounding of its motion opened gaps after 1e10 of its slip; the path went there, and back to smaller loads."""
     wide = Table.read(BENCHMARKS / "hard_wide.toml")
