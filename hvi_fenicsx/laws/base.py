@@ -82,14 +82,9 @@ class Superpotential(SplitLaw):
     def peak(self) -> Directional:
         """The largest resistance: Clarke's derivative j⁰(x; ±1) at its supremum over x, N/m².
 
-        Unless a law overrides it, a bound from above, sharp to a relative 1e-6. So are c3 and c4.
+        Unless a law overrides it, a bound from above, sharp to a relative 1e-6. So is c4.
         """
         return Directional(self._extremes.peak_minus, self._extremes.peak_plus)
-
-    @property
-    def c3(self) -> float:
-        """Growth condition (i) of Ovcharova and Gwinner, section 4: |η| ≤ c3 (1 + |x|) for η ∈ ∂j(x)."""
-        return self._extremes.c3
 
     @property
     def c4(self) -> float:

@@ -164,15 +164,13 @@ class PolylineLaw(Superpotential):
 
     @cached_property
     def _extremes(self) -> Extremes:
-        """c3 and c4 in closed form: on each piece both quotients are monotone between their zeros."""
+        """In closed form: on each piece the traction is monotone."""
         g = self.graph
-        sizes = np.maximum(np.abs(g.left), np.abs(g.right)) / (1.0 + np.abs(g.breaks))
         ahead = np.append(g.left[g.zero + 1 :], g.right[g.zero :])
         behind = np.append(g.left[: g.zero + 1], g.right[: g.zero])
         return Extremes(
             self.peak.minus,
             self.peak.plus,
-            c3=float(max(sizes.max(), abs(g.slopes[0]), abs(g.slopes[-1]))),
             c4=float(max(0.0, np.max(-ahead), -self.growth.plus, np.max(behind), -self.growth.minus)),
         )
 

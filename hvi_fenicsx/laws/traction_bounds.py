@@ -47,18 +47,16 @@ _Objective = Callable[[Array, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Extremes:
-    """Upper bounds of the largest resistances and of the paper's growth constants.
+    """Upper bounds of the largest resistances and of the paper's growth constant.
 
     Attributes:
         peak_minus: of the resistance in the direction -1.
         peak_plus: of the resistance in the direction +1.
-        c3: of the constant of growth condition (i).
-        c4: of the constant of growth condition (ii).
+        c4: of the constant of the paper's growth condition (ii).
     """
 
     peak_minus: float
     peak_plus: float
-    c3: float
     c4: float
 
 
@@ -79,7 +77,6 @@ def extremes(law: SplitLaw, thresholds: LawThresholds = DEFAULT) -> Extremes:
     return Extremes(
         peak_minus=max(law.growth.minus, supremum(both, lambda lo, hi, r: -lo)),
         peak_plus=max(law.growth.plus, supremum(both, lambda lo, hi, r: hi)),
-        c3=supremum(both, lambda lo, hi, r: np.maximum(np.abs(lo), np.abs(hi)) / (1.0 + r)),
         c4=max(
             0.0,
             supremum(right, lambda lo, hi, r: np.where(r > 0, -lo, 0.0)),

@@ -67,7 +67,7 @@ class WeakeningLaw(Superpotential):
     def _extremes(self) -> Extremes:
         # |traction| falls with |x|: it is largest at the onset of slip, and never acts along the slip.
         peak = self.peak_traction
-        return Extremes(peak, peak, c3=peak, c4=0.0)
+        return Extremes(peak, peak, c4=0.0)
 
     @override
     @property

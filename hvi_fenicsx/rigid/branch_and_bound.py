@@ -82,7 +82,7 @@ class ConcavePart:
             y: the motion, (k,).
             depth: how often the cone was divided before.
         """
-        limit, slip = self.programme.thresholds.inside, self.basis @ y
+        limit, slip = self.programme.thresholds.dropped, self.basis @ y
         shares = np.linalg.solve(edges, slip)
         inner = np.flatnonzero(shares > limit * np.abs(shares).max(initial=0.0))
         if depth % 3 == 2 or len(inner) < 2:

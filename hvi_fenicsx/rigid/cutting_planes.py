@@ -180,32 +180,6 @@ class Minimum:
 
 
 @dataclass
-class GapHistory:
-    """The gaps between value and bound: is the last one small, or at least small enough and stuck in rounding?
-
-    Attributes:
-        scale: the size of the works that are compared.
-        thresholds: what is small.
-        best: the smallest gap.
-        stalled: linear programmes since it fell.
-    """
-
-    scale: float
-    thresholds: RigidThresholds
-    best: float = np.inf
-    stalled: int = 0
-
-    def done(self, gap: float) -> bool:
-        """Whether the search may end at this gap. To be asked once for each linear programme."""
-        limits = self.thresholds
-        self.stalled = 0 if gap < limits.shrunk * self.best else self.stalled + 1
-        self.best = min(self.best, gap)
-        if gap <= limits.tight_gap * self.scale:
-            return True
-        return self.stalled >= limits.patience and gap <= limits.rounding * self.scale
-
-
-@dataclass
 class CuttingPlanes:
     """The motions with rigid coefficients frame @ y, their slip integrals, and the cuts found so far.
 
@@ -257,8 +231,9 @@ class CuttingPlanes:
             SolverError: the gap between value and bound does not close.
         """
         best = Minimum(np.inf, np.zeros(self.frame.shape[1]), -np.inf)
-        active, progress = _seeds(f.cone), GapHistory(self.scale, self.thresholds)
-        for _ in range(self.thresholds.max_rounds):
+        limits, active = self.thresholds, _seeds(f.cone)
+        smallest, stalled = np.inf, 0
+        for _ in range(limits.max_rounds):
             found = self._solve(f, region, active)
             if found is None or found.lower > give_up:
                 return None
@@ -266,12 +241,13 @@ class CuttingPlanes:
                 value = self.evaluate(f, found.y)
                 best = Minimum(value, found.y, found.lower) if value < best.value else best
             gap = best.value - found.lower
-            if best.value < aim or (np.isfinite(gap) and gap <= enough) or progress.done(gap):
+            stalled = 0 if gap < limits.shrunk * smallest else stalled + 1
+            smallest = min(smallest, gap)
+            tight = limits.rounding if stalled >= limits.patience else limits.tight_gap
+            if best.value < aim or (np.isfinite(gap) and gap <= max(enough, tight * self.scale)):
                 return replace(best, lower=found.lower)
             self._cut_towards(found.y, best.y)
-        raise SolverError(
-            f"rigid motions: {self.thresholds.max_rounds} cutting planes left a gap of {progress.best:.1e}"
-        )
+        raise SolverError(f"rigid motions: {limits.max_rounds} cutting planes left a gap of {smallest:.1e}")
 
     def _cut(self, y: Array) -> None:
         for integral, cuts in zip(self.integrals, self.cuts, strict=True):

@@ -157,7 +157,7 @@ class _CutModel:
         room = self.sides.limits - self.sides.rows @ a
         touching = np.flatnonzero(room <= self.thresholds.touching * self.size)
         first = touching[np.argsort(-reactions[touching], kind="stable")]
-        return RestingPosition(a, _independent(self.sides.rows, first, self.thresholds.independent))
+        return RestingPosition(a, _independent(self.sides.rows, first, self.thresholds.touching))
 
 
 def least_energy(

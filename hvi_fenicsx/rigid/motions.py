@@ -342,7 +342,7 @@ def _condition_rows(part: FixedDirections, body: Movable) -> Array:
     return np.asarray(np.einsum("kd,knd->kn", part.directions, fields_at(part.points, body)))
 
 
-NEGLIGIBLE = 1e-9
+NEGLIGIBLE = DEFAULT.rounding
 """A coefficient this small beside the largest is not named."""
 AXES = "xyz"
 

@@ -19,17 +19,16 @@ class RigidThresholds:
         exact: the same where rows have unit length and nothing was summed up: a row that constrains no motion, the
             violation of one, an energy above the least one.
         dropped: coefficients of at most this size may be left out of the motion that is named; the largest is tried
-            first, then its tenths.
+            first, then its tenths. So small a share of an edge of a cone of slips, relative to the largest, is none.
         max_rounds: linear programmes for one minimum; friction in 3D needs about 40.
         tight_gap: gap between value and lower bound, over the scale, that ends the search.
         patience: linear programmes without a smaller gap after which it counts as shrinking no more.
         shrunk: what a gap must fall to, of the last smallest, to count as smaller.
-        touching: distance from its bound, over the largest bound, at which a vertex rests on it.
-        independent: part of a support's row that must not be spanned by others.
+        touching: distance from its bound, over the largest bound, at which a vertex rests on it; part of a support's
+            row that must not be spanned by others.
         farthest: a displacement of so many times p0 L / E0 is a body that slides away.
         max_cones: divisions of a cone of slips for one minimum, where a growth is not convex.
         part_of_gap: how exactly the bound on such a cone is computed, relative to the gap that is left in all.
-        inside: share of an edge of such a cone, relative to the largest, from which a slip is inside of the cone.
     """
 
     rounding: float = 1e-9
@@ -40,11 +39,9 @@ class RigidThresholds:
     patience: int = 4
     shrunk: float = 0.9
     touching: float = 1e-7
-    independent: float = 1e-6
     farthest: float = 1e8
     max_cones: int = 2_000
     part_of_gap: float = 0.1
-    inside: float = 1e-3
 
     def dropped_sizes(self) -> list[float]:
         """The sizes up to which coefficients may be left out, the largest first; all are above rounding."""

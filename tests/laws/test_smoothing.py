@@ -162,7 +162,6 @@ def test_bounds_of_the_smoothed_law_hold(law: Superpotential, plus: PlusFunction
     assert smooth.growth == law.scaled(law.length_scale, 1.0).growth
     assert slope.max() <= smooth.peak.plus + slack
     assert -slope.min() <= smooth.peak.minus + slack
-    assert np.all(np.abs(slope) <= smooth.c3 * (1 + np.abs(x)) + slack)
     assert np.all(-slope * x <= smooth.c4 * np.abs(x) + slack * np.abs(x))
     if np.isfinite(smooth.peak.plus):
         assert smooth.peak.plus <= max(slope.max(), smooth.growth.plus) * 1.05 + slack

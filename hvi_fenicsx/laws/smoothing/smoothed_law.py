@@ -234,7 +234,7 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
     """A law smoothed at its kinks by one plus function, with ε (N/m) the same for every kink.
 
     An even law stays even, with traction exactly 0 at zero slip; a kink at zero slip is smoothed like any.
-    The scales are those of the law. `peak`, `c3`, `c4` are bounds from above, sharp to a relative 1e-6.
+    The scales are those of the law. `peak` and `c4` are bounds from above, sharp to a relative 1e-6.
     """
 
     name = "smoothed"
