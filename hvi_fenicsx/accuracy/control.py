@@ -16,8 +16,7 @@ from ..runtime import memory
 from ..runtime.mpi import largest
 from . import adaptive, quantities
 from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, ControlThresholds
-from .error_balance import Elements, ErrorBalance
-from .goal import AccuracyResult, AdaptiveStep, Goal
+from .goal import AccuracyResult, AdaptiveStep, Elements, ErrorBalance, Goal
 
 _INTERRUPTED = "interrupted"
 _LARGEST = 2**31 - 1

@@ -16,8 +16,7 @@ from mpi4py import MPI
 from .. import console, results
 from ..model import Model, dump_scene, read_scene
 from ..report.page import NAME as PAGE
-from ..results.folder import inputs_of, read_finished
-from ..results.output_folder import existing
+from ..results.output_folder import existing, inputs_of, read_finished
 from ..runtime import log, terminal
 from ..runtime.mpi import Interrupt, on_root
 from ..runtime.timing import Timer

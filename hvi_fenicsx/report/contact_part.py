@@ -10,8 +10,8 @@ import numpy as np
 from .. import geometry
 from ..typing import Array, Integers, Mask
 
-_CARRIES_NOTHING = 1e-6
-"""A pressure so small beside the largest is none."""
+NOTHING = 1e-6
+"""A pressure, or a length, so small beside the largest is none."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -110,7 +110,7 @@ class ContactPart:
     def idle(self) -> Mask:
         """Vertices that are lifted and carry nothing, (m,); where something adheres, a lifted one may."""
         stress = np.nan_to_num(np.abs(self["sigma_n"]))
-        return self.lifted & (stress <= _CARRIES_NOTHING * stress.max(initial=0.0))
+        return self.lifted & (stress <= NOTHING * stress.max(initial=0.0))
 
     @property
     def branch(self) -> Integers | None:

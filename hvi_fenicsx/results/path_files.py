@@ -21,7 +21,7 @@ from ..runtime.mpi import on_root
 from ..workflow import unsolved
 from . import tables, vtk_fields
 from .contact_parts import contact_parts
-from .folder import ResultFolder
+from .output_folder import ResultFolder
 from .summary import plain, summary
 from .whole import made, write_record
 

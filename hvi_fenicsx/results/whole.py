@@ -20,7 +20,7 @@ from ..runtime.timing import Timer
 from ..typing import Array
 from ..workflow import Solution
 from . import gathering, tables, vtk_fields
-from .folder import ResultFolder
+from .output_folder import ResultFolder
 from .summary import summary
 
 _PATIENCE = 120.0

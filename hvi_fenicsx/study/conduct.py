@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from ..report import page
 from ..report.errors import ReportError
-from ..results.folder import ResultFolder
+from ..results import ResultFolder
 from ..results.output_folder import Existing
 from ..runtime import writing
 from ..runtime.manifest import MARKS

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hvi_fenicsx.report.body_mesh import BodyMesh
-from hvi_fenicsx.report.pictures.flat_parts import laid_flat
+from hvi_fenicsx.report.pictures.contact import laid_flat
 from hvi_fenicsx.typing import Array, Integers, Mask
 
 RADIUS, HEIGHT, AROUND = 0.5, 1.2, 24

@@ -18,6 +18,7 @@ from matplotlib.tri import Triangulation
 from ...geometry import chains
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
+from ..contact_part import NOTHING
 from ..units import quantity
 from .canvas import Canvas, Label
 from .shape import ARROW, DeformedBody, PartGeometry
@@ -26,8 +27,6 @@ from .style import BLUE, GREY, INK, ORANGE, PURPLE, VERMILION
 
 LEGIBLE = 5000
 """Cells up to which their edges are drawn, in a square body."""
-_NOTHING = 1e-6
-"""So small a part of the largest stress, or of the body's size, is none."""
 _HALO = [withStroke(linewidth=3.2, foreground="white")]
 _ALONG: dict[str, Any] = {"clip_on": False, "solid_capstyle": "butt"}
 
@@ -111,7 +110,7 @@ class PlaneCanvas(Canvas):
             at = _spread(line, amount, size, apart=ARROW * size * (1.4 if beside else 0.25), long=ARROW * size * beside)
             arrows = _at(line, load.traction[:, :2], at) * float(ARROW * size / load.largest)
             feet, outward = _at(line, line, at), _at(line, load.side.normals[:, :2], at)
-            pushed = np.einsum("ki,ki->k", arrows, outward) < -_NOTHING * size
+            pushed = np.einsum("ki,ki->k", arrows, outward) < -NOTHING * size
             off = ARROW / 4 * size * outward - arrows / 2 if beside else np.where(pushed[:, None], -arrows, 0.0)
             self._arrows(feet + off, arrows, INK)
             ends, middle = np.concatenate([feet + off, feet + off + arrows]), len(at) // 2
@@ -151,7 +150,7 @@ class PlaneCanvas(Canvas):
         kinds = (1, VERMILION, "contact pressure"), (-1, PURPLE, "contact tension")
         for sign, colour, words in kinds:
             values = np.maximum(sign * np.nan_to_num(part.pressure[rows]), 0.0) / (float(np.abs(stress).max()) or 1.0)
-            if values.max() > _NOTHING:
+            if values.max() > NOTHING:
                 self._profile(base, outward, values, shape.body.size, sign, colour)
                 most = quantity(float((sign * stress).max()), "Pa")
                 self.key(Patch(fc=colour, alpha=0.5, ec=colour, label=f"{words}, up to {most}"))
@@ -165,7 +164,7 @@ class PlaneCanvas(Canvas):
         """Values along a line as an area beside it, with arrows onto the line; from it where the sign is negative."""
         tips = base + ARROW * size * values[:, None] * outward
         self.axes.add_patch(Polygon(np.concatenate([base, tips[::-1]]), color=colour, alpha=0.16, lw=0, clip_on=False))
-        shown = np.where(np.convolve(values > _NOTHING, [1, 1, 1])[1:-1, None] > 0, tips, np.nan)
+        shown = np.where(np.convolve(values > NOTHING, [1, 1, 1])[1:-1, None] > 0, tips, np.nan)
         self.axes.plot(*shown.T, color=colour, lw=1.8, zorder=5, path_effects=_HALO, clip_on=False)
         at = _spread(base, values, size, fewest=5)
         feet, ends = _at(base, base, at), _at(base, tips, at)

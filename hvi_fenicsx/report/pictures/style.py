@@ -22,6 +22,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from ...runtime import writing
+from ..contact_part import NOTHING
 from ..page import CAPTION
 from ..reader import Result
 from ..units import thousands
@@ -78,7 +79,7 @@ def pressure_scale(lowest: float, largest: float) -> tuple[LinearSegmentedColorm
     Returns:
         The colours, and the values at their ends, N/m².
     """
-    if lowest < -1e-6 * largest:
+    if lowest < -NOTHING * largest:
         return shades(PURPLE, "#fdfaf7", VERMILION), -largest, largest
     return shades("#fdf3ec", VERMILION), 0.0, largest
 
