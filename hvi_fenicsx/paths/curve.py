@@ -16,11 +16,13 @@ from contextlib import suppress
 import numpy as np
 from typing_extensions import override
 
+from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .branch import Branch, Move, Outcome, Passage, Refused
 from .equations import Place
 from .events import Arc, Events, displacement_rate, driven_work
 from .passages import Crossing
+from .pivoting import StraightBranch
 from .relations import ContactPoints
 from .state import Position
 
@@ -307,3 +309,28 @@ class Curve(Events):
             agreed = max(agreed, self.length)
         self.length = min(self._next, agreed)
         return move
+
+
+def branch_from(
+    points: ContactPoints,
+    constant: Array,
+    rate: Array,
+    z: Array,
+    factor: float,
+    inverse: CellInverse | None = None,
+    heading: int = 1,
+) -> Branch:
+    """The branch from a state on: exactly from event to event, or by predictor and corrector where graphs are curved.
+
+    Args:
+        points: where all points are; changed.
+        constant: the load at the factor 0, (n,).
+        rate: how it grows with the factor, (n,).
+        z: their coordinates, (n,).
+        factor: λ.
+        inverse: of the straight equations, where it is known.
+        heading: the direction in which the factor of a straight branch sets out, 1 or -1.
+    """
+    if points.straight:
+        return StraightBranch(points, constant, rate, z, factor, inverse=inverse, heading=heading)
+    return Curve(constant, rate, points, z.copy(), factor)

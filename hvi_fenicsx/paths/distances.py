@@ -13,8 +13,8 @@ from ..typing import Array
 from .relations import ContactPoints
 from .state import PathState
 from .straight_state import StraightState, coordinates_at
-from .substitutions import factors, multiplied
 from .thresholds import DEFAULT, ROUNDING
+from .vertex_laws import factors, multiplied
 
 
 class Distances:

@@ -67,7 +67,10 @@ class EnergyBalance:
     ) -> None:
         self._problem, self._points, self.work = problem, points, work
         self._size = sum(float(b.weights.sum()) * b.law.energy_scale for b in problem.bonds)
-        self._bonds = BondEnergies(problem, points)
+        remember = {law.group for law in points.vertices if law.laws.memory is not None}
+        self._numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
+        self._laws = [[law for law in points.vertices if law.group == n] for n in self._numbers]
+        self._at: list[Integers] = [points.point_of[[law.unknowns[0] for law in laws]] for laws in self._laws]
         self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
         self.stored = self.at(values, factor)
 
@@ -81,8 +84,8 @@ class EnergyBalance:
         problem, x = self._problem, values.x
         elastic, load = 0.5 * float(x @ (problem.elastic @ x)), float(problem.load(factor) @ x)
         constant = problem.constant_at(factor)
-        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._bonds.numbers)
-        back, lost, scales = self._bonds(values)
+        plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._numbers)
+        back, lost, scales = self._of_bonds(values)
         all_lost = float(scales @ lost)
         return Stored(
             energy=elastic - load + constant + plain + back,
@@ -150,31 +153,8 @@ class EnergyBalance:
         before, after = arc.before.values.x, arc.after.values.x
         return 0.5 * float((before + after) @ (self._problem.stiffness @ (after - before)))
 
-
-class BondEnergies:
-    """The energies of the bonds with memory, and of those whose energy depends on the mode.
-
-    Args:
-        problem: the problem.
-        points: its points.
-
-    Attributes:
-        numbers: of these among the problem's bonds.
-    """
-
-    def __init__(self, problem: CondensedProblem, points: ContactPoints) -> None:
-        self._points = points
-        remember = {law.group for law in points.vertices if law.laws.memory is not None}
-        self.numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
-        self._laws = [[law for law in points.vertices if law.group == n] for n in self.numbers]
-        self._at: list[Integers] = [points.point_of[[law.unknowns[0] for law in laws]] for laws in self._laws]
-
-    def __call__(self, values: Values) -> tuple[float, Array, Array]:
-        """What they give back, what each has lost for 1 at its mode, and the scales by mode, (b,).
-
-        Args:
-            values: of the points.
-        """
+    def _of_bonds(self, values: Values) -> tuple[float, Array, Array]:
+        """What bonds give back, what each has lost for 1 at its mode, and the scales by mode, (b,)."""
         back, lost, scales = 0.0, [np.zeros(0)], [np.zeros(0)]
         for vertices, at in zip(self._laws, self._at, strict=True):
             x, scale, laws = values.lengths[at], values.energies[at], vertices[0].laws

@@ -20,7 +20,7 @@ from .pivoting import StraightBranch
 from .relations import ContactPoints
 from .state import End, Event, Follow, PathOptions, PathState, Place, Stopped, place_of
 from .straight_state import coordinates_at
-from .substitutions import factors, multiplied
+from .vertex_laws import factors, multiplied
 
 
 class Follower(LoadHistory):

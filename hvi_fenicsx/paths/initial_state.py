@@ -14,7 +14,7 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .branch import Outcome, Refused, advancing
-from .branching import branch_from
+from .curve import branch_from
 from .motion import Relaxation
 from .relations import ContactPoints
 from .segments import Kind, Segment

@@ -20,7 +20,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .branch import Branch, Outcome, Refused, advancing
-from .branching import branch_from
+from .curve import branch_from
 from .motion import Relaxation
 from .relations import ContactPoints
 

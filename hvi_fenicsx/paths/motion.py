@@ -17,8 +17,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CondensedStiffness, DenseStiffness
 from ..typing import Array
 from .branch import Branch, Outcome, Refused
-from .branching import branch_from
-from .curve import Curve
+from .curve import Curve, branch_from
 from .relations import ContactPoints
 
 

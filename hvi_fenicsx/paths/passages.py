@@ -11,29 +11,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from ..typing import Array, Mask
+from ..typing import Array
 from .branch import Move, Outcome, Passage, Refused
 from .equations import CurveEquations
 from .segments import piece_at
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Approach:
-    """Which points come to ends of their segments along the present direction.
-
-    Attributes:
-        rates: how fast the points go, (m,).
-        near: which of them are at an end, (m,).
-        comes: which of them are at an end that they approach, or turn back, (m,).
-    """
-
-    rates: Array
-    near: Mask
-    comes: Mask
 
 
 class Crossing:
@@ -73,14 +57,11 @@ class Crossing:
             self._pass_arrived(move.point, turned=move.outcome is Outcome.TURNED)
         for _ in range(50 + 20 * len(self._points)):
             self._check()
-            approach = self._approach()
-            ways = self._ways(approach)
-            k = int(np.argmin(ways)) if len(ways) else 0
-            if not len(ways) or not np.isfinite(ways[k]):
+            rates = self._rates()
+            k = self._next(rates)
+            if k is None:
                 return self.passages
-            self._go(approach, float(ways[k]))
-            self._left[k] = 0.0
-            self._pass(k, approach.rates)
+            self._pass(k, rates)
             self._count()
         raise Refused
 
@@ -120,26 +101,25 @@ class Crossing:
         rates[self._rests] = 0.0
         return rates
 
-    def _approach(self) -> _Approach:
-        points, values, rates = self._points, self._curve.here.values, self._rates()
+    def _next(self, rates: Array) -> int | None:
+        """The point that comes to its end first on a way of the order ε, or turns back; all go there. None: none does.
+
+        Args:
+            rates: how fast the points go, (m,).
+        """
+        points, values, speeds = self._points, self._curve.here.values, np.abs(rates)
         allowed = points.allowances(values, rates, float(np.max(np.abs(self._curve.here.tangent))))
         low, high = values.s <= points.low + allowed, values.s >= points.high - allowed
         comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | points.turning_back(values, rates)
-        return _Approach(rates=rates, near=low | high, comes=comes)
-
-    def _ways(self, approach: _Approach) -> Array:
-        """The ways to the ends that the points approach; infinite where they approach none, (m,)."""
-        comes = approach.comes
-        found = np.full(len(comes), np.inf)
-        found[comes] = self._left[comes] / np.abs(approach.rates[comes])
-        return found
-
-    def _go(self, approach: _Approach, way: float) -> None:
-        """A way of the order ε along the present direction."""
-        comes, change = approach.comes, way * np.abs(approach.rates)
-        loads = approach.rates * self._points.outward > 0.0
-        self._left = np.where(comes, self._left - change, self._left + np.where(approach.near, change, 0.0))
+        if not np.any(comes):
+            return None
+        ways = np.divide(self._left, speeds, out=np.full(len(comes), np.inf), where=comes)
+        k = int(np.argmin(ways))
+        change, loads = ways[k] * speeds, rates * points.outward > 0.0
+        self._left = np.where(comes, self._left - change, self._left + np.where(low | high, change, 0.0))
         self._left = np.where(loads & ~comes, self._lag, np.maximum(self._left, 0.0))
+        self._left[k] = 0.0
+        return k
 
     def _pass(self, k: int, rates: Array) -> None:
         """Into the next segment, and on in the same direction along the graph."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..laws import Superpotential, TractionGraph, VertexLaws
 from ..reduced.condensed_problem import Bonds, CondensedProblem
+from ..reduced.condensed_stiffness import DenseStiffness
 from ..typing import Array
 from .thresholds import ROUNDING
 
@@ -210,3 +211,38 @@ def shares(laws: Sequence[VertexLaw], x: float, force: float) -> list[float]:
     jump = float(weights @ (right - left))
     share = 0.0 if jump == 0.0 else min(max((force - float(weights @ left)) / jump, 0.0), 1.0)
     return [float(t) for t in left + share * (right - left)]
+
+
+def factors(problem: CondensedProblem) -> Array:
+    """What the unknowns are multiplied by, (n,); 1 where no law acts on a length.
+
+    Args:
+        problem: the problem.
+    """
+    found = np.ones(problem.size)
+    for bonds in problem.bonds:
+        if bonds.radial:
+            found[bonds.unknowns] = bonds.signs
+    return found
+
+
+def multiplied(problem: CondensedProblem, factors: Array) -> CondensedProblem:
+    """The problem in unknowns that are multiplied.
+
+    Args:
+        problem: the problem.
+        factors: by unknown, positive or negative, (n,).
+    """
+    if np.all(factors == 1.0) and is_straight(problem):
+        return problem
+    ends = np.sort(np.stack([problem.lower * factors, problem.upper * factors]), axis=0)
+    return replace(
+        problem,
+        elastic=DenseStiffness(problem.stiffness / np.outer(factors, factors)),
+        force=problem.force / factors,
+        force_rate=problem.force_rate / factors,
+        lower=ends[0],
+        upper=ends[1],
+        applied=problem.applied / factors,
+        bonds=tuple(replace(b, signs=b.signs / factors[b.unknowns]) for b in problem.bonds),
+    )

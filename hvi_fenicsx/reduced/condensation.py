@@ -170,15 +170,6 @@ class Condensation:
         constants[:, 1] += rows.T @ self._shift
         return constants, np.asarray(rows.T)
 
-    def values(self, x: Array, factor: float = 1.0) -> Array:
-        """The displacements of all unknowns of Γc that the body keeps, (n of the interior,).
-
-        Args:
-            x: the condensed unknowns, (n,).
-            factor: λ.
-        """
-        return self._elimination.completed(x + factor * self._shift, self._force @ np.array([1.0, factor]))
-
     def expand(self, x: Array, factor: float = 1.0) -> PETSc.Vec:
         """The unknowns of the whole body in equilibrium with condensed ones. Collective.
 
@@ -187,8 +178,9 @@ class Condensation:
             factor: λ.
         """
         found = self._system.load.duplicate()
-        right = self._loading.lifted @ np.array([1.0, factor])
-        found.array[:] = self._interior.expand(self.values(x, factor), right)
+        weights = np.array([1.0, factor])
+        kept = self._elimination.completed(x + factor * self._shift, self._force @ weights)
+        found.array[:] = self._interior.expand(kept, self._loading.lifted @ weights)
         return found
 
     def displacement(self, x: Array, factor: float = 1.0) -> fem.Function:
