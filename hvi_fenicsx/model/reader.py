@@ -233,14 +233,15 @@ KEYS = tuple(_SceneTables.model_fields)
 
 def _scene_tables() -> type[_SceneTables]:
     """The tables of a scene file with all effects that are registered now."""
-    materials = dict[str, Annotated[Effect, BeforeValidator(_material)]]
+    by_name: Any = dict
     body, elastic = BodyTable.with_effects(), Effect.registry[Place.MATERIAL].values()
     of_material = [*MaterialTable.model_fields, *(key for kind in elastic for key in kind.model_fields)]
+    material = Annotated[Effect, BeforeValidator(_material)]
     fields: dict[str, Any] = {
-        "material": (Annotated[materials, _named(of_material)], ...),
-        "body": (Annotated[dict[str, body], _named(body.model_fields)], {}),  # type: ignore[valid-type]
-        "boundary": (dict[str, BoundaryTable.with_effects()], {}),  # type: ignore[misc]
-        "interface": (dict[str, InterfaceTable.with_effects()], {}),  # type: ignore[misc]
+        "material": (Annotated[by_name[str, material], _named(of_material)], ...),
+        "body": (Annotated[by_name[str, body], _named(body.model_fields)], {}),
+        "boundary": (by_name[str, BoundaryTable.with_effects()], {}),
+        "interface": (by_name[str, InterfaceTable.with_effects()], {}),
     }
     return create_model("SceneTables", __base__=_SceneTables, **fields)
 
