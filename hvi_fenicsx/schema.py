@@ -385,3 +385,32 @@ def _written(path: Path, info: SerializationInfo) -> str:
 
 ExistingFile = Annotated[Path, BeforeValidator(_existing), PlainSerializer(_written)]
 """A file that exists, absolute; its context has the folder that its name is relative to."""
+
+
+def require_kind(name: str, given: Any, kinds: tuple[type, ...], wanted: str) -> None:
+    """Refuse anything but a value of some kinds; a boolean is no number.
+
+    Args:
+        name: of the argument.
+        given: what the user gave.
+        kinds: those that are allowed.
+        wanted: the same in words.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if isinstance(given, bool) or not isinstance(given, kinds):
+        raise InputError(f"{name}: must be {wanted} (is {given!r})")
+
+
+def require_path(name: str, given: Any) -> None:
+    """Refuse anything but a path.
+
+    Args:
+        name: of the argument.
+        given: what the user gave.
+
+    Raises:
+        InputError: it is something else.
+    """
+    require_kind(name, given, (str, os.PathLike), "a path, as a text or a pathlib.Path")

@@ -3,5 +3,5 @@
 from .following import ModelPath, follow
 from .solution import ModelSolution as Solution
 from .solving import check, solve
-from .stationary import Equilibria, equilibria
+from .stationary import ModelEquilibria, equilibria
 from .studying import study

@@ -18,13 +18,12 @@ from .. import console
 from ..errors import InputError
 from ..load_paths.following import Control, PathRun
 from ..model import Model, PathTable, SolverTable
-from ..model.argument_checks import require_path
 from ..paths.load_path import LoadPath
 from ..report.reader import PathResult
 from ..results import ResultFolder, path_files
 from ..results.output_folder import existing
 from ..runtime import log
-from ..schema import unknown
+from ..schema import require_path, unknown
 from ..typing import Array
 from .solution import GIVEN, displacement
 from .solving import check, fields_of

@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from .. import console
 from ..certify.certificate import Examination
 from ..errors import InputError
-from ..model.argument_checks import require_kind, require_path
 from ..problem import spaces
 from ..problem.scaling import Scales
 from ..problem.stress import cell_stress, space_of_stress
@@ -29,6 +28,7 @@ from ..results.output_folder import existing
 from ..results.whole import begin_whole, picture_process
 from ..runtime import log
 from ..runtime.mpi import on_root
+from ..schema import require_kind, require_path
 from ..solvers.method import SolveResult
 from ..typing import Array
 from ..workflow import Solution

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -14,14 +14,19 @@ from ..errors import InputError
 from ..load_paths import last_borne
 from ..mesh.domain import Domain
 from ..model import Model, is_portable
-from ..model.argument_checks import require_switch
 from ..paths.load_path import LoadPath
 from ..problem import spaces
 from ..runtime.log import newton_step
+from ..schema import Table
 from ..solvers.context import Progress
 from ..system import petsc_options
 from ..workflow import DEFAULT, Preparation, Solution, Thresholds
 from .solution import ModelSolution
+
+
+class _Asked(Table):
+    progress: Callable[..., None]
+    estimate: bool
 
 
 class ModelPreparation(Preparation):
@@ -62,7 +67,7 @@ def solve(
         InputError: on all ranks alike: an argument or option is not allowed, no solver reads an option for PETSc, or
             the model does not fit its mesh.
     """
-    _check_arguments(progress, estimate)
+    _Asked.made({"progress": progress, "estimate": estimate})
     known = start if isinstance(start, ModelSolution) else None
     if known is None and start is not None:
         options["start"] = start
@@ -99,12 +104,6 @@ def check(
     domain = None if model.from_file else _domain(model)
     model = _with_options(model, options)
     return ModelPreparation(**fields_of(workflow.prepare(model, ranks, domain=domain, thresholds=thresholds)))
-
-
-def _check_arguments(progress: Any, estimate: Any) -> None:
-    if not callable(progress):
-        raise InputError(f"progress: give a function of one hvi.NewtonStep, such as print, not {progress!r}")
-    require_switch("estimate", estimate)
 
 
 def fields_of(made: Preparation | Solution | LoadPath) -> dict[str, Any]:

@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from mpi4py import MPI
+from pydantic import Field
 
 from ..equilibrium_search import bodies
 from ..model import Model
-from ..model.argument_checks import require_between, require_switch
 from ..runtime import log
 from ..runtime.mpi import time_over
+from ..schema import Positive, Table
 from .solution import ModelSolution
 from .solving import check, fields_of
 
 _LOG = log.logger("api")
 
 
+class _Asked(Table):
+    lowest: bool
+    gap: Annotated[float, Field(gt=0, lt=1)]
+    limit: Positive | None
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Equilibria:
+class ModelEquilibria:
     """What :func:`equilibria` found; the same on all ranks, not collective.
 
     Attributes:
@@ -55,7 +62,7 @@ def equilibria(
     gap: float = 1e-8,
     limit: float | None = None,
     **options: Any,
-) -> Equilibria:
+) -> ModelEquilibria:
     """All equilibria of a model, or the lowest with a proof; at level DEBUG progress is logged. Collective.
 
     Args:
@@ -70,10 +77,7 @@ def equilibria(
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
     """
-    require_switch("lowest", lowest)
-    require_between("gap", gap, 1.0)
-    if limit is not None:
-        require_between("limit", limit)
+    _Asked.made({"lowest": lowest, "gap": gap, "limit": limit})
     prepared = check(model, comm, **options)
     searched = bodies.Equilibria(prepared)
     stop = time_over(prepared.system.comm, limit)
@@ -81,7 +85,7 @@ def equilibria(
     solutions = tuple(ModelSolution(**fields_of(searched.solution(point))) for point in found.points)
     searched.free()
     prepared.system.free()
-    return Equilibria(
+    return ModelEquilibria(
         solutions=solutions,
         kinds=tuple(str(point.kind) for point in found.points),
         complete=found.complete,

@@ -14,8 +14,8 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..mesh.shapes import OnlyMesh
 from ..model import Model, is_portable
-from ..model.argument_checks import require_path
 from ..results.output_folder import existing
+from ..schema import require_path
 from ..study import plan as study_plan
 from ..study.conduct import conduct
 from ..study.table import Study

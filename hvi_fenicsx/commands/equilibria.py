@@ -132,7 +132,7 @@ def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> Exi
     return ExitCode.INTERRUPTED if interrupted else ExitCode.NOT_CONVERGED
 
 
-def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[files.Row]:
+def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[files.EquilibriumRow]:
     """Write all equilibria, and tell how many are written; their rows. Collective."""
     count = len(found.points)
     for i in range(count):
@@ -140,7 +140,7 @@ def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[fi
         tell_moving("%s", certified_in_words(i + 1, count))
 
 
-def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.Row:
+def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.EquilibriumRow:
     """Write one equilibrium into a result folder of its own; its row. After a signal nothing is drawn. Collective."""
     solution = bodies.solution(found.points[i])
     name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
@@ -154,7 +154,7 @@ def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.R
     return files.row(i + 1, bodies, found.points[i], solution, name)
 
 
-def _lines(prepared: Preparation, found: Found, rows: list[files.Row]) -> Iterator[str]:
+def _lines(prepared: Preparation, found: Found, rows: list[files.EquilibriumRow]) -> Iterator[str]:
     unit = "J/m" if prepared.problem.scales.dimension == 2 else "J"
     for row in rows[:MOST_TOLD]:
         uncertified = "" if row.certified else "  NOT CERTIFIED"

@@ -28,7 +28,7 @@ COLUMNS = ("index", "energy", "kind", "max_slip", "max_opening", "broken", "fold
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class EquilibriumRow:
     """One equilibrium in ``equilibria.csv``.
 
     Attributes:
@@ -54,7 +54,7 @@ class Row:
     certified: bool
 
 
-def row(index: int, bodies: Equilibria, point: StationaryPoint, solution: Solution, folder: str) -> Row:
+def row(index: int, bodies: Equilibria, point: StationaryPoint, solution: Solution, folder: str) -> EquilibriumRow:
     """The row of an equilibrium. Collective.
 
     Args:
@@ -70,7 +70,7 @@ def row(index: int, bodies: Equilibria, point: StationaryPoint, solution: Soluti
     comm, unit = problem.domain.mesh.comm, problem.scales.displacement
     slip = max((_largest(np.linalg.norm(s.slip, axis=1)) for s in examination.states), default=0.0)
     opening = max((_largest(_opening(s)) for s in examination.states), default=0.0)
-    return Row(
+    return EquilibriumRow(
         index=index,
         energy=examination.energy * problem.scales.energy,
         kind=point.kind,
@@ -92,7 +92,7 @@ def _largest(values: Array) -> float:
 
 
 def write(
-    folder: ResultFolder, prepared: Preparation, found: Found, rows: list[Row], code: ExitCode, command: str
+    folder: ResultFolder, prepared: Preparation, found: Found, rows: list[EquilibriumRow], code: ExitCode, command: str
 ) -> None:
     """Write table, summary and scene. Collective.
 
@@ -117,7 +117,7 @@ def write(
     on_root(folder.comm, act)
 
 
-def _entry(found: Found, rows: list[Row], unit: float) -> dict[str, Any]:
+def _entry(found: Found, rows: list[EquilibriumRow], unit: float) -> dict[str, Any]:
     """The entry ``equilibria`` of the summary."""
     return {
         "count": len(rows),

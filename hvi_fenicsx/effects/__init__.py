@@ -2,6 +2,7 @@
 
 from ..class_registry import load_modules
 from .base import (
+    BodySizes,
     Drive,
     Effect,
     Evaluate,
@@ -9,7 +10,6 @@ from .base import (
     Place,
     SideMoments,
     Sides,
-    Sizes,
     SurfaceLoad,
     from_python,
     in_words,

@@ -126,7 +126,7 @@ class FormContext(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Sizes:
+class BodySizes:
     """What an effect's scale may depend on.
 
     Attributes:
@@ -288,7 +288,7 @@ class Effect(Table):
             where: a boundary part, a region, or None for the whole body.
         """
 
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest stress (N/m²) it brings.
 
         Args:
@@ -316,7 +316,7 @@ class Effect(Table):
             InputError: with the reason and how to correct it.
         """
 
-    def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:
+    def implausible(self, largest: Evaluate, sizes: BodySizes) -> tuple[str, ...]:
         """What may be mistakes in its numbers, in sentences. Advice: nothing is refused.
 
         Args:

@@ -15,7 +15,7 @@ from typing_extensions import override
 from ..formula import Formula, SpatialValue
 from ..schema import refusal
 from ..typing import Array
-from .base import Drive, Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python
+from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, Sides, from_python
 from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
 from .obstacles import NonzeroVector, Obstacle, ObstacleField, ObstacleGap, unit
 from .values import FormulaField, Value, as_value, require_components
@@ -114,7 +114,7 @@ class Contact(Effect):
         return self
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The stress of an obstacle's force, or of the largest displacement that is demanded, over the length."""
         bounds = self._bounds()
         demanded = [bounds.lower] if bounds.lower else []

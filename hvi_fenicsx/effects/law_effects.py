@@ -28,7 +28,7 @@ from ..formula import SpatialValue
 from ..laws import Mixity, mixities
 from ..schema import Mistake, OneOf, refusal, shown, validation_error
 from . import law_formulas
-from .base import Effect, Evaluate, FormContext, Place, Sides, Sizes, from_python
+from .base import BodySizes, Effect, Evaluate, FormContext, Place, Sides, from_python
 from .contribution import ONE, BoundaryLaw, Contribution, Direction
 from .law_formulas import FormulaLaw, times
 from .values import FormulaField, Value
@@ -138,7 +138,7 @@ class LawEffect(Effect):
         )
 
     @override
-    def implausible(self, largest: Evaluate, sizes: Sizes) -> tuple[str, ...]:
+    def implausible(self, largest: Evaluate, sizes: BodySizes) -> tuple[str, ...]:
         """A traction that is negative somewhere: it pushes the body on."""
         if self.law.c4 <= 1e-9 * self.law.traction_scale:
             return ()
@@ -146,7 +146,7 @@ class LawEffect(Effect):
         return (f"{text} pushes the body on; is a sign wrong?",)
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The law's own, times its multiplier."""
         return self.law.traction_scale * largest(self.multiplier)
 

@@ -15,13 +15,13 @@ from ..formula import SpatialValue
 from ..schema import Finite, refusal
 from ..typing import Array
 from .base import (
+    BodySizes,
     Drive,
     Evaluate,
     FormContext,
     Place,
     SideMoments,
     Sides,
-    Sizes,
     SurfaceLoad,
     from_python,
 )
@@ -59,7 +59,7 @@ class Traction(Listed):
         return SurfaceLoad(self.values)
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component."""
         return max(largest(f) for f in self.values)
 
@@ -89,7 +89,7 @@ class BodyForce(Listed):
         return Contribution(linear=(ufl.inner(vector, context.test) * context.cells(where),))
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component times the body's length."""
         return max(largest(f) for f in self.values) * sizes.length
 
@@ -136,7 +136,7 @@ class Displacement(Listed):
         return tuple(i for i, f in enumerate(self.values) if f != "free")
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The stress of the largest component, as a strain over the body's length."""
         return max((largest(f) for f in self.values if f != "free"), default=0.0) * sizes.modulus / sizes.length
 
@@ -168,7 +168,7 @@ class Pressure(OneValue):
         return SurfaceLoad(pressure=self.value)
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest pressure."""
         return largest(self.value)
 
@@ -223,7 +223,7 @@ class Force(_Total):
         return np.tile(np.array(self.values) / moments.area, (len(points), 1))
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component over the body's length, squared in 3D."""
         return max(map(abs, self.values)) / sizes.length ** (len(self.values) - 1)
 
@@ -282,7 +282,7 @@ class Moment(_Total):
         return np.asarray(np.cross(_rotation(moments.second, self.values)[0], r)[:, :d], dtype=np.float64)
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component over the body's length squared, cubed in 3D."""
         return max(map(abs, self.values)) / sizes.length ** (2 if len(self.values) == 1 else 3)
 
@@ -338,7 +338,7 @@ class Temperature(OneValue):
         return context.render(self.value) * sum(context.number(float(s)) * e for s, e in pairs if s)
 
     @override
-    def stress_scale(self, largest: Evaluate, sizes: Sizes) -> float:
+    def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """E α ΔT."""
         return sizes.modulus * sizes.expansion * largest(self.value)
 

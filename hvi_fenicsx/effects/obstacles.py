@@ -262,7 +262,7 @@ class Cylinder(_Round):
         return np.asarray(vectors - (vectors @ axis)[:, None] * axis)
 
 
-class Surface(Obstacle):
+class TriangulatedSurface(Obstacle):
     """A surface of triangles from a file, in space; the gap is measured along `direction`, which it needs."""
 
     shape: ClassVar[str] = "surface"
@@ -273,7 +273,7 @@ class Surface(Obstacle):
     """length in m of one unit of the coordinates in the file: 1e-3 for a surface in mm"""
 
     @model_validator(mode="after")
-    def _along(self) -> Surface:
+    def _along(self) -> TriangulatedSurface:
         if self.direction is None:
             raise refusal('shape = "surface" needs a direction, from the body towards it: direction = [0, 0, -1]')
         return self

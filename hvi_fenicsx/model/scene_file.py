@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..schema import Keys, Mistake, shown, unknown
-from .argument_checks import require_path
+from ..schema import Keys, Mistake, require_path, shown, unknown
 from .content import WHOLE
 from .model import Mistakes, Model
 from .reader import KEYS, read_tables

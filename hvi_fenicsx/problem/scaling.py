@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ..effects import Drive, Effect, Evaluate, Place, Sizes
+from ..effects import BodySizes, Drive, Effect, Evaluate, Place
 from ..errors import InputError
 from .thresholds import DEFAULT
 
@@ -46,7 +46,7 @@ Placed = tuple[str | None, Effect]
 """An effect with where it acts: a boundary part, a region, or None for the whole body."""
 
 
-def sizes(length: float, effects: Sequence[Placed]) -> Sizes:
+def sizes(length: float, effects: Sequence[Placed]) -> BodySizes:
     """What the effects' scales may depend on.
 
     Args:
@@ -54,7 +54,7 @@ def sizes(length: float, effects: Sequence[Placed]) -> Sizes:
         effects: those in force, with their places.
     """
     modulus = max((e.modulus_scale() for _, e in effects), default=0.0) or 1.0
-    return Sizes(length, modulus, max((e.expansion_scale() for _, e in effects), default=0.0))
+    return BodySizes(length, modulus, max((e.expansion_scale() for _, e in effects), default=0.0))
 
 
 def place(placed: Placed) -> str:
@@ -68,7 +68,9 @@ def place(placed: Placed) -> str:
     return ".".join(filter(None, (effect.place.value, name, effect.key)))
 
 
-def choose(sizes: Sizes, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]) -> Scales:
+def choose(
+    sizes: BodySizes, dimension: int, effects: Sequence[Placed], evaluate: Callable[[Placed], Evaluate]
+) -> Scales:
     """The scales of a problem. Collective where ``evaluate`` is.
 
     The stress scale is that of the largest driving effect: a load, or the strain of a prescribed displacement or of

@@ -79,9 +79,9 @@ def test_a_refusal_names_the_effect_and_its_place(square: hvi.Body, effect: Any,
 @pytest.mark.parametrize(
     ("argument", "reason"),
     [
-        ({"estimate": "no"}, "^estimate: must be True or False .is 'no'"),
-        ({"estimate": None}, "^estimate: must be True or False .is None"),
-        ({"progress": True}, "^progress: give a function of one hvi.NewtonStep, such as print, not True"),
+        ({"estimate": "no"}, "^estimate: must be true or false"),
+        ({"estimate": None}, "^estimate: must be true or false"),
+        ({"progress": True}, "^progress: must be a function"),
     ],
 )
 def test_what_is_no_switch_or_no_function_is_refused(square: hvi.Body, argument: Any, reason: str) -> None:
@@ -93,11 +93,11 @@ def test_what_is_no_switch_or_no_function_is_refused(square: hvi.Body, argument:
 @pytest.mark.parametrize(
     ("argument", "reason"),
     [
-        ({"gap": "1e-8"}, "^gap: must be a number above 0 and below 1 .is '1e-8'"),
-        ({"gap": 1}, "^gap: must be a number above 0 and below 1 .is 1"),
-        ({"limit": "60"}, "^limit: must be a number above 0 .is '60'"),
-        ({"limit": 0}, "^limit: must be a number above 0 .is 0"),
-        ({"lowest": "no"}, "^lowest: must be True or False .is 'no'"),
+        ({"gap": "1e-8"}, "^gap: must be a number"),
+        ({"gap": 1}, "^gap: must be less than 1 .is 1"),
+        ({"limit": "60"}, "^limit: must be a number"),
+        ({"limit": 0}, "^limit: must be greater than 0 .is 0"),
+        ({"lowest": "no"}, "^lowest: must be true or false"),
     ],
 )
 def test_a_search_for_equilibria_refuses_numbers_that_mean_nothing(
