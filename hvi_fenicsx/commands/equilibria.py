@@ -4,26 +4,38 @@ from __future__ import annotations
 
 import argparse
 import functools
+import math
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import console, results
+from ..certify.contact_state import ContactState
 from ..equilibrium_search.bodies import Equilibria
 from ..equilibrium_search.found import Found, Saved, certified_in_words, counted
+from ..equilibrium_search.search import falls_passed
+from ..equilibrium_search.stationarity import StationaryPoint
 from ..errors import ExitCode, NotWrittenError
+from ..model import dump_scene
 from ..report import page
 from ..report.pictures.draw import draw as draw_pictures
-from ..results.whole import begin_whole, made, picture_process
-from ..runtime import journal
-from ..runtime.mpi import on_root, time_over
+from ..results import ResultFolder, plain, tables
+from ..results.summary import common
+from ..results.whole import begin_whole, made, picture_process, write_record
+from ..runtime import journal, writing
+from ..runtime.mpi import largest, on_root, time_over
 from ..runtime.timing import Timer
-from ..workflow import Preparation, prepare
-from . import equilibria_files as files
+from ..typing import Array
+from ..workflow import Preparation, Solution, prepare
 from . import session
 from .session import COMM, LOG, Command, Session, say, tell_moving
 
+TABLE = "equilibria.csv"
+COLUMNS = ("index", "energy", "kind", "max_slip", "max_opening", "broken", "folder")
 KEPT_EVERY = 10
 """Seconds between two times at which a search keeps what it has; where that takes longer, so many times as long."""
 MOST_TOLD = 20
@@ -69,7 +81,7 @@ def _run(call: Session) -> int:
     code = _exit_code(prepared, found, interrupted=call.interrupted())
     say([f"result: {found.reason}; {counted(found.nodes, 'box', 'boxes')}"])
     rows = list(_all_written(call, bodies, found))
-    files.write(folder, prepared, found, rows, code, options.given)
+    _write(folder, prepared, found, rows, code, options.given)
     if rows:
         draw = not options.no_pictures and not call.interrupted()
         on_root(COMM, lambda: _picture_and_page(folder.work, draw=draw))
@@ -132,7 +144,7 @@ def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> Exi
     return ExitCode.INTERRUPTED if interrupted else ExitCode.NOT_CONVERGED
 
 
-def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[files.EquilibriumRow]:
+def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[EquilibriumRow]:
     """Write all equilibria, and tell how many are written; their rows. Collective."""
     count = len(found.points)
     for i in range(count):
@@ -140,7 +152,7 @@ def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[fi
         tell_moving("%s", certified_in_words(i + 1, count))
 
 
-def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.EquilibriumRow:
+def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> EquilibriumRow:
     """Write one equilibrium into a result folder of its own; its row. After a signal nothing is drawn. Collective."""
     solution = bodies.solution(found.points[i])
     name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
@@ -151,16 +163,121 @@ def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> files.E
     ):
         begin_whole(own, solution, call.timer, LOG.info, pictures).finish(solution, call.given)
         own.commit(call.scene)
-    return files.row(i + 1, bodies, found.points[i], solution, name)
+    return _row(i + 1, bodies, found.points[i], solution, name)
 
 
-def _lines(prepared: Preparation, found: Found, rows: list[files.EquilibriumRow]) -> Iterator[str]:
+def _lines(prepared: Preparation, found: Found, rows: list[EquilibriumRow]) -> Iterator[str]:
     unit = "J/m" if prepared.problem.scales.dimension == 2 else "J"
     for row in rows[:MOST_TOLD]:
         uncertified = "" if row.certified else "  NOT CERTIFIED"
         yield f"{row.index:4d}  {row.energy:.10g} {unit}  {row.kind}  {row.broken} broken{uncertified}"
     if len(rows) > MOST_TOLD:
-        yield f"      and {len(rows) - MOST_TOLD} more in {files.TABLE}"
+        yield f"      and {len(rows) - MOST_TOLD} more in {TABLE}"
     if found.gap is not None and found.lower_bound is not None:
         bound = found.lower_bound * prepared.problem.scales.energy
         yield f"no displacement has an energy below {bound:.10g} {unit} (relative gap {found.gap:.1e})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumRow:
+    """One equilibrium in ``equilibria.csv``.
+
+    Attributes:
+        index: from 1, by energy.
+        energy: J/m or J.
+        kind: minimiser, saddle or undecided.
+        max_slip: largest |u_t| on Γc, m.
+        max_opening: largest displacement off the obstacle, m.
+        broken: unknowns of Γc beyond a drop of their law, or on or beyond a falling part.
+        folder: of its result.
+        isolated: False where it stands for a continuum.
+        certified: whether its certificate passed.
+    """
+
+    index: int
+    energy: float
+    kind: str
+    max_slip: float
+    max_opening: float
+    broken: int
+    folder: str
+    isolated: bool
+    certified: bool
+
+
+def _row(index: int, bodies: Equilibria, point: StationaryPoint, solution: Solution, folder: str) -> EquilibriumRow:
+    """The row of an equilibrium. Collective.
+
+    Args:
+        index: from 1, by energy.
+        bodies: that were searched.
+        point: the equilibrium.
+        solution: the same of the whole bodies.
+        folder: of its result.
+    """
+    problem, examination = solution.problem, solution.examination
+    assert bodies.problem is not None
+    assert examination is not None
+    comm, unit = problem.domain.mesh.comm, problem.scales.displacement
+    slip = max((_largest(np.linalg.norm(s.slip, axis=1)) for s in examination.states), default=0.0)
+    opening = max((_largest(_opening(s)) for s in examination.states), default=0.0)
+    return EquilibriumRow(
+        index=index,
+        energy=examination.energy * problem.scales.energy,
+        kind=point.kind,
+        max_slip=largest(comm, slip) * unit,
+        max_opening=largest(comm, opening) * unit,
+        broken=falls_passed(bodies.problem, point.x) if point.x.size else 0,
+        folder=folder,
+        isolated=point.isolated,
+        certified=solution.converged,
+    )
+
+
+def _opening(state: ContactState) -> Array:
+    return np.where(np.isfinite(state.gap), state.gap, -state.normal)
+
+
+def _largest(values: Array) -> float:
+    return float(np.max(values, initial=0.0))
+
+
+def _write(
+    folder: ResultFolder, prepared: Preparation, found: Found, rows: list[EquilibriumRow], code: ExitCode, command: str
+) -> None:
+    """Write table, summary and scene. Collective.
+
+    Args:
+        folder: being written.
+        prepared: the scene.
+        found: by the search.
+        rows: of its equilibria.
+        code: what the command ends with.
+        command: the command line.
+    """
+    entry = _entry(found, rows, prepared.problem.scales.energy)
+    record = common(prepared) | plain(
+        {"reason": found.reason, "exit_code": int(code), "equilibria": entry, "command": command}
+    )
+
+    def act() -> None:
+        tables.write(folder.work / TABLE, COLUMNS, ([getattr(r, name) for name in COLUMNS] for r in rows))
+        writing.text(folder.work / "scene.toml", dump_scene(prepared.scene, folder.target))
+        write_record(folder.work, record)
+
+    on_root(folder.comm, act)
+
+
+def _entry(found: Found, rows: list[EquilibriumRow], unit: float) -> dict[str, Any]:
+    """The entry ``equilibria`` of the summary."""
+    return {
+        "count": len(rows),
+        "complete": found.complete,
+        "lowest_energy": rows[0].energy if rows else None,
+        "lower_bound": math.nan if found.lower_bound is None else found.lower_bound * unit,
+        "gap": found.gap,
+        "proven": found.proven,
+        "nodes": found.nodes,
+        "continua": [r.index for r in rows if not r.isolated],
+        "uncertified": [r.index for r in rows if not r.certified],
+    }

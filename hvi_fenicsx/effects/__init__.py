@@ -31,7 +31,6 @@ from .contribution import (
 from .elasticity import Anisotropic, Isotropic, Orthotropic
 from .law_effects import Adhesion, Cohesion, Friction, LawEffect, Support
 from .loads import BodyForce, Displacement, Force, Moment, Pressure, Temperature, Traction
-from .role import Role, role_of
 from .values import FormulaField
 
 load_modules(__name__)

@@ -5,15 +5,33 @@ No effect states any of this itself, so a user's own effect has a summary like t
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
-from ..effects import Contribution, Direction, Effect, Place, Role, role_of
+from ..effects import BoundaryLaw, Contribution, Direction, Effect, Place
+from ..laws import Superpotential, describe
 from .contact_surface import Surface
 from .problem import PlacedContribution, Problem
 
+Role = dict[str, Any]
+"""One effect's role, ready for JSON:
+
+    place: where it stands in the scene: "boundary", "body" or "material".
+    drive: how it drives the body: "load", "kinematic" or "resistance".
+    meaning: what it is, in a sentence or two.
+    label: the same in a few words.
+    traction: a load on its part by component, numbers or formulas, N/m²; empty: none.
+    pressure: a load against its part, a number or a formula, N/m²; None: none.
+    prescribed: the displacement components, from 0, that it prescribes.
+    bounded: whether it bounds the normal displacement.
+    obstacle: the unit vector towards a flat obstacle, where it has one.
+    laws: the displacement that each of its laws acts on, the law as a scene writes it, and the multipliers of its
+        tractions and of its lengths, numbers or formulas.
+"""
 _BOUNDS = ("gap", "sigma_n", "contact")
 
 
@@ -130,3 +148,44 @@ def _row(summary: EffectSummary) -> tuple[str, ...]:
         ", ".join(summary.output) or "none",
         summary.solver,
     )
+
+
+def role_of(effect: Effect, contribution: Contribution) -> Role:
+    """The role of an effect.
+
+    Args:
+        effect: the effect.
+        contribution: what it added to the problem.
+    """
+    load = effect.surface_load()
+    return {
+        "place": effect.place.value,
+        "drive": effect.drive.name.lower(),
+        "meaning": effect.meaning(),
+        "label": effect.label or effect.key.replace("_", " "),
+        "traction": [f.source for f in load.components] if load else [],
+        "pressure": load.pressure.source if load and load.pressure else None,
+        "prescribed": sorted({c.component for c in contribution.conditions}),
+        "bounded": bool(contribution.bounds),
+        "obstacle": next((b.towards.constant for b in contribution.bounds if b.towards is not None), None),
+        "laws": [_law(brought) for brought in contribution.laws],
+    }
+
+
+def _law(brought: BoundaryLaw) -> dict[str, Any]:
+    return {
+        "direction": brought.direction.value,
+        "law": _table(brought.law),
+        "multiplier": brought.multiplier.source,
+        "length_multiplier": brought.length_multiplier.source,
+    }
+
+
+def _table(law: Superpotential) -> dict[str, Any]:
+    """The table that a scene would have; its name alone where a parameter is not plain data."""
+    try:
+        table = describe(law)
+        json.dumps(table)
+    except (TypeError, ValueError, AttributeError):
+        return {"law": law.name}
+    return table

@@ -120,7 +120,7 @@ class Result(Finished):
         return bool((self.summary.get("estimate") or {}).get("coarse"))
 
     def roles(self, part: str) -> list[Mapping[str, Any]]:
-        """What the effects on a part do (:class:`hvi_fenicsx.effects.Role`)."""
+        """What the effects on a part do (:data:`hvi_fenicsx.problem.effect_summary.Role`)."""
         return [role for where, role in self._roles("boundary") if where == part]
 
     def _roles(self, place: str) -> list[tuple[str | None, Mapping[str, Any]]]:
