@@ -259,6 +259,11 @@ class ArcTable:
         """The arc that holds x, of the two at a joint the left one; (n,)."""
         return np.asarray((self.high[:, :-1] < x[:, None]).sum(axis=1), dtype=np.int64)
 
+    def around(self, x: Array) -> tuple[Array, Array]:
+        """The begin and the end of the arcs that hold x, (n,) each."""
+        rows, k = np.arange(len(x)), self.at(x)
+        return self.low[rows, k], self.high[rows, k]
+
     def energy(self, x: Array) -> Array:
         """φᵢ(xᵢ), (n,)."""
         rows, k = np.arange(len(x)), self.at(x)

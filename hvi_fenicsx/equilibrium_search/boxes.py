@@ -18,12 +18,14 @@ class Box:
         low: (n + m,).
         high: (n + m,).
         x: where a relaxation has its minimiser, or is to begin, (n,).
+        weights: where envelopes were not tight, (n + m,).
         bound: no point of it has a lower energy.
     """
 
     low: Array
     high: Array
     x: Array
+    weights: Array
     bound: float = -math.inf
 
     @classmethod
@@ -35,7 +37,7 @@ class Box:
             high: (n + m,).
             x: where to begin, (n,).
         """
-        return cls(low=low, high=high, x=clipped(x, low, high))
+        return cls(low=low, high=high, x=clipped(x, low, high), weights=np.zeros(len(low)))
 
 
 def clipped(x: Array, low: Array, high: Array) -> Array:

@@ -66,26 +66,28 @@ class CurvatureShare:
         columns, sizes, _ = np.linalg.svd(np.where(with_law[:, None], self.kernel, 0.0), full_matrices=False)
         return np.asarray(columns[:, sizes > problem.thresholds.points.accuracy])
 
-    def share(self, low: Array, high: Array, undecided: Integers, *, lend: bool = False) -> Curvature:
+    def share(self, low: Array, high: Array, undecided: Integers, seen: Array, *, lend: bool = False) -> Curvature:
         """D on a box.
 
         Args:
             low: of the box, (n + m,).
             high: of the box, (n + m,).
             undecided: arguments whose law is not convex on the box.
+            seen: where envelopes were not tight, (n + m,); all zero where nothing is known.
             lend: whether curvature is lent along rigid motions.
         """
         problem = self._problem
         slope, drops = problem.arcs.least_slope(low, high), problem.arcs.drops(low, high)
         own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
         own[problem.size :] = 0.0
-        weights = np.where(drops > 0.0, drops, -slope * (high - low))[undecided]
+        most = float(seen[undecided].max(initial=0.0))
+        strength = np.where(drops > 0.0, drops, -slope * (high - low)) * (seen / most + 0.1 if most > 0.0 else 1.0)
         need = np.where(drops > 0.0, np.inf, np.maximum(-slope, 0.0))
         matrix = problem.stiffness + np.diag(problem.diagonal(own))
         if lend:
             matrix += self.lent * self.shapes @ self.shapes.T
         free = self._free_motions(matrix)
-        added = self._given(matrix, free, undecided, weights, need)
+        added = self._given(matrix, free, undecided, strength[undecided], need)
         radii = self._radii(self._inverse(matrix - np.diag(problem.diagonal(added)), free))
         return Curvature(added=added - own, radii=np.where(self._moved(free), np.inf, radii), range_radii=radii)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
+from .boxes import Box
 from .relaxation import Minimum, Relaxation
 from .scalar_problem import ScalarProblem
 
@@ -79,7 +80,7 @@ def _farthest(
     """A bound of c·x from above, by forces each a quarter of the one before."""
     best, tau = np.inf, float(np.max(np.abs(problem.force), initial=1e-300))
     for _ in range(problem.thresholds.programmes.most_steps):
-        pulled = Relaxation(problem.under(problem.force + tau * c), cut).solve(*ends, found.x)
+        pulled = Relaxation(problem.under(problem.force + tau * c), cut).solve(Box.around(*ends, found.x))
         if cut():
             raise Cut
         if not problem.is_far(pulled.x):

@@ -94,7 +94,7 @@ class LowestSearch:
         self.x = clipped(np.zeros(problem.size), low, high)
         for x in (self.x, *points):
             self._try(x)
-        first = self._relaxation.solve(low, high, self.x)
+        first = self._relaxation.solve(Box.around(low, high, self.x))
         if self.cut():
             raise Cut
         if region is None and problem.is_far(first.x):
@@ -172,8 +172,9 @@ class LowestSearch:
         found = None
         for _ in range(self._thresholds.most_rounds):
             before = box.bound
-            found = self._relaxation.solve(box.low, box.high, box.x, self._thresholds.lost * (self.upper - before))
-            box = replace(box, x=found.x, bound=max(before, found.bound))
+            found = self._relaxation.solve(box, self._thresholds.lost * (self.upper - before))
+            weights = 0.5 * (box.weights + found.spread) if box.weights.any() else found.spread
+            box = replace(box, x=found.x, bound=max(before, found.bound), weights=weights)
             self._try(found.x)
             if box.bound >= self.upper - self._allowed or np.any((box := self._smaller(box, found)).low > box.high):
                 return

@@ -11,6 +11,7 @@ import numpy as np
 from ..typing import Array, Integers
 from . import envelopes as convex
 from .arcs import ArcTable
+from .boxes import Box
 from .convex_programme import Optimum, minimise, never
 from .curvature import Curvature, CurvatureShare
 from .length_programme import LengthProgramme
@@ -59,6 +60,7 @@ class Minimum:
         x: the minimiser, (n,).
         bound: no point of the box has a lower energy; by strong convexity it grows with the distance from x.
         curvature: that the laws were given.
+        spread: where envelopes are not tight, (n + m,).
         gap: the largest by which an envelope is below its law at x; 0 where the relaxation is the energy.
         argument: of that law.
         place: where its interval is to be divided.
@@ -67,6 +69,7 @@ class Minimum:
     x: Array
     bound: float
     curvature: Curvature
+    spread: Array
     gap: float
     argument: int
     place: float
@@ -107,25 +110,23 @@ class Relaxation:
             low: of the box, (n + m,).
             high: of the box, (n + m,).
         """
-        return self._share.share(low, high, self.undecided(low, high)).added
+        return self._share.share(low, high, self.undecided(low, high), np.zeros(len(low))).added
 
-    def solve(self, low: Array, high: Array, start: Array, lost: float = 0.0) -> Minimum:
+    def solve(self, box: Box, lost: float = 0.0) -> Minimum:
         """The minimum on a box.
 
         Args:
-            low: of the box, (n + m,), finite.
-            high: of the box, (n + m,), finite.
-            start: where to begin, (n,).
+            box: the box, finite.
             lost: energy that the chords of rigid motions may take off.
         """
-        undecided = self.undecided(low, high)
+        low, high, undecided = box.low, box.high, self.undecided(box.low, box.high)
         lent = self._lent(low, high) if undecided.size else None
         if lent is not None and lent.cost > lost:
             lent = None
-        curvature = self._share.share(low, high, undecided, lend=lent is not None)
+        curvature = self._share.share(low, high, undecided, box.weights, lend=lent is not None)
         stack = envelopes(self.problem, low, high, curvature.added)
-        found = self._minimised(low, high, start, curvature, lent, stack)
-        return self._examined(low, high, found, stack, curvature, lent)
+        found = self._minimised(box, curvature, lent, stack)
+        return self._examined(box, found, stack, curvature, lent)
 
     def _lent(self, low: Array, high: Array) -> _Lent | None:
         """The curvature along rigid motions, with the intervals of their shares in a box."""
@@ -137,9 +138,7 @@ class Relaxation:
         first, last = ends.sum(axis=1)
         return _Lent(shapes=shapes, stiffness=self._share.lent, low=first - slack, high=last + slack)
 
-    def _minimised(
-        self, low: Array, high: Array, start: Array, curvature: Curvature, lent: _Lent | None, stack: ArcTable
-    ) -> Optimum:
+    def _minimised(self, box: Box, curvature: Curvature, lent: _Lent | None, stack: ArcTable) -> Optimum:
         problem = self.problem
         a, b, constant = problem.stiffness - np.diag(problem.diagonal(curvature.added)), problem.force, problem.constant
         if lent is not None:
@@ -147,32 +146,30 @@ class Relaxation:
         if len(problem.lengths):
             shut = curvature.added[problem.size :]
             programme = LengthProgramme(
-                problem=problem, a=a, b=b, laws=stack, shut=shut, low=low, high=high, cut=self._cut
+                problem=problem, a=a, b=b, laws=stack, shut=shut, low=box.low, high=box.high, cut=self._cut
             )
-            found = programme.bound(programme.minimiser(start))
+            found = programme.bound(programme.minimiser(box.x))
         else:
-            found = minimise(a, b, stack, start, problem.thresholds.programmes, self._cut)
+            found = minimise(a, b, stack, box.x, problem.thresholds.programmes, self._cut)
         return Optimum(x=found.x, bound=found.bound + constant)
 
-    def _examined(
-        self, low: Array, high: Array, found: Optimum, stack: ArcTable, curvature: Curvature, lent: _Lent | None
-    ) -> Minimum:
+    def _examined(self, box: Box, found: Optimum, stack: ArcTable, curvature: Curvature, lent: _Lent | None) -> Minimum:
         """Where envelopes are not tight, and chords take something off."""
         problem, x, at = self.problem, found.x, self.problem.arguments(found.x)
         tight = self._thresholds.tight * problem.energy_size(x)
         gaps = problem.arcs.energy(at) + 0.5 * curvature.added * at * at - stack.energy(at)
-        gaps = np.where((gaps > tight) & (high > low), gaps, 0.0)
+        gaps = np.where((gaps > tight) & (box.high > box.low), gaps, 0.0)
         i = int(np.argmax(gaps))
-        place, gap = self._place(stack, i, float(at[i])), float(gaps[i])
+        begin, end = stack.around(at)
+        spread = np.where(gaps > 0.0, 0.5 * (at - begin) * (end - at), 0.0)
+        place, gap = self._place(i, float(begin[i]), float(end[i]), float(at[i])), float(gaps[i])
         if lent is not None and (off := lent.gap(x)) > max(gap, tight):
-            i, gap = int(np.argmax(np.abs(lent.shapes).max(axis=1) * (high - low)[: problem.size])), off
-            place = 0.5 * float(low[i] + high[i])
-        return Minimum(x=x, bound=found.bound, curvature=curvature, gap=gap, argument=i, place=place)
+            i, gap = int(np.argmax(np.abs(lent.shapes).max(axis=1) * (box.high - box.low)[: problem.size])), off
+            place = 0.5 * float(box.low[i] + box.high[i])
+        return Minimum(x=x, bound=found.bound, curvature=curvature, spread=spread, gap=gap, argument=i, place=place)
 
-    def _place(self, stack: ArcTable, i: int, at: float) -> float:
+    def _place(self, i: int, begin: float, end: float, at: float) -> float:
         """The joint of a law in the chord of its envelope that is nearest to a place; the place if there is none."""
-        k = int((stack.high[i, :-1] < at).sum())
-        begin, end = stack.low[i, k], stack.high[i, k]
         joints = self.problem.arcs.high[i]
         inside = joints[(joints > begin) & (joints < end)]
         return float(inside[np.argmin(np.abs(inside - at))]) if inside.size else at

@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 import hvi_fenicsx as hvi
 from hvi_fenicsx.equilibrium_search.arcs import FREE, chain
 from hvi_fenicsx.equilibrium_search.bodies import Equilibria
+from hvi_fenicsx.equilibrium_search.boxes import Box
 from hvi_fenicsx.equilibrium_search.lengths import Lengths
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
@@ -173,7 +174,7 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int, opening: bool) -> None:
     for part in (0.5, 0.999):
         bounds = replace(problem.thresholds.bounds, part=part)
         problem = replace(problem, thresholds=replace(problem.thresholds, bounds=bounds))
-        bound = Relaxation(problem).solve(low, high, low[: problem.size]).bound
+        bound = Relaxation(problem).solve(Box.around(low, high, low[: problem.size])).bound
         assert min(problem.energy(x) for x in inside) >= bound
 
 
@@ -193,7 +194,7 @@ def test_no_point_of_a_box_is_below_a_bound_with_curvature_lent_along_a_rigid_mo
     problem, random = freed(random_problem(seed, 3, 2, opening=False), 0.3), np.random.default_rng(seed)
     low = np.maximum(random.uniform(-2, 0, problem.size), problem.lower)
     low, high = problem.with_lengths(low, low + random.uniform(1.0, 3, problem.size))
-    solved = Relaxation(problem).solve(low, high, low[: problem.size], lost=1e6)
+    solved = Relaxation(problem).solve(Box.around(low, high, low[: problem.size]), lost=1e6)
     assert np.all(np.isfinite(solved.curvature.radii))
     samples = random.uniform(low[: problem.size], high[: problem.size], (4000, problem.size))
     energies = np.array([problem.energy(x) for x in samples])

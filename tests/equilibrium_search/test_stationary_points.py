@@ -18,6 +18,7 @@ from scenes import DELTA, block, model
 
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain, energy
+from hvi_fenicsx.equilibrium_search.boxes import Box
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.equilibrium_search.envelopes import envelopes
@@ -265,6 +266,6 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int) -> None:
     for part in (0.5, 0.999):
         bounds = dataclasses.replace(problem.thresholds.bounds, part=part)
         problem = dataclasses.replace(problem, thresholds=dataclasses.replace(problem.thresholds, bounds=bounds))
-        bound = Relaxation(problem).solve(low, high, low).bound
+        bound = Relaxation(problem).solve(Box.around(low, high, low)).bound
         samples = random.uniform(low, high, (300, n))
         assert min(problem.energy(x) for x in samples) >= bound
