@@ -35,7 +35,7 @@ def contact_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str,
     """
     comm, scales, found = problem.domain.mesh.comm, problem.scales, {}
     for state in sorted(states, key=lambda state: state.surface.part):
-        columns = {name: joined(comm, values) for name, values in _columns(problem, state).items()}
+        columns = {name: joined(comm, values) for name, values in columns_of(problem, state).items()}
         others = {name: joined(comm, values) for name, values in _others(problem, state).items()}
         if comm.rank == 0:
             found[state.surface.part] = _sorted(state.surface.part, columns, others, scales.dimension)
@@ -73,8 +73,13 @@ def _others(problem: Problem, state: ContactState) -> dict[str, Any]:
     }
 
 
-def _columns(problem: Problem, state: ContactState) -> dict[str, Array]:
-    """What this rank knows of a part's columns but ``s``, (m,) each; NaN where the table is empty."""
+def columns_of(problem: Problem, state: ContactState) -> dict[str, Array]:
+    """What this rank knows of a part's columns but ``s``, (m,) each; NaN where the table is empty.
+
+    Args:
+        problem: what was solved.
+        state: of the part.
+    """
     scales, d = problem.scales, problem.scales.dimension
     u, p = scales.displacement, scales.stress
     found = {axis: state.surface.points[:, i] for i, axis in enumerate("xyz"[:d])}

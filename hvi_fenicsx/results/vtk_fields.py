@@ -22,6 +22,7 @@ from ..rigid import Mode
 from ..typing import Array, Entities, Integers
 from ..workflow import Solution
 from . import vtk_files
+from .contact_parts import columns_of
 from .vtk_files import Entry, Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
@@ -215,31 +216,27 @@ def _second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array
 
 def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]:
     """By name, values at all local nodes of the body (NaN where there is none). Collective."""
-    u, p = problem.scales.displacement, problem.scales.stress
     found: dict[str, la.Vector] = {}
-
-    def put(name: str, state: ContactState, values: Array) -> None:
-        if name not in found:
-            found[name] = la.vector(problem.space.dofmap.index_map, 3 if values.ndim > 1 else 1)
-            found[name].array[:] = np.nan
-        width = found[name].block_size
-        found[name].array.reshape(-1, width)[state.surface.blocks] = values.reshape(-1, width)
-
     for state in states:
-        put("u_n", state, state.normal_displacement * u)
-        put("sigma_n", state, state.pressure * p)
-        put("gap", state, state.gap * u)
-        put("contact", state, state.contact.astype(float))
-        put("normal", state, _spatial(state.surface.normals))
-        for i in range(problem.scales.dimension - 1):
-            put(f"t{i + 1}", state, _spatial(state.surface.tangents[:, i]))
-            put(f"u_t{i + 1}", state, state.tangential_displacement[:, i] * u)
-            if state.resists_slip:
-                put(f"friction_t{i + 1}", state, state.friction[:, i] * p)
-        if (both := state.of_both_modes) is not None:
-            put("mode_mixity", state, both.slip_share)
-        distances = [law.term.multiplier * law.distance for law in state.laws]
-        put("inclusion_distance", state, np.max(distances, axis=0) * p if distances else 0.0 * state.normal)
+        for name, values in _fields(problem, state).items():
+            if name not in found:
+                found[name] = la.vector(problem.space.dofmap.index_map, 3 if values.ndim > 1 else 1)
+                found[name].array[:] = np.nan
+            width = found[name].block_size
+            found[name].array.reshape(-1, width)[state.surface.blocks] = values.reshape(-1, width)
     for field in found.values():
         field.scatter_forward()
     return {name: field.array if field.block_size == 1 else field.array.reshape(-1, 3) for name, field in found.items()}
+
+
+def _fields(problem: Problem, state: ContactState) -> dict[str, Array]:
+    """The columns of ``contact.csv`` at a part's vertices, its normals and tangents, and what is of ParaView alone."""
+    found = dict.fromkeys(("gap", "contact"), np.full(len(state.pressure), np.nan))
+    found |= {name: values for name, values in columns_of(problem, state).items() if name not in ("x", "y", "z")}
+    tangents = np.moveaxis(state.surface.tangents, 1, 0)
+    found |= {"normal": _spatial(state.surface.normals)}
+    found |= {f"t{i + 1}": _spatial(tangent) for i, tangent in enumerate(tangents)}
+    if (both := state.of_both_modes) is not None:
+        found["mode_mixity"] = both.slip_share
+    distances = [law.term.multiplier * law.distance for law in state.laws] or [0.0 * state.pressure]
+    return found | {"inclusion_distance": np.max(distances, axis=0) * problem.scales.stress}
