@@ -42,7 +42,7 @@ FIRST = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
+class StateVerdict:
     """What was found of a state.
 
     Attributes:
@@ -82,7 +82,7 @@ class Certifier:
         self._distance = Distances(condensation.problem, remember)
         self._whole_load, self._whole_drive = self._load(largest), self._drive(largest)
 
-    def verdict(self, state: PathState, number: int) -> Verdict:
+    def verdict(self, state: PathState, number: int) -> StateVerdict:
         """What a state is found to be. Collective.
 
         Args:
@@ -91,17 +91,17 @@ class Certifier:
         """
         on_graphs = self._distance(state) <= self._tolerance
         if not (state.event in ALWAYS or is_examined(number)):
-            return Verdict(certified=on_graphs, whole=False)
+            return StateVerdict(certified=on_graphs, whole=False)
         if not on_graphs:
-            return Verdict(certified=False, whole=True)
+            return StateVerdict(certified=False, whole=True)
         u = self._expanded(state)
         found = self._examination(state, u)
         if self._passes(state, u, found):
-            return Verdict(certified=True, whole=True)
+            return StateVerdict(certified=True, whole=True)
         corrected = self._refined(state, found) is not None
-        return Verdict(certified=corrected, whole=True, corrected=corrected)
+        return StateVerdict(certified=corrected, whole=True, corrected=corrected)
 
-    def displacement(self, state: PathState, verdict: Verdict) -> fem.Function:
+    def displacement(self, state: PathState, verdict: StateVerdict) -> fem.Function:
         """The displacement of the whole body that was certified, nondimensional, ghosts updated. Collective.
 
         Args:

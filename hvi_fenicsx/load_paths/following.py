@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..model import PathTable
 from ..paths.follower import Follower
 from ..paths.load_path import LoadPath, PathRow
-from ..paths.state import End, Event, Follow, PathOptions, PathState, Place, Position
+from ..paths.state import End, Event, EventPlace, Follow, PathOptions, PathState, Position
 from ..paths.vertex_laws import is_straight
 from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
@@ -24,7 +24,7 @@ from ..runtime.journal import Record
 from ..solvers import obstacle_force
 from ..system import existence
 from ..workflow import Preparation
-from .certifying import Certifier, Verdict
+from .certifying import Certifier, StateVerdict
 from .measures import Measures
 
 
@@ -82,7 +82,7 @@ class PathRun:
         parts = system, self._condensation, self._factored, tolerance, self._remember
         self._certifier = Certifier(*parts, largest)
         self.states: list[PathState] = []
-        self._verdicts: list[Verdict] = []
+        self._verdicts: list[StateVerdict] = []
         self._rows: list[PathRow] = []
         self._reached = 0.0, 0.0
 
@@ -153,14 +153,14 @@ class PathRun:
         known = self.prepared.load_factors(*scaled)
         return {"borne": (known.peak_from, known.peak), "held": (known.held_from, known.held)}
 
-    def _take(self, state: PathState, verdict: Verdict) -> None:
+    def _take(self, state: PathState, verdict: StateVerdict) -> None:
         self.states.append(state)
         self._verdicts.append(verdict)
         low, high = self._reached
         self._reached = min(low, state.factor), max(high, state.factor)
         self._rows.append(self._row(state, verdict))
 
-    def _row(self, state: PathState, verdict: Verdict) -> PathRow:
+    def _row(self, state: PathState, verdict: StateVerdict) -> PathRow:
         scales = self.prepared.problem.scales
         place, d = state.place, scales.dimension
         return PathRow(
@@ -225,7 +225,7 @@ def _finite(states: Iterator[PathState]) -> Iterator[PathState]:
     return itertools.takewhile(lambda state: np.isfinite(state.factor) and bool(np.all(np.isfinite(state.x))), states)
 
 
-def _record_of(state: PathState, verdict: Verdict) -> Record:
+def _record_of(state: PathState, verdict: StateVerdict) -> Record:
     """What the journal keeps of a state."""
     found: dict[str, Any] = {field.name: getattr(state, field.name) for field in fields(state)}
     found["event"] = str(state.event)
@@ -235,14 +235,14 @@ def _record_of(state: PathState, verdict: Verdict) -> Record:
     return found
 
 
-def _state_of(kept: Record) -> tuple[PathState, Verdict]:
+def _state_of(kept: Record) -> tuple[PathState, StateVerdict]:
     """A state and what was found of it, from its record."""
     values = dict(kept)
-    verdict = Verdict(**values.pop("verdict"))
+    verdict = StateVerdict(**values.pop("verdict"))
     place, position = values.pop("place"), dict(values.pop("position"))
     numbers = np.asarray(position.pop("numbers")).astype(np.int64)
     return PathState(
         **{**values, "event": Event(values["event"])},
-        place=None if place is None else Place(**place),
+        place=None if place is None else EventPlace(**place),
         position=Position(numbers=numbers, **position),
     ), verdict

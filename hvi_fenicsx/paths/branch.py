@@ -12,11 +12,11 @@ import numpy as np
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .relations import ContactPoints, Values
-from .segments import Kind, Segment
+from .segments import Segment, SegmentKind
 from .state import Event, Position
 
 
-class Outcome(Enum):
+class StepEnd(Enum):
     """What ended a step."""
 
     STEP = "nothing"
@@ -38,7 +38,7 @@ class Move:
         tied: how many points reached an end at once.
     """
 
-    outcome: Outcome
+    outcome: StepEnd
     point: int | None = None
     tied: int = 1
 
@@ -60,12 +60,12 @@ class Passage:
     @property
     def closes(self) -> bool:
         """Whether a contact closes."""
-        return self.after.kind is Kind.BOUND
+        return self.after.kind is SegmentKind.BOUND
 
     @property
     def opens(self) -> bool:
         """Whether a contact opens."""
-        return self.before.kind is Kind.BOUND
+        return self.before.kind is SegmentKind.BOUND
 
 
 def event_of(passages: Sequence[Passage], *, folds: bool) -> Event:
@@ -262,5 +262,5 @@ def advancing(branch: Branch, aim: float, check: Callable[[], None], most: int) 
         check()
         move = branch.advance(aim)
         yield move
-        if move.outcome in (Outcome.END, Outcome.TURNED):
+        if move.outcome in (StepEnd.END, StepEnd.TURNED):
             branch.pass_on(move, check)

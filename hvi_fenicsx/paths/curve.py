@@ -18,16 +18,16 @@ from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
-from .branch import Branch, Move, Outcome, Passage, Refused
-from .equations import Place
-from .events import Arc, Events, displacement_rate, driven_work
+from .branch import Branch, Move, Passage, Refused, StepEnd
+from .equations import CurvePoint
+from .events import CurveStep, Events, displacement_rate, driven_work
 from .passages import Crossing
 from .pivoting import StraightBranch
 from .relations import ContactPoints
 from .state import Position
 
 
-class Curve(Events):
+class CurvedBranch(Events):
     """The curve from one of its points on.
 
     Args:
@@ -47,7 +47,7 @@ class Curve(Events):
         super().__init__(constant, rate, points, z, factor)
         self.length, self.shortest = 0.1, self.limits.standing
         self._next, self._crossed = self.length, False
-        self.disagreement: Callable[[Arc], float] = lambda move: 0.0
+        self.disagreement: Callable[[CurveStep], float] = lambda move: 0.0
         self._size = self._extent()
 
     def _extent(self) -> float:
@@ -56,9 +56,9 @@ class Curve(Events):
         return float(np.max(np.abs(ends[np.isfinite(ends)]), initial=1.0))
 
     @override
-    def advance(self, aim: float) -> Arc:
+    def advance(self, aim: float) -> CurveStep:
         if self._goes_on_for_ever(aim):
-            return Arc(outcome=Outcome.AWAY, before=self.here, after=self.here)
+            return CurveStep(outcome=StepEnd.AWAY, before=self.here, after=self.here)
         while self.length > self.shortest:
             try:
                 move = self._tried(aim)
@@ -66,10 +66,10 @@ class Curve(Events):
                 self.length *= 0.5
                 continue
             self.here = move.after
-            if move.outcome is Outcome.FACTOR:
+            if move.outcome is StepEnd.FACTOR:
                 self.here.y[-1] = aim / self.unit
             return move
-        return Arc(outcome=Outcome.STUCK, before=self.here, after=self.here)
+        return CurveStep(outcome=StepEnd.STUCK, before=self.here, after=self.here)
 
     def _goes_on_for_ever(self, aim: float) -> bool:
         """Whether nothing ends the curve."""
@@ -107,7 +107,7 @@ class Curve(Events):
         rate, left = self.rising, aim / self.unit - float(self.here.y[-1])
         return left / rate if rate * left > 0.0 else np.inf
 
-    def _tried(self, aim: float) -> Arc:
+    def _tried(self, aim: float) -> CurveStep:
         """A step of the present length, or to what comes first."""
         start, tangent = self.here.y, self.here.tangent
         ways, ends = self._ends()
@@ -116,14 +116,14 @@ class Curve(Events):
         # what ends with the factor at its aim goes on from there, if at all
         if until <= way * (1.0 + 0.1 * self.limits.reached):
             way = until
-            outcome, point, condition = Outcome.FACTOR, None, self.at_factor(aim)
+            outcome, point, condition = StepEnd.FACTOR, None, self.at_factor(aim)
         elif way == first:
             point = int(np.argmin(ways))
             if way == 0.0:
                 return self._in_place(point)
-            outcome, condition = Outcome.END, self.at_end(point, float(ends[point]))
+            outcome, condition = StepEnd.END, self.at_end(point, float(ends[point]))
         else:
-            outcome, point, condition = Outcome.STEP, None, self.plane(way)
+            outcome, point, condition = StepEnd.STEP, None, self.plane(way)
         predicted = start + way * tangent
         y = self.correct(predicted, condition)
         self._refuse_far(predicted, y, way)
@@ -191,24 +191,24 @@ class Curve(Events):
 
     @override
     def note(self, move: Move) -> None:
-        if move.outcome is Outcome.FOLD:
+        if move.outcome is StepEnd.FOLD:
             self.trend = -self.trend
             self.unstable = self._beyond(move)
             return
-        if move.outcome in (Outcome.END, Outcome.TURNED):
+        if move.outcome in (StepEnd.END, StepEnd.TURNED):
             self._settle()
             self.watch_folds()
         self.unstable = self.points.unstable_directions(self.here.values)
 
     def _beyond(self, move: Move) -> int:
         """The number of unstable directions after a fold: vᵀH v = λ' f1ᵀv along the curve changes its sign there."""
-        assert isinstance(move, Arc)
+        assert isinstance(move, CurveStep)
         held = self.trend * float(self._rate @ displacement_rate(self.points, move.before))
         return max(self.unstable + (1 if held < 0.0 else -1), 0)
 
     @override
     def driven(self, move: Move) -> float:
-        assert isinstance(move, Arc)
+        assert isinstance(move, CurveStep)
         return driven_work(move, self.points, self._rate, self.unit)
 
     @override
@@ -260,7 +260,7 @@ class Curve(Events):
 
     @override
     def set_out_as(self, other: Branch, check: Callable[[], None]) -> None:
-        assert isinstance(other, Curve)
+        assert isinstance(other, CurvedBranch)
         along = other.here.tangent.copy()
         along[-1] = 0.0
         self.head(along)
@@ -285,13 +285,13 @@ class Curve(Events):
     def _settle_at(self, y: Array) -> None:
         self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
 
-    def _turns_back(self, after: Place) -> bool:
+    def _turns_back(self, after: CurvePoint) -> bool:
         """Whether the tangent there leads back in units of the laws: a long spring beside them hides a fold."""
         way = (after.values.s - self.here.values.s) / self.points.reach(after.values)
         rates = self.rates_at(after) / self.points.reach(after.values)
         return float(way @ rates) < 0.0
 
-    def _checked(self, move: Arc, way: float) -> Arc:
+    def _checked(self, move: CurveStep, way: float) -> CurveStep:
         """The step, if it did not leave the curve."""
         if not self.points.bent:
             return move
@@ -305,7 +305,7 @@ class Curve(Events):
             self.length *= max(0.3, 1.6 * disagreement**-0.2)  # halved as well where it is refused
             raise Refused
         agreed = move.size * 0.8 * max(disagreement, 1e-4) ** -0.2
-        if move.outcome is not Outcome.STEP:  # an event that is near says nothing of the next step's length
+        if move.outcome is not StepEnd.STEP:  # an event that is near says nothing of the next step's length
             agreed = max(agreed, self.length)
         self.length = min(self._next, agreed)
         return move
@@ -333,4 +333,4 @@ def branch_from(
     """
     if points.straight:
         return StraightBranch(points, constant, rate, z, factor, inverse=inverse, heading=heading)
-    return Curve(constant, rate, points, z.copy(), factor)
+    return CurvedBranch(constant, rate, points, z.copy(), factor)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
-from .events import Arc, driven_work
+from .events import CurveStep, driven_work
 from .relations import ContactPoints, Values
 from .vertex_laws import VertexLaw
 
@@ -132,7 +132,7 @@ class EnergyBalance:
         self.work += self.stored.potential - before.potential
         return before.energy + before.dissipated - self.stored.energy - self.stored.dissipated
 
-    def disagreement(self, arc: Arc, unit: float) -> float:
+    def disagreement(self, arc: CurveStep, unit: float) -> float:
         """By how much the work along a step misses what the energies say, 1 for all that is allowed.
 
         Args:
@@ -148,7 +148,7 @@ class EnergyBalance:
         size = max(self._size, before.size, after.size)
         return abs(change) / (self._points.thresholds.agreed * size or 1.0)
 
-    def _strained(self, arc: Arc) -> float:
+    def _strained(self, arc: CurveStep) -> float:
         """The change of ½ xᵀ S x, without the rounding that large displacements leave in each of its ends."""
         before, after = arc.before.values.x, arc.after.values.x
         return 0.5 * float((before + after) @ (self._problem.stiffness @ (after - before)))

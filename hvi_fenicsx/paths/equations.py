@@ -18,7 +18,7 @@ from .thresholds import DEFAULT, FollowingThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class CurvePoint:
     """A point of the curve.
 
     Attributes:
@@ -65,7 +65,7 @@ class CurveEquations(Branch):
         values = points.values(z)
         self._held: Array = np.empty((0, len(z)))
         left = (points.stiffness @ values.x + values.force - constant - factor * rate) / points.forces
-        self.here = Place(y=y, tangent=np.zeros_like(y), values=values, left=left)
+        self.here = CurvePoint(y=y, tangent=np.zeros_like(y), values=values, left=left)
         self._factors: Bordered | None = None
 
     @property
@@ -93,7 +93,7 @@ class CurveEquations(Branch):
     def directions(self) -> Array:
         return self.rates_at(self.here)
 
-    def rates_at(self, place: Place) -> Array:
+    def rates_at(self, place: CurvePoint) -> Array:
         """How fast the points go along their graphs at a place, (m,).
 
         Args:
@@ -121,8 +121,8 @@ class CurveEquations(Branch):
         change -= (y[-1] - here.y[-1]) * self.unit * self._rate
         return np.asarray(here.left + change / self.points.forces)
 
-    def _at_place(self, y: Array, tangent: Array, values: Values) -> Place:
-        return Place(y=y, tangent=tangent, values=values, left=self.residual(y, values))
+    def _at_place(self, y: Array, tangent: Array, values: Values) -> CurvePoint:
+        return CurvePoint(y=y, tangent=tangent, values=values, left=self.residual(y, values))
 
     def _factorise(self, values: Values, row: Array) -> Bordered:
         n = len(values.x)

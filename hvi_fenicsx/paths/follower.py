@@ -10,15 +10,15 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
-from .branch import Branch, Move, Outcome, Passage, Refused, event_of
-from .curve import Curve
+from .branch import Branch, Move, Passage, Refused, StepEnd, event_of
+from .curve import CurvedBranch
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
 from .jumps import Jump
 from .load_history import Cycle, Cycles, LoadHistory
 from .pivoting import StraightBranch
 from .relations import ContactPoints
-from .state import End, Event, Follow, PathOptions, PathState, Place, Stopped, place_of
+from .state import End, Event, EventPlace, Follow, PathOptions, PathState, Stopped, place_of
 from .straight_state import coordinates_at
 from .vertex_laws import factors, multiplied
 
@@ -179,7 +179,7 @@ class Follower(LoadHistory):
             loads = problem.force, problem.force_rate
             self._branch = StraightBranch(points, *loads, z, factor, position, inverse, heading)
             return
-        curve = Curve(problem.force, problem.force_rate, points, z.copy(), factor)
+        curve = CurvedBranch(problem.force, problem.force_rate, points, z.copy(), factor)
         curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
         self._branch = curve
         if resumed is not None and resumed.event not in (Event.START, Event.TURN):
@@ -203,12 +203,12 @@ class Follower(LoadHistory):
                 yield from self._taken_up() if self._adrift else self._jump(aim)
                 continue
             move = self._branch.advance(self._next(aim))
-            if move.outcome in (Outcome.AWAY, Outcome.STUCK):
+            if move.outcome in (StepEnd.AWAY, StepEnd.STUCK):
                 self._ended(move.outcome)
                 yield self._state(Event.END)
                 return
             self._balance.go(self._branch.values, self.factor, self._branch.driven(move))
-            if move.outcome is not Outcome.FACTOR or self.factor != aim:
+            if move.outcome is not StepEnd.FACTOR or self.factor != aim:
                 yield self._noted(move)
             if self.end is None:
                 self._watch()
@@ -259,7 +259,7 @@ class Follower(LoadHistory):
 
     def _passed(self, move: Move) -> list[Passage]:
         """The passages at the present state; where there is no end of them, the path is lost."""
-        if move.outcome not in (Outcome.END, Outcome.TURNED):
+        if move.outcome not in (StepEnd.END, StepEnd.TURNED):
             return []
         try:
             return self._branch.pass_on(move, self._check)
@@ -273,16 +273,16 @@ class Follower(LoadHistory):
 
     def _noted(self, move: Move) -> PathState:
         """The state after a step, and what happens there."""
-        if move.outcome in (Outcome.END, Outcome.TURNED) and not self._points.straight and self._is_adrift():
+        if move.outcome in (StepEnd.END, StepEnd.TURNED) and not self._points.straight and self._is_adrift():
             return self._state(Event.KINK)  # all bonds are broken at once: nothing is left to pass
         before = self._branch.trend
         passages = self._passed(move)
         self._branch.note(move)
-        if move.outcome in (Outcome.STEP, Outcome.FACTOR):
+        if move.outcome in (StepEnd.STEP, StepEnd.FACTOR):
             return self._state(Event.STEP)
         event = event_of(passages, folds=before * self._branch.trend < 0)
         state = self._state(event, passages, bifurcation=event is Event.FOLD and max(move.tied, len(passages)) > 1)
-        if move.outcome is not Outcome.FOLD:
+        if move.outcome is not StepEnd.FOLD:
             self._detect_cycle(state)
         return state
 
@@ -296,9 +296,9 @@ class Follower(LoadHistory):
         elif not straight and self._cycles.standing > self._options.thresholds.waits + 4 * len(self._points):
             self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
 
-    def _ended(self, outcome: Outcome) -> None:
+    def _ended(self, outcome: StepEnd) -> None:
         """End where no step is short enough, or nothing ends the curve: where the factor stands, a body comes off."""
-        if outcome is Outcome.STUCK:
+        if outcome is StepEnd.STUCK:
             self._lose(self.factor, f"at the factor {self.factor:.6g} no step is short enough to stay on the path")
         elif self._branch.stands:
             self._come_off(self.factor, f"at the factor {self.factor:.6g} a body comes off")
@@ -356,7 +356,7 @@ class Follower(LoadHistory):
         self,
         event: Event,
         passages: Sequence[Passage] = (),
-        place: Place | None = None,
+        place: EventPlace | None = None,
         *,
         bifurcation: bool = False,
     ) -> PathState:
@@ -377,7 +377,7 @@ class Follower(LoadHistory):
         )
         return self._last
 
-    def _place(self, passage: Passage) -> Place:
+    def _place(self, passage: Passage) -> EventPlace:
         laws = self._points.laws_at(passage.point)
         group = laws[0].group if laws and not (passage.closes or passage.opens) else None
         return place_of(self._problem, int(self._points.unknowns_of(passage.point)[0]), group)

@@ -13,11 +13,11 @@ import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
-from .branch import Outcome, Refused, advancing
+from .branch import Refused, StepEnd, advancing
 from .curve import branch_from
-from .motion import Relaxation
+from .motion import OverdampedMotion
 from .relations import ContactPoints
-from .segments import Kind, Segment
+from .segments import Segment, SegmentKind
 from .thresholds import FollowingThresholds
 
 
@@ -57,7 +57,7 @@ def at_rest(problem: CondensedProblem, points: ContactPoints) -> Rest:
         i = int(points.one[k]) if k < len(points.one) else None
         at, wanted = (0.0, 0.0) if i is None else (float(x[i]), float(free[i]))
         number, s_force = _standing(points.chain(k), at, wanted)
-        if points.opening(k) is not None and points.chain(k)[number].kind is Kind.PIECE:
+        if points.opening(k) is not None and points.chain(k)[number].kind is SegmentKind.PIECE:
             number = len(points.chain(k)) - 1
         points.enter(k, number)
         if i is not None:
@@ -67,7 +67,7 @@ def at_rest(problem: CondensedProblem, points: ContactPoints) -> Rest:
 
 def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:
     """The segment of a displacement that holds best, and its least force; of a fixed unknown the wanted one."""
-    if len(chain) == 1 and chain[0].kind is Kind.BOUND:
+    if len(chain) == 1 and chain[0].kind is SegmentKind.BOUND:
         return 0, wanted
     forces = {n: segment.force_at(x) for n, segment in enumerate(chain) if segment.stands_at(x)}
     least = min(abs(f) for f in forces.values())
@@ -92,7 +92,7 @@ def settled(
     """
     limits = points.thresholds
     first = limits.small * towards
-    motion = Relaxation(problem, points, z, problem.load(first), held=held, step=step)
+    motion = OverdampedMotion(problem, points, z, problem.load(first), held=held, step=step)
     if not motion.run(np.zeros(len(points))) or motion.escapes:
         return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
     heading, most = -int(np.sign(first)), limits.waits * (1 + len(points))
@@ -101,9 +101,9 @@ def settled(
         branch.set_out(heading, step)
         none = no_load(problem, branch.values.x, first, limits)
         for move in advancing(branch, -heading * none, step, most):
-            if move.outcome is Outcome.FACTOR:
+            if move.outcome is StepEnd.FACTOR:
                 return branch.balanced(0.0)
-            if move.outcome in (Outcome.AWAY, Outcome.STUCK):
+            if move.outcome in (StepEnd.AWAY, StepEnd.STUCK):
                 break
     except (Refused, np.linalg.LinAlgError):
         pass

@@ -19,9 +19,9 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
-from .branch import Branch, Outcome, Refused, advancing
+from .branch import Branch, Refused, StepEnd, advancing
 from .curve import branch_from
-from .motion import Relaxation
+from .motion import OverdampedMotion
 from .relations import ContactPoints
 
 
@@ -103,14 +103,14 @@ class Jump:
         for move in advancing(branch, 0.0, self._step, most):
             stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
             standing, x = standing + 1 if stands else 0, branch.values.x
-            anywhere = move.outcome is Outcome.AWAY and abs(branch.factor) <= none
-            if move.outcome is Outcome.FACTOR or anywhere:
+            anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
+            if move.outcome is StepEnd.FACTOR or anywhere:
                 stable = self._points.unstable_directions(branch.values) == 0
                 return self._landed(branch.z.copy(), branch.inverse()) if stable else None
-            if move.outcome is Outcome.AWAY:
+            if move.outcome is StepEnd.AWAY:
                 off = branch.stands and branch.factor < 0.0 and not self._held
                 return Landing(z=None) if off else None
-            if move.outcome is Outcome.STUCK or branch.factor > none or standing > limits.waits + 4 * len(self._points):
+            if move.outcome is StepEnd.STUCK or branch.factor > none or standing > limits.waits + 4 * len(self._points):
                 return None
         return None
 
@@ -141,7 +141,7 @@ class Jump:
         return found if found is None or found.z is None else self._landed(found.z)
 
     def _relaxed(self, z: Array, load: Array) -> Landing | None:
-        relaxation = Relaxation(self._problem, self._points, z, load, held=self._held, step=self._step)
+        relaxation = OverdampedMotion(self._problem, self._points, z, load, held=self._held, step=self._step)
         if not relaxation.run(self._directions):
             return None
         return Landing(z=None if relaxation.escapes else relaxation.z)

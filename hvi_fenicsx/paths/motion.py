@@ -16,8 +16,8 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CondensedStiffness, DenseStiffness
 from ..typing import Array
-from .branch import Branch, Outcome, Refused
-from .curve import Curve, branch_from
+from .branch import Branch, Refused, StepEnd
+from .curve import CurvedBranch, branch_from
 from .relations import ContactPoints
 
 
@@ -30,7 +30,7 @@ class _Went(Enum):
     NOWHERE = 64.0
 
 
-class Relaxation:
+class OverdampedMotion:
     """The motion at constant loads.
 
     Args:
@@ -139,7 +139,7 @@ class Relaxation:
             return _Went.NOWHERE
         branch = branch_from(points, points.elastic @ values.x + values.force, left, self.z, 0.0)
         branch.set_out(1.0, self._step)
-        if isinstance(branch, Curve):
+        if isinstance(branch, CurvedBranch):
             branch.shortest = self._limits.small
         went = self._followed(branch)
         self.z = branch.z.copy()
@@ -158,19 +158,19 @@ class Relaxation:
     def _followed(self, branch: Branch) -> _Went:
         """Along the branch of one step, until all that was left of the forces is applied or a law drops."""
         points = self._points
-        for _ in range(50 + 4 * len(points)):
+        for _ in range(self._limits.waits * (2 + len(points))):
             if branch.rising < 0.0 or points.on_drops():
                 break
             self._step()
             move = branch.advance(1.0)
             self.z = branch.z.copy()
-            if move.outcome is Outcome.FACTOR or self._is_out_of_reach():
+            if move.outcome is StepEnd.FACTOR or self._is_out_of_reach():
                 return _Went.WELL
-            if move.outcome is Outcome.AWAY:
+            if move.outcome is StepEnd.AWAY:
                 return _Went.NOWHERE
-            if move.outcome is Outcome.STUCK:
+            if move.outcome is StepEnd.STUCK:
                 break
-            if move.outcome in (Outcome.END, Outcome.TURNED):
+            if move.outcome in (StepEnd.END, StepEnd.TURNED):
                 branch.pass_on(move, self._step)
         return _Went.PARTLY if branch.factor > 0.0 else _Went.NOWHERE
 

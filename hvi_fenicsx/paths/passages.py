@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..typing import Array
-from .branch import Move, Outcome, Passage, Refused
+from .branch import Move, Passage, Refused, StepEnd
 from .equations import CurveEquations
 from .segments import piece_at
 
@@ -54,8 +54,8 @@ class Crossing:
 
     def _passed(self, move: Move | None) -> list[Passage]:
         if move is not None and move.point is not None:
-            self._pass_arrived(move.point, turned=move.outcome is Outcome.TURNED)
-        for _ in range(50 + 20 * len(self._points)):
+            self._pass_arrived(move.point, turned=move.outcome is StepEnd.TURNED)
+        for _ in range(self._limits.waits * (2 + len(self._points))):
             self._check()
             rates = self._rates()
             k = self._next(rates)

@@ -19,9 +19,9 @@ from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
-from .branch import Branch, Move, Outcome, Passage
+from .branch import Branch, Move, Passage, StepEnd
 from .relations import ContactPoints
-from .segments import Kind, Segment, piece_at
+from .segments import Segment, SegmentKind, piece_at
 from .state import Position
 from .straight_state import FACTOR, Basis, StraightState
 from .thresholds import ROUNDING
@@ -202,7 +202,7 @@ class StraightBranch(Branch):
     def advance(self, aim: float) -> Move:
         chosen = self._first_end(aim)
         if chosen is None:
-            return Move(outcome=Outcome.AWAY)
+            return Move(outcome=StepEnd.AWAY)
         variable, length, small, tied = chosen
         self._go(length, small)
         if variable == FACTOR:
@@ -211,9 +211,9 @@ class StraightBranch(Branch):
         self._told = self.values.x, self._factor
         self._driven = 0.5 * float(self.rate @ (before + self.values.x)) * (self._factor - factor)
         if variable == FACTOR:
-            return Move(outcome=Outcome.FACTOR)
+            return Move(outcome=StepEnd.FACTOR)
         turns = self.rates[variable] * self.points.outward[variable] < 0.0
-        return Move(outcome=Outcome.TURNED if turns else Outcome.END, point=variable, tied=tied)
+        return Move(outcome=StepEnd.TURNED if turns else StepEnd.END, point=variable, tied=tied)
 
     @override
     def driven(self, move: Move) -> float:
@@ -285,7 +285,7 @@ class StraightBranch(Branch):
         assert move.point is not None
         i, before, trend, stood = move.point, self.points.segment(move.point), self.trend, self.stands
         forward, held = bool(self.rates[i] > 0.0), self.state.held
-        if move.outcome is Outcome.TURNED:
+        if move.outcome is StepEnd.TURNED:
             self._turn_back(i, forward=forward)
         else:
             number = int(self.points.numbers[i]) + (1 if forward else -1)
@@ -360,15 +360,15 @@ class StraightBranch(Branch):
 
 def _change(before: Segment, after: Segment) -> int:
     """How the number of unstable directions changes where the factor turns: by the sign of the pivot."""
-    if before.kind is Kind.PIECE and after.kind is Kind.PIECE:
+    if before.kind is SegmentKind.PIECE and after.kind is SegmentKind.PIECE:
         return 1 if after.slope < before.slope else -1
-    if before.kind is Kind.PIECE:
+    if before.kind is SegmentKind.PIECE:
         return 1 if _drops(after) else -1
     return -1 if _drops(before) else 1
 
 
 def _drops(segment: Segment) -> bool:
-    return segment.kind is Kind.JUMP and segment.rise < 0.0
+    return segment.kind is SegmentKind.JUMP and segment.rise < 0.0
 
 
 def _largest(values: Array) -> float:

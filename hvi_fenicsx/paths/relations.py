@@ -43,7 +43,7 @@ class Values:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motions:
+class FreeMotions:
     """The displacements that can change at a point, q of them.
 
     Attributes:
@@ -286,7 +286,7 @@ class ContactPoints(PointStatuses):
             return not self.elastic.is_singular(self.moving, self.slope)
         return not is_singular(self.motions(values).matrix, rounding_of(self.stiffness))
 
-    def motions(self, values: Values) -> Motions:
+    def motions(self, values: Values) -> FreeMotions:
         """The displacements that can change.
 
         Args:
@@ -295,7 +295,7 @@ class ContactPoints(PointStatuses):
         slopes = self._slopes(values)
         free = np.flatnonzero(~np.isnan(slopes))
         ways = self._axes(values.directions).sparse[free]
-        return Motions(ways=ways, elastic=ways @ (ways @ self.stiffness).T, slopes=slopes[free])
+        return FreeMotions(ways=ways, elastic=ways @ (ways @ self.stiffness).T, slopes=slopes[free])
 
     def _axes(self, directions: Array) -> Blocks:
         """Orthonormal axes of each point, the first that counts along its vector.

@@ -20,7 +20,7 @@ from .vertex_laws import VertexLaw
 _SIDES = ("left", "right")
 
 
-class Kind(Enum):
+class SegmentKind(Enum):
     """What moves on a segment."""
 
     PIECE = "piece"
@@ -47,7 +47,7 @@ class Segment:
             else 0.
     """
 
-    kind: Kind
+    kind: SegmentKind
     x: float
     force: float
     slope: float = 0.0
@@ -81,9 +81,9 @@ class Segment:
     @property
     def hold(self) -> tuple[int, float]:
         """How well a segment holds, for comparison: bounds, rising jumps, pieces by their slope, drops."""
-        if self.kind is Kind.PIECE:
+        if self.kind is SegmentKind.PIECE:
             return 0, self.slope
-        if self.kind is Kind.BOUND:
+        if self.kind is SegmentKind.BOUND:
             return 2, 0.0
         return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
 
@@ -125,7 +125,7 @@ def chain(laws: Sequence[VertexLaw], lower: float, upper: float) -> tuple[Segmen
         upper: its upper bound, or inf.
     """
     if lower == upper:
-        return (Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=math.inf),)
+        return (Segment(kind=SegmentKind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=math.inf),)
     every = sorted({float(b) for law in laws for b in law.graph.breaks if lower < b < upper})
     ends = [lower, *(b for b in every if any(law.changes(b) for law in laws)), upper]
     places = np.unique([x for x in (*ends, 0.0) if math.isfinite(x)])
@@ -136,21 +136,21 @@ def chain(laws: Sequence[VertexLaw], lower: float, upper: float) -> tuple[Segmen
     )
     found: list[Segment] = []
     if math.isfinite(lower):
-        found.append(Segment(kind=Kind.BOUND, x=lower, force=right[lower], rise=1.0, low=-math.inf, high=0.0))
+        found.append(Segment(kind=SegmentKind.BOUND, x=lower, force=right[lower], rise=1.0, low=-math.inf, high=0.0))
     for start, end in itertools.pairwise(ends):
         if start > lower and abs(right[start] - left[start]) > ROUNDING * size[start]:
             found.append(_jump(laws, start, left[start], right[start]))
         anchor = 0.0 if start < 0.0 < end else start if math.isfinite(start) else end
         found.append(_piece(laws, start, end, anchor, (left if anchor == end else right)[anchor]))
     if math.isfinite(upper):
-        found.append(Segment(kind=Kind.BOUND, x=upper, force=left[upper], rise=1.0, low=0.0, high=math.inf))
+        found.append(Segment(kind=SegmentKind.BOUND, x=upper, force=left[upper], rise=1.0, low=0.0, high=math.inf))
     return tuple(found)
 
 
 def _jump(laws: Sequence[VertexLaw], at: float, left: float, right: float) -> Segment:
     fresh = at != 0.0 and not all(law.has_passed(at) for law in laws)
     rise, outward = math.copysign(1.0, right - left), int(np.sign(at)) if fresh else 0
-    return Segment(kind=Kind.JUMP, x=at, force=left, rise=rise, low=0.0, high=abs(right - left), outward=outward)
+    return Segment(kind=SegmentKind.JUMP, x=at, force=left, rise=rise, low=0.0, high=abs(right - left), outward=outward)
 
 
 def _piece(laws: Sequence[VertexLaw], start: float, end: float, anchor: float, force: float) -> Segment:
@@ -160,7 +160,7 @@ def _piece(laws: Sequence[VertexLaw], start: float, end: float, anchor: float, f
         for law in laws
     )
     return Segment(
-        kind=Kind.PIECE,
+        kind=SegmentKind.PIECE,
         x=anchor,
         force=force,
         slope=math.fsum(law.slope(middle) for law in laws),
@@ -193,7 +193,7 @@ def from_zero(found: tuple[Segment, ...]) -> tuple[Segment, ...]:
     rest = found[0].force
     if rest == 0.0:
         return found[1:]
-    jump = Segment(kind=Kind.JUMP, x=0.0, force=0.0, rise=float(np.sign(rest)), low=0.0, high=abs(rest))
+    jump = Segment(kind=SegmentKind.JUMP, x=0.0, force=0.0, rise=float(np.sign(rest)), low=0.0, high=abs(rest))
     return (jump, *found[1:])
 
 
@@ -203,9 +203,9 @@ def beside_opening(lower: float) -> tuple[Segment, ...]:
     Args:
         lower: the bound, at most 0; or -inf.
     """
-    found = [Segment(kind=Kind.PIECE, x=0.0, force=0.0, low=0.0, high=math.inf)]
+    found = [Segment(kind=SegmentKind.PIECE, x=0.0, force=0.0, low=0.0, high=math.inf)]
     if lower < 0.0:
-        found.insert(0, Segment(kind=Kind.PIECE, x=0.0, force=0.0, low=lower, high=0.0))
+        found.insert(0, Segment(kind=SegmentKind.PIECE, x=0.0, force=0.0, low=lower, high=0.0))
     if math.isfinite(lower):
-        found.insert(0, Segment(kind=Kind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=0.0))
+        found.insert(0, Segment(kind=SegmentKind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=0.0))
     return tuple(found)

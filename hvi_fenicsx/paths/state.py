@@ -49,7 +49,7 @@ class End(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class EventPlace:
     """Where an event happened.
 
     Attributes:
@@ -63,7 +63,7 @@ class Place:
     point: Array
 
 
-def place_of(problem: CondensedProblem, unknown: int, group: int | None) -> Place:
+def place_of(problem: CondensedProblem, unknown: int, group: int | None) -> EventPlace:
     """Where an event happened at an unknown: at the part of a law or, where a contact closes or opens, of the contact.
 
     Args:
@@ -72,7 +72,7 @@ def place_of(problem: CondensedProblem, unknown: int, group: int | None) -> Plac
         group: number of the problem's bonds; None: a contact.
     """
     part = problem.parts[unknown] if group is None else problem.bonds[group].part
-    return Place(part=part, unknown=unknown, point=problem.points[unknown])
+    return EventPlace(part=part, unknown=unknown, point=problem.points[unknown])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +118,7 @@ class PathState:
 
     factor: float
     event: Event
-    place: Place | None
+    place: EventPlace | None
     x: Array
     energy: float
     work: float

@@ -17,7 +17,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
 from .contact_points import PointLaws
 from .curved_laws import Deviations
-from .segments import Kind, Segment, beside_opening, chain, from_zero
+from .segments import Segment, SegmentKind, beside_opening, chain, from_zero
 from .thresholds import DEFAULT, ROUNDING, FollowingThresholds
 from .vertex_laws import shares
 
@@ -136,7 +136,7 @@ class PointStatuses(PointLaws):
         self._x[k], self._force[k] = segment.x, segment.force
         self._moves[k] = 0.0 if segment.rise else unit
         self._rises[k] = (segment.rise or segment.slope) * unit
-        self._bound[k] = segment.kind is Kind.BOUND
+        self._bound[k] = segment.kind is SegmentKind.BOUND
         self.outward[k] = segment.outward
         self._curved[k] = self._deviations.enter(k, segment)
         self._bent[k] = self._curved[k] or self._turns(k)

@@ -27,7 +27,7 @@ from . import condensed_laws, loading
 from .condensed_laws import Carriers
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
-from .elimination import Elimination, RigidMotions
+from .elimination import CondensedMotions, Elimination
 from .factorised_stiffness import FactorisedStiffness
 
 
@@ -132,7 +132,7 @@ class Condensation:
 
     def _balanced(self, elastic: DenseStiffness, force: Array) -> tuple[DenseStiffness, Array]:
         """Stiffness and loads as rounding has not changed them along rigid motions. Collective."""
-        motions = RigidMotions.of(self._system, self._interior, self._elimination.stay)
+        motions = CondensedMotions.of(self._system, self._interior, self._elimination.stay)
         work = self._system.comm.allreduce(motions.fields.T @ self._loading.lifted)
         return DenseStiffness(motions.without_forces(elastic.array)), motions.with_work(force, work)
 

@@ -117,7 +117,7 @@ _UNSEEN = 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigidMotions:
+class CondensedMotions:
     """Rigid motions that the supports of bodies leave, at condensed unknowns.
 
     Attributes:
