@@ -21,10 +21,10 @@ from hvi_fenicsx.compat import NOT_A_NUMBER
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.solvers.condensed import onto_bounds
 from hvi_fenicsx.solvers.context import SolveContext
-from hvi_fenicsx.solvers.law_models import VertexModel
 from hvi_fenicsx.solvers.method import Counts, Method, SolveResult
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system.held_solver import HeldPreconditioner
+from hvi_fenicsx.system.law_models import VertexModel
 from hvi_fenicsx.system.petsc_options import configure, raise_python_error
 from hvi_fenicsx.system.system import System
 

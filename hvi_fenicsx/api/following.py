@@ -16,11 +16,12 @@ from mpi4py import MPI
 
 from .. import console
 from ..errors import InputError
+from ..load_paths import path_files
 from ..load_paths.following import Control, PathRun
 from ..model import Model, PathTable, SolverTable
 from ..paths.load_path import LoadPath
 from ..report.reader import PathResult
-from ..results import ResultFolder, path_files
+from ..results import ResultFolder
 from ..results.output_folder import existing
 from ..runtime import log
 from ..schema import require_path, unknown

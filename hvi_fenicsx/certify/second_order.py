@@ -23,9 +23,9 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
 from ..runtime.timing import Timer
-from ..solvers.law_models import Cells, VertexModel
 from ..system import local_frames
 from ..system.factorisation import Factorisation, form_of
+from ..system.law_models import Cells, VertexModel
 from ..system.system import System
 from ..typing import Array, Entities, Integers, Mask
 from . import force_attribution

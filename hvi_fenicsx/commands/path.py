@@ -6,11 +6,11 @@ import argparse
 from typing import Any
 
 from .. import console
+from ..load_paths import path_files
 from ..load_paths.following import Control, PathRun
 from ..model import PathTable
 from ..paths.load_path import PathRow
 from ..paths.state import End
-from ..results import path_files
 from ..runtime import journal
 from ..runtime.journal import Journal
 from ..runtime.mpi import on_root

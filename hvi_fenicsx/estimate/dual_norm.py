@@ -22,11 +22,11 @@ from ..problem.problem import Problem
 from ..problem.vectors import turn
 from ..runtime.mpi import total
 from ..runtime.timing import Timer
-from ..solvers.thresholds import DEFAULT as SOLVERS
 from ..system.held_solver import Goal, HeldPreconditioner
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
 from ..system.system import System
+from ..system.thresholds import DEFAULT as SYSTEM
 from ..typing import Array, Entities, Integers
 from .law_traces import nearest
 from .thresholds import DEFAULT
@@ -138,7 +138,7 @@ def _rising(comm: MPI.Comm, term: LawTerm, u: Array) -> Array:
     convex = term.law.convex
     second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
     if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
-        second = np.full_like(second, SOLVERS.foundation)
+        second = np.full_like(second, SYSTEM.foundation)
         return term.rate(u, second * argument * term.stretch, second * term.stretch)
     secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second
     return term.rate(u, secant, second)

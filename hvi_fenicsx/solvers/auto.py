@@ -17,10 +17,10 @@ from dataclasses import replace
 from petsc4py import PETSc
 
 from ..errors import SolverError
+from ..system.law_models import VertexModel
 from . import load_path_start, newton_continuation
 from .branch import BranchIteration
 from .context import SolveContext
-from .law_models import VertexModel
 from .load_path_start import PathStart
 from .method import Counts, SolveResult
 from .resting_start import at_rest, resting_start

@@ -23,12 +23,12 @@ from ..laws import Superpotential
 from ..laws.smoothing import QUADRATIC
 from ..model.options import Start
 from ..problem.law_term import LawTerm
+from ..system.law_models import Cells
 from ..system.system import System
 from ..typing import Array
 from .context import SolveContext
 from .convergence import Outcome
 from .convex_step import UNBOUNDED, ConvexStep, no_step
-from .law_models import Cells
 from .method import Counts, Method, SolveResult
 from .resting_start import resting_start
 

@@ -20,10 +20,10 @@ from ..errors import InputError
 from ..system.equations import LawModel
 from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
+from ..system.law_models import VertexModel
 from ..system.system import System
 from ..typing import Array, Integers
 from .context import SolveContext
-from .law_models import VertexModel
 from .method import Counts, Method, SolveResult
 
 _STATUS = {

@@ -17,12 +17,12 @@ from petsc4py import PETSc
 
 from ..laws import Superpotential
 from ..system import boundedness
+from ..system.law_models import Cells, VertexModel
 from ..typing import Array
 from . import kink_bounds
 from .attempts import Attempt, first_success
 from .context import SolveContext
 from .convergence import Outcome
-from .law_models import Cells, VertexModel
 from .method import Counts
 from .thresholds import ENERGY, EXACT, FULL_STEPS
 
@@ -54,7 +54,7 @@ class ConvexStep:
     def cells(self, x: PETSc.Vec) -> list[Cells]:
         """The cells between convex kinks that hold x, by term."""
         terms = zip(self._system.terms, self._laws, self.arguments(x), strict=True)
-        return [Cells.around(law.convex, a, radial=t.radial, thresholds=self._thresholds) for t, law, a in terms]
+        return [Cells.around(law.convex, a, radial=t.radial, thresholds=self._thresholds.linear) for t, law, a in terms]
 
     def subgradients(self, x: PETSc.Vec, shifts: Sequence[Array] | None = None) -> list[Array]:
         """ξ ∈ ∂G at x, by term, (m,) each.
@@ -244,9 +244,9 @@ class ConvexStep:
             self._check_bounded = True
             if self._is_unbounded([m.xi for m in models if m.xi is not None]):
                 yield UNBOUNDED
-        yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.foundation)
+        yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.linear.foundation)
         secants = [replace(m, secant_from=m.law.length_scale) for m in models]
-        yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
+        yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.linear.foundation)
         yield Attempt(models=models, line_search=FULL_STEPS)
 
     def _is_unbounded(self, xi: Sequence[Array]) -> bool:

@@ -10,9 +10,9 @@ from petsc4py import PETSc
 from ..laws import ConvexPart
 from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
+from ..system.law_models import Cells, VertexModel
 from ..system.system import System
 from ..typing import Array, Integers, Mask
-from .law_models import Cells, VertexModel
 
 
 def exist(cells: Sequence[Cells]) -> bool:

@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from petsc4py import PETSc
 
+from ..system.law_models import VertexModel
 from ..system.system import System
 from .attempts import Attempt, first_success
 from .convergence import Outcome
-from .law_models import VertexModel
 from .method import Counts, Method, SolveResult
 from .resting_start import at_rest, resting_start
 from .thresholds import ENERGY, EXACT, FULL_STEPS
@@ -109,7 +109,7 @@ class ConvexProgramme(Method):
         models = [VertexModel(term.law) for term in self.system.terms]
         yield Attempt(models=models, line_search=FULL_STEPS, steady=self.context.steady)
         yield Attempt(models=models, line_search=FULL_STEPS, start=self._from_rest(models, counts))
-        yield Attempt(models=models, line_search=EXACT, foundation=self.options.thresholds.foundation)
+        yield Attempt(models=models, line_search=EXACT, foundation=self.options.thresholds.linear.foundation)
         yield Attempt(models=models, line_search=ENERGY)
 
     def _from_rest(self, models: list[VertexModel], counts: Counts) -> PETSc.Vec | None:

@@ -16,11 +16,11 @@ from ..rigid.thresholds import DEFAULT as RIGID
 from ..runtime.mpi import agree
 from ..system import existence, free_motions
 from ..system.equations import LawModel
+from ..system.law_models import Cells, TangentAtRest, VertexModel
 from ..system.system import System
 from ..typing import Array, Integers
 from .active_set import ActiveSetSolver
 from .context import SolveContext
-from .law_models import Cells, TangentAtRest, VertexModel
 
 
 def contact_dofs(system: System) -> Integers:

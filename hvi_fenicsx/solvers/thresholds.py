@@ -38,10 +38,6 @@ class Thresholds:
         most_changes: convex steps at most, and changes of the cells between kinks in one of them.
         runaway: a displacement of so many times p0 L / E0 is a body that slides away; a slip of so many times that at
             rest is beyond every kink.
-        foundation: stiffness that keeps a matrix regular where laws have none.
-        first_ramp: slip up to which the traction of a law of |u_t| grows from zero at first, relative to the largest
-            slip: a free vertex may turn its direction there.
-        least_slip: the largest slip is taken to be this at least.
         narrowest: the last width of a continuation to the law itself.
         vertex_unknowns: unknowns of Γc's vertices up to which a load path is followed for a start.
         curve_unknowns: the same where the path is a curve, without jumps; where it goes on through jumps a half.
@@ -63,9 +59,6 @@ class Thresholds:
     search_steps: int = 1_000
     most_changes: int = 200
     runaway: float = 1e8
-    foundation: float = 1e-8
-    first_ramp: float = 1e-2
-    least_slip: float = 1e-6
     narrowest: float = 1e-3
     vertex_unknowns: int = 1_600
     curve_unknowns: int = 400

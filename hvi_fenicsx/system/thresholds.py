@@ -38,6 +38,10 @@ class Thresholds:
             that move a vertex, one in space has 1/4 or more; and what may be missing of all weights of a displacement.
         held_stiffness: diagonal of a held unknown, in units of an elastic stiffness (about 1): what the unknown moves
             is less than rounding.
+        foundation: stiffness that keeps a matrix regular where laws have none.
+        first_ramp: slip up to which the traction of a law of |u_t| grows from zero at first, relative to the largest
+            slip: a free vertex may turn its direction there.
+        least_slip: the largest slip is taken to be this at least.
         rounding: of the local components of a unit vector.
     """
 
@@ -60,6 +64,9 @@ class Thresholds:
     level_growth: float = 3.0
     held_weight: float = 0.2
     held_stiffness: float = 1e20
+    foundation: float = 1e-8
+    first_ramp: float = 1e-2
+    least_slip: float = 1e-6
     rounding: float = 1e-12
 
 

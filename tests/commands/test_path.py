@@ -17,10 +17,10 @@ from runs import ROOT, command, hvi
 
 from hvi_fenicsx import prepare, read_scene
 from hvi_fenicsx.errors import Interrupted
+from hvi_fenicsx.load_paths import path_files
 from hvi_fenicsx.load_paths.following import Control, PathRun
 from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.paths.load_path import LoadPath
-from hvi_fenicsx.results import path_files
 from hvi_fenicsx.runtime.journal import Record
 
 BAR = ROOT / "demos" / "glued_bar.toml"

@@ -10,20 +10,20 @@ import numpy as np
 from dolfinx import fem
 
 from ..certify import certificate
-from ..load_paths.following import PathRun
 from ..model import dump_scene
 from ..paths.load_path import LoadPath
 from ..paths.state import End, Event
 from ..report import page
 from ..report.pictures.draw import draw as draw_pictures
+from ..results import tables, vtk_fields
+from ..results.contact_parts import contact_parts
+from ..results.output_folder import ResultFolder
+from ..results.summary import plain, summary
+from ..results.whole import made, write_record
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..workflow import unsolved
-from . import tables, vtk_fields
-from .contact_parts import contact_parts
-from .output_folder import ResultFolder
-from .summary import plain, summary
-from .whole import made, write_record
+from .following import PathRun
 
 JOURNAL = "path.journal"
 """The file in which the states of a path are kept while it is followed."""
