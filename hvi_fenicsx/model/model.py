@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -297,23 +297,14 @@ def _is_on_side(body: Body, effect: Effect) -> bool:
 
 
 def _check_place(body: Body, effect: Effect) -> None:
-    """Refuse a name that is no side or region of the body."""
-    on_side = effect.place is Place.BOUNDARY
-    known: Collection[str] = body.sides if on_side else body.regions if effect.where else ()
-    alone = (*body.pieces, *body.interfaces) if on_side else ()
-    names = effect.where or ()
+    """Refuse a name that is no side or region of the body; a piece or an interface stands alone."""
+    on_side, names = effect.place is Place.BOUNDARY, effect.where or ()
+    known = body.sides if on_side else body.regions if names else ()
+    if on_side and len(names) == 1:
+        known = (*known, *body.pieces, *body.interfaces)
     for name in names:
-        if name not in (*known, *(alone if len(names) == 1 else ())):
-            raise InputError(f"{type(effect).__name__}: {_no_place(name, known, alone)}")
-
-
-def _no_place(name: str, known: Collection[str], alone: Collection[str]) -> str:
-    """Why a name is none of a place, or none in a list."""
-    if name in alone:
-        return f"{name!r} stands alone, being a piece or an interface; a list is of whole sides: {', '.join(known)}"
-    if not known and not alone:
-        return f"the body has no place {name!r}"
-    return unknown("place", name, [*known, *alone])
+        if name not in known:
+            raise InputError(f"{type(effect).__name__}: {unknown('place', name, known)}")
 
 
 def _named(effects: Iterable[Effect]) -> Iterator[Effect]:

@@ -68,7 +68,7 @@ def test_loads_on_a_list_add_up_and_a_force_is_one(body: hvi.Body) -> None:
         (["floor", "floor"], "the place names the same thing twice"),
         (["floor", 1], "the place must be a name or a list of names in quotes"),
         ({"floor": 1}, "the place must be a name or a list of names in quotes"),
-        (["wall", "end"], "Traction: 'end' stands alone, being a piece or an interface; a list is of whole sides"),
+        (["wall", "end"], 'Traction: unknown place "end"; .*allowed: '),
     ],
 )
 def test_lists_are_refused_as_in_a_scene_file(body: hvi.Body, side: Any, reason: str) -> None:

@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from ...errors import InputError
+from ...class_registry import enter
 from ...schema import Table
 
 if TYPE_CHECKING:
@@ -58,13 +58,7 @@ class DomainShape(Table):
         super().__pydantic_init_subclass__(**kwargs)
         if "shape" not in cls.__annotations__:
             return
-        name = cls.model_fields["shape"].default
-        if not isinstance(name, str):
-            raise InputError(f'domain shape {cls.__name__}: name it by shape: Literal["name"] = "name"')
-        known = DomainShape.registry.get(name, cls)
-        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
-            raise InputError(f"domain shape {cls.__name__}: the name {name!r} is taken; choose another")
-        DomainShape.registry[name] = cls
+        enter(DomainShape.registry, cls, cls.model_fields["shape"].default, "domain shape")
 
     def space_dimension(self) -> int | None:
         """2 or 3; None where only the opened mesh knows it."""
