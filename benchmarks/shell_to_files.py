@@ -39,7 +39,7 @@ def one(words: list[str]) -> None:
 
     if cpu:
         timing.time.perf_counter = processor_time  # type: ignore[attr-defined]
-    from hvi_fenicsx import cli
+    from hvi_fenicsx.commands import cli
 
     made: list[float] = []
     init = timing.Timer.__init__

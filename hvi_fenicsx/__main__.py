@@ -8,7 +8,7 @@ import warnings
 if __name__ == "__main__" and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the command catches it: Python would end by a traceback
 
-from .cli import main
+from .commands.cli import main
 
 if __name__ == "__main__":
     # PYTHONWARNINGS=error would end the program at what a library says about itself.

@@ -15,8 +15,8 @@ from PIL import Image
 from scenes import DELTA, Table, model, quadratic_linear
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.cli import main
 from hvi_fenicsx.commands import equilibria as command
+from hvi_fenicsx.commands.cli import main
 from hvi_fenicsx.equilibrium_search.found import Saved
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
 

@@ -165,7 +165,7 @@ def executed(words: list[str], ranks: int) -> tuple[int, str]:
         ranks: to run it on.
     """
     if ranks == 1:
-        from hvi_fenicsx.cli import main as hvi
+        from hvi_fenicsx.commands.cli import main as hvi
 
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):

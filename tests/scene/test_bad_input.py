@@ -157,7 +157,7 @@ def test_a_folder_that_cannot_be_written_is_refused(out: str, scene: Path, tmp_p
 ALL_RANKS = """
 import json, sys
 from mpi4py import MPI
-from hvi_fenicsx.cli import main
+from hvi_fenicsx.commands.cli import main
 codes = [int(main(["run", *words])) for words in json.loads(sys.argv[2])]
 every = MPI.COMM_WORLD.gather(codes)
 if every:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 import pytest
 
 from hvi_fenicsx import dump_scene, read_tables
-from hvi_fenicsx.cli import main
+from hvi_fenicsx.commands.cli import main
 from hvi_fenicsx.runtime.processes import SIGNALS
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +82,7 @@ def on_ranks(ranks: int, script: str, *words: object) -> Any:
 
 _RUN_ALL = """
 import sys
-from hvi_fenicsx.cli import main
+from hvi_fenicsx.commands.cli import main
 folder, ranks = sys.argv[1:3]
 for name in sys.argv[3:]:
     main(["run", f"{folder}/{name}.toml", "--out", f"{folder}/{name}-{ranks}", "--no-pictures"])

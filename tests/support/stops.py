@@ -16,7 +16,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from hvi_fenicsx import cli
+from hvi_fenicsx.commands import cli
 from hvi_fenicsx.runtime import mpirun, processes, terminal
 
 WATCHED = {str(Path(str(module.__file__))) for module in (cli, processes, terminal)}

@@ -22,7 +22,7 @@ from typing import IO
 
 from runs import command
 
-from hvi_fenicsx.cli import main
+from hvi_fenicsx.commands.cli import main
 from hvi_fenicsx.runtime.processes import SIGNALS
 
 from . import folders, requests, surroundings

@@ -17,7 +17,7 @@ from unittest.mock import patch
 import tomli_w
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx.cli import main
+from hvi_fenicsx.commands.cli import main
 from hvi_fenicsx.runtime.journal import Journal
 
 from .case import OUT, RUN, SCENE, Case, write

@@ -10,9 +10,9 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from .commands.arguments import parser
-from .errors import ExitCode, HviError, InputError
-from .runtime import log, processes, terminal
+from ..errors import ExitCode, HviError, InputError
+from ..runtime import log, processes, terminal
+from .arguments import parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,12 +70,12 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
     if options.command == "version":
         return _version()
     if getattr(options, "np", None) and not processes.is_under_mpirun():
-        from .runtime import mpirun
+        from ..runtime import mpirun
 
         return mpirun.run(options.np, words)
     if not processes.is_under_mpirun():
         return _run_on_ranks(options)
-    from .runtime import mpirun
+    from ..runtime import mpirun
 
     processes.die_with_parent(signal.SIGKILL)
     return mpirun.hand_over(_told(lambda: _run_on_ranks(options)))
@@ -86,11 +86,11 @@ def _run_on_ranks(options: argparse.Namespace) -> int:
         processes.start_petsc()
         from mpi4py import MPI
 
-        from .model import plugins
-        from .runtime.mpi import ended_together
-        from .system.petsc_options import refusals_told
+        from ..model import plugins
+        from ..runtime.mpi import ended_together
+        from ..system.petsc_options import refusals_told
 
-        command = importlib.import_module(f".commands.{options.command}", __package__)
+        command = importlib.import_module(f".{options.command}", __package__)
     with ended_together(MPI.COMM_WORLD), _placed(options), refusals_told(), plugins.named():
         return int(command.execute(options))
 
@@ -98,7 +98,7 @@ def _run_on_ranks(options: argparse.Namespace) -> int:
 @contextmanager
 def _placed(options: argparse.Namespace) -> Iterator[None]:
     """Say where in the scene file a key stands that an error names."""
-    from .model import with_place
+    from ..model import with_place
 
     try:
         yield
@@ -109,7 +109,7 @@ def _placed(options: argparse.Namespace) -> Iterator[None]:
 
 def _version() -> int:
     processes.start_petsc()
-    from .runtime.versions import versions
+    from ..runtime.versions import versions
 
     if processes.is_first_rank():
         terminal.say("\n".join(f"{name} {version}" for name, version in versions().items()))
