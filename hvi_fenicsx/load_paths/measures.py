@@ -45,7 +45,7 @@ class Measures:
         self._system, self._scaled, self._scales = system, scaled, system.problem.scales
         self.parts = tuple(driven(system.problem))
         held, touched = _attributed(system.problem, self.parts)
-        columns, constants = [], []
+        columns, constants = list[Array](), list[Array]()
         for part in self.parts:
             for i in range(self._scales.dimension):
                 column, load = self._force(part, held[part], touched[part], i, condensation)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..reduced.condensed_stiffness import ZERO, is_singular, negative_directions, rounding_of
+from ..reduced.condensed_stiffness import ZERO, negative_directions, rounding_of
 from ..typing import Array, Mask
 from .contact_points import PointLaws
 from .rigid_motions import Unresisted, unresisted
@@ -284,7 +284,7 @@ class ContactPoints(PointStatuses):
         """
         if self.straight:
             return not self.elastic.is_singular(self.moving, self.slope)
-        return not is_singular(self.motions(values).matrix, rounding_of(self.stiffness))
+        return not negative_directions(self.motions(values).matrix, -ZERO, rounding_of(self.stiffness))
 
     def motions(self, values: Values) -> FreeMotions:
         """The displacements that can change.

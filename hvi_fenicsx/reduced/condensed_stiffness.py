@@ -318,17 +318,6 @@ def rounding_of(stiffness: Array) -> float:
     return len(stiffness) * float(np.finfo(float).eps * np.linalg.norm(stiffness, 1)) if len(stiffness) else 0.0
 
 
-def is_singular(stiffness: Array, rounding: float) -> bool:
-    """Whether some displacement meets no stiffness, or a negative one.
-
-    Args:
-        stiffness: symmetric, (n, n); of no unknowns, it is regular.
-        rounding: an eigenvalue that is zero.
-    """
-    values = np.linalg.eigvalsh(stiffness) if len(stiffness) else np.ones(1)
-    return bool(values[0] <= max(ZERO * values[-1], rounding))
-
-
 def negative_directions(stiffness: Array, negligible: float, rounding: float = 0.0) -> int:
     """The number of negative eigenvalues, by the signs of the pivots of LDLᵀ (Sylvester's law of inertia).
 

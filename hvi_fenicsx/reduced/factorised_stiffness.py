@@ -100,7 +100,7 @@ class FactorisedStiffness(CondensedStiffness):
 
     def _counted(self, moving: Mask, slope: Array) -> int:
         cell = self.factorised(moving, slope)
-        count = cell.negative
+        count = cell.factors.negative
         cell.free()
         return count
 
@@ -136,6 +136,9 @@ class FactorisedCell:
         moving: those of them that move, this rank's.
         slope: of the laws' forces, this rank's.
 
+    Attributes:
+        factors: as made.
+
     Raises:
         numpy.linalg.LinAlgError: it is singular.
     """
@@ -154,21 +157,11 @@ class FactorisedCell:
         factors.allow_negative()
         factors.add(interior.kept, np.where(moving, slope, 0.0))
         factors.factorise(np.union1d(interior.kept[~moving], system.pins))
-        self._factors = factors
+        self.factors = factors
         self._load, self._found, self._force = (system.load.duplicate() for _ in range(3))
         if factors.failure:
             self.free()
             raise np.linalg.LinAlgError("the tangent is singular")
-
-    @property
-    def negative(self) -> int:
-        """The number of negative eigenvalues. Collective."""
-        return self._factors.negative
-
-    @property
-    def is_singular(self) -> bool:
-        """Whether a pivot is zero."""
-        return self._factors.is_singular
 
     def solve(self, right: Array) -> Array:
         """Displacements of what moves, forces on what stands, (n,). Collective.
@@ -180,14 +173,14 @@ class FactorisedCell:
         kept, own = interior.kept, interior.own_part(right)
         self._load.set(0.0)
         self._load.array[kept] = np.where(moving, own, 0.0)
-        self._factors.apply(self._load, self._found)
+        self.factors.apply(self._load, self._found)
         self._stiffness.mult(self._found, self._force)
         felt = own - self._force.array_r[kept]
         return np.concatenate(agree(self._system.comm, np.where(moving, self._found.array_r[kept], felt)))
 
     def free(self) -> None:
         """Free the PETSc objects. Collective."""
-        self._factors.free()
+        self.factors.free()
         for vector in (self._load, self._found, self._force):
             vector.destroy()
 
@@ -200,7 +193,7 @@ _INDEFINITE = {**CHOLESKY, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_24": 1}
 def _inverse(cell: FactorisedCell, columns: CellColumns, most: int) -> CellInverse:
     """The inverse of a cell's equations; the unknown in whose place is the factor stands in the cell."""
     singular, driver = np.linalg.LinAlgError("the tangent is singular"), columns.driver
-    if cell.is_singular:
+    if cell.factors.is_singular:
         raise singular
     signs = np.where(_moving(columns), 1.0, columns.rise)
     if driver is not None:
