@@ -22,7 +22,7 @@ from ..problem.problem import Problem
 from ..problem.vectors import turn
 from ..runtime.mpi import total
 from ..runtime.timing import Timer
-from ..system.held_solver import Goal, HeldPreconditioner
+from ..system.held_solver import HeldPreconditioner
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
 from ..system.system import System
@@ -64,7 +64,7 @@ class DualNorm:
         load, x = self._load(functional), system.load.duplicate()
         x.set(0.0)
         if load.norm() > 0:
-            self._inverse.solve(load, x, Goal(rtol=self._tolerance if tolerance is None else tolerance))
+            self._inverse.solve(load, x, self._tolerance if tolerance is None else tolerance)
         energy = float(load.dot(x))
         return system.displacement(x), float(np.sqrt(max(energy, 0.0))) if np.isfinite(energy) else np.inf
 

@@ -7,6 +7,7 @@ are relative ones.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,7 +77,7 @@ class PartPoints:
     def of_nodes(self, values: Array) -> Array:
         """Values at the part's owned nodes (m, ...) by facet, (f, n, ...). Collective."""
         bs, found = self._field.function_space.dofmap.index_map_bs, []
-        flat = values.reshape(len(values), -1)
+        flat = values.reshape(len(values), math.prod(values.shape[1:]))
         for start in range(0, flat.shape[1], bs):
             some, local = flat[:, start : start + bs], self._field.x.array.reshape(-1, bs)
             local[self._surface.blocks, : some.shape[1]] = some
@@ -174,7 +175,9 @@ class Trace:
 
     def _on_facets(self, functions: Array, values: Array) -> Array:
         """Sums of functions (f, q, n) times values of nodes (facets, n, k, ...)."""
-        found = self._points.on_facets(values.reshape(*values.shape[:2], -1))[self._points.facets]
+        found = self._points.on_facets(values.reshape(*values.shape[:2], math.prod(values.shape[2:])))[
+            self._points.facets
+        ]
         return np.asarray(functions @ found).reshape(*functions.shape[:2], *values.shape[2:])
 
     def of_bubbles(self, e: fem.Function) -> Array:

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from ..compat import NOT_A_NUMBER
 from ..runtime.timing import Timer
 from ..system.equations import LawModel
-from ..system.held_solver import Goal, HeldPreconditioner
+from ..system.held_solver import HeldPreconditioner
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
 from ..system.petsc_options import default_options, prefix, raise_python_error
@@ -126,7 +126,7 @@ class ActiveSetSolver:
         self.held.prepare(held)
         step = x.duplicate()
         step.set(0.0)
-        iterations, reason = self.held.solve(self._residual, step, Goal(rtol=rtol))
+        iterations, reason = self.held.solve(self._residual, step, rtol)
         step.array[held] = 0.0  # multigrid leaves rounding there, and a vertex must stay exactly on its bound
         finite = np.isfinite(step.norm())
         if finite:
@@ -260,17 +260,11 @@ class _SnesRun:
         ksp.setType(PETSc.KSP.Type.PYTHON)
         ksp.setPythonContext(InactiveSolve(snes, self.owner.held, self._goal))
 
-    def _goal(self, *, moved: bool) -> Goal:
-        """How exact a linear solve is: what the tolerance needs, but loose while the active set changes.
-
-        Where net forces are left, which residuals by vertex do not tell, its norm falls as far as they have to.
-        """
+    def _goal(self, *, moved: bool) -> float:
+        """How exact a linear solve is: what the tolerance needs, but loose while the active set changes."""
         thresholds = self.thresholds
         least = thresholds.loose if moved else 0.0 if self.steady else thresholds.coarse_tolerance
-        wanted = max(thresholds.margin * self.tolerance, least * self.last)
-        balanced = not np.any(self.sizes.net > 0.0)
-        reached = self.owner.convergence.reaches(wanted, self.sizes.forces) if balanced else None
-        return Goal(rtol=wanted / self.last, reached=reached)
+        return max(thresholds.margin**2 * self.tolerance / self.last, least)
 
     def finish(self, snes: PETSc.SNES) -> None:
         """Take iterations and reason from the SNES, and free it."""
@@ -397,7 +391,7 @@ class InactiveSolve:
         goal: how exact a step is to be, by whether the active set has changed.
     """
 
-    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, goal: Callable[..., Goal]) -> None:
+    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, goal: Callable[..., float]) -> None:
         self._snes, self._held, self._goal = snes, held, goal
         self._active: Entities | None = None
 

@@ -11,7 +11,6 @@ from ..problem.contact_surface import Surface
 from ..problem.vectors import NodalForces
 from ..system import net_forces
 from ..system.free_motions import Motions, SupportedBody
-from ..system.held_solver import Reached
 from ..system.net_forces import ActingForces, Holder
 from ..system.system import System
 from ..typing import Array, Mask
@@ -27,14 +26,12 @@ class Sizes:
         traction: the largest nodal traction on Γc, over what is allowed there.
         net: the largest net force along a rigid motion (:mod:`.net_forces`).
         net_rounding: of that.
-        forces: what ``norm`` is relative to.
     """
 
     norm: Array
     traction: Array
     net: Array
     net_rounding: Array
-    forces: Array
 
     @property
     def worst(self) -> float:
@@ -42,7 +39,7 @@ class Sizes:
         return float(np.max([self.norm, self.traction, self.net]))
 
 
-NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(5)))
+NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(4)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,30 +112,13 @@ class ConvergenceTest:
 
     def _measured(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Sizes:
         """As :meth:`.NetForceTest.sizes`. Collective."""
-        norm, traction, forces = self._forces(projected, x)
-        return Sizes(norm, traction, *self._net.sizes(x, residual, projected, on), forces)
+        return Sizes(*self._forces(projected, x), *self._net.sizes(x, residual, projected, on))
 
-    def reaches(self, wanted: float, forces: Array) -> Reached:
-        """Whether the residual (n,) of a linear solve is small enough, net forces aside; collective.
-
-        Args:
-            wanted: its size at most, relative.
-            forces: what its norm is relative to, by body (:attr:`Sizes.forces`).
-        """
-
-        def reached(residual: Array) -> bool:
-            return bool(
-                np.all(self._traction(residual) <= wanted)
-                and np.all(self._system.references.norms(residual) <= wanted * forces)
-            )
-
-        return reached
-
-    def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array, Array]:
-        """Norm and largest traction of a residual (n,) at x, and what the norm is relative to, by body. Collective."""
+    def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array]:
+        """Norm and largest traction of a residual (n,) at x, relative, by body. Collective."""
         references = self._system.references
         forces = references.forces(x.array_r, self._system.holding_forces(x))
-        return references.norms(residual) / forces, self._traction(residual), forces
+        return references.norms(residual) / forces, self._traction(residual)
 
     def _traction(self, residual: Array) -> Array:
         """The largest traction of a residual (n,) on Γc, relative, by body. Collective."""
@@ -153,7 +133,7 @@ class ConvergenceTest:
         """
         sample = self._system.load.duplicate()
         self._system.equations.rounding_sample(x, sample)
-        norm, traction, _ = self._forces(sample.array_r, x)
+        norm, traction = self._forces(sample.array_r, x)
         sample.destroy()
         return self._thresholds.rounding_safety * norm, self._thresholds.rounding_safety * traction
 

@@ -9,8 +9,7 @@ which they are held by their diagonals (:meth:`.Jacobian.hold`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -45,20 +44,6 @@ class Preconditioner(Protocol):
 
     def free(self) -> None:
         """Free the PETSc objects."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Goal:
-    """How exact a linear solve is to be.
-
-    Attributes:
-        rtol: relative tolerance of the residual's norm.
-        reached: whether a residual (n,) is small enough for what the solve is for, which a conjugate gradient method
-            asks at each iteration instead: tractions on Γc may fall more slowly than the norm, or faster. Collective.
-    """
-
-    rtol: float
-    reached: Reached | None = None
 
 
 class HeldPreconditioner:
@@ -197,21 +182,21 @@ class HeldPreconditioner:
         self._preconditioner.pc.apply(self._in, self._out)  # type: ignore[union-attr]
         self._collect(y)
 
-    def solve_reduced(self, inactive: PETSc.IS, load: PETSc.Vec, x: PETSc.Vec, goal: Goal) -> tuple[int, int]:
+    def solve_reduced(self, inactive: PETSc.IS, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
         """As :meth:`solve`, on the dofs that are not held. Collective.
 
         Args:
             inactive: these dofs.
             load: the right-hand side, a reduced vector.
             x: where the solution is written, reduced too.
-            goal: how exact it is to be.
+            rtol: relative tolerance of the residual's norm.
 
         Returns:
             Iterations, and PETSc's reason for the end.
         """
         self.select(inactive)
         self._spread(load)
-        ended = self.solve(self._in, self._out, goal)
+        ended = self.solve(self._in, self._out, rtol)
         self._collect(x)
         return ended
 
@@ -226,7 +211,7 @@ class HeldPreconditioner:
         for at, of in self._runs:
             part[of] = whole[at]
 
-    def solve(self, load: PETSc.Vec, x: PETSc.Vec, goal: Goal) -> tuple[int, int]:
+    def solve(self, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
         """Solve with the matrix in which unknowns are held. Collective.
 
         Where motions are free, x is the shortest of all solutions.
@@ -234,39 +219,36 @@ class HeldPreconditioner:
         Args:
             load: the right-hand side; changed at pinned dofs.
             x: where the solution is written.
-            goal: how exact it is to be.
+            rtol: relative tolerance of the residual's norm.
 
         Returns:
             Iterations, and PETSc's reason for the end.
         """
         self.system.free_leftovers()  # of the step before, and of who asks for this one
         load.array[self.system.pins] = 0.0
-        ksp, before = self._krylov(goal), self.inner_iterations
+        ksp, before = self._krylov(rtol), self.inner_iterations
         with self._timer("solve"):
             ksp.solve(load, x)
         if self.system.free_motions is not None:
             self.system.free_motions.null_space.remove(x)
-        iterations, reason = iterations_of(ksp), int(ksp.getConvergedReason())
+        iterations, reason = int(ksp.getIterationNumber()), int(ksp.getConvergedReason())
         ksp.destroy()
         self.report(iterations, failed=reason < 0)
         return iterations + self.inner_iterations - before, reason
 
-    def _krylov(self, goal: Goal) -> PETSc.KSP:
+    def _krylov(self, rtol: float) -> PETSc.KSP:
         """The Krylov method, to be destroyed after use."""
         assert self._preconditioner is not None
         ksp, settings = PETSc.KSP().create(self.system.comm), self.settings
         ksp.setOperators(self._preconditioner.matrix)
         ksp.setPC(self._preconditioner.pc)
         if isinstance(self._preconditioner, MixedMultigrid):
-            self._preconditioner.accuracy = min(goal.rtol, settings.thresholds.mixed_accuracy)
-        ksp.setTolerances(rtol=goal.rtol, max_it=settings.iterations)
+            self._preconditioner.accuracy = min(rtol, settings.thresholds.mixed_accuracy)
+        ksp.setTolerances(rtol=rtol, max_it=settings.iterations)
         configure(ksp, settings.ksp(ksp.getPC()))
         if settings.kind in ("gamg", "mg"):
-            reached = goal.reached if ksp.getType() == PETSc.KSP.Type.CG else None
-            if reached is not None:
-                ksp.setTolerances(rtol=settings.thresholds.surplus * goal.rtol)
             held = np.union1d(self._wanted, self.system.pins)
-            set_up(ksp, self.system.jacobian.matrix, self._preconditioner.pc, held, reached)
+            set_up(ksp, self.system.jacobian.matrix, self._preconditioner.pc, held)
         return ksp
 
 
@@ -276,10 +258,6 @@ def consecutive_runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:
     for run in np.split(np.arange(len(chosen)), breaks) if len(chosen) else []:
         begin, end = int(run[0]), int(run[-1]) + 1
         yield slice(int(chosen[begin]), int(chosen[end - 1]) + 1), slice(begin, end)
-
-
-Reached = Callable[[Array], bool]
-"""Whether a residual (n,) is small enough; collective."""
 
 
 class _Matrix:
@@ -295,23 +273,13 @@ class _Matrix:
 
 
 class _Preconditioner:
-    """The context of the PC.
+    """The context of the PC."""
 
-    Attributes:
-        ended: whether it has ended the method.
-    """
-
-    def __init__(self, inner: PETSc.PC, held: Entities, reached: Reached | None) -> None:
-        self._inner, self._held, self._reached, self._begun = inner, held, reached, False
-        self.ended = False
+    def __init__(self, inner: PETSc.PC, held: Entities) -> None:
+        self._inner, self._held = inner, held
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Apply the inner preconditioner to the residual x, or write zero into y. Collective."""
-        self.ended = self._begun and self._reached is not None and self._reached(x.array_r)
-        self._begun = True
-        if self.ended:
-            y.set(0.0)
-            return
+        """Apply the inner preconditioner. Collective."""
         self._inner.apply(x, y)
         y.array[self._held] = 0.0
 
@@ -320,7 +288,7 @@ class _Preconditioner:
         self._inner.view(viewer)
 
 
-def set_up(ksp: PETSc.KSP, whole: PETSc.Mat, inner: PETSc.PC, held: Entities, reached: Reached | None) -> None:
+def set_up(ksp: PETSc.KSP, whole: PETSc.Mat, inner: PETSc.PC, held: Entities) -> None:
     """Give a method its matrix and preconditioner, for one solve from zero. Collective.
 
     Args:
@@ -328,19 +296,11 @@ def set_up(ksp: PETSc.KSP, whole: PETSc.Mat, inner: PETSc.PC, held: Entities, re
         whole: J.
         inner: a preconditioner of it; one of a J with other held unknowns and another tangent will do.
         held: the unknowns that are held (local, owned).
-        reached: ends the method of conjugate gradients; the first residual never does. None: only its own tests do.
     """
     matrix = PETSc.Mat().createPython(whole.getSizes(), _Matrix(whole, held), comm=whole.comm)
     matrix.setUp()
     pc = PETSc.PC().create(whole.comm)
     pc.setType(PETSc.PC.Type.PYTHON)
-    pc.setPythonContext(_Preconditioner(inner, held, reached))
+    pc.setPythonContext(_Preconditioner(inner, held))
     ksp.setPC(pc)
     ksp.setOperators(matrix)
-
-
-def iterations_of(ksp: PETSc.KSP) -> int:
-    """Iterations of a finished solve; PETSc counts one more where the preconditioner ended it."""
-    pc = ksp.getPC()
-    context = pc.getPythonContext() if pc.getType() == PETSc.PC.Type.PYTHON else None  # PETSc crashes of other types
-    return int(ksp.getIterationNumber()) - (isinstance(context, _Preconditioner) and context.ended)

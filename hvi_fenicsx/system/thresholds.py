@@ -26,7 +26,6 @@ class Thresholds:
             with it; and times that algebraic multigrid is made: most of its cost is then in its setup (on cells 1000
             times as long as high, ten times that of a factorisation).
         slower: factor of the first iterations from which a preconditioner is made anew.
-        surplus: part of the relative tolerance at which a Krylov method ends though its goal is not reached.
         krylov_iterations: iterations of a Krylov method at most.
         replaced_iterations: the same where a direct solver can take over: 2,000 in vain took far longer than that.
         dense_columns: right-hand sides that are solved at once where a body is condensed.
@@ -54,7 +53,6 @@ class Thresholds:
     drift: float = 0.2
     slow: int = 50
     slower: float = 1.5
-    surplus: float = 1e-2
     krylov_iterations: int = 2_000
     replaced_iterations: int = 100
     dense_columns: int = 64
