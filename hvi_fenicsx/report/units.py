@@ -17,17 +17,15 @@ class Unit:
 
     Attributes:
         size: of the unit, in the unit without its prefix.
-        name: with the prefix, or with a power of ten where no prefix suits.
-        joint: between a value and the name.
+        name: with the prefix.
     """
 
     size: float
     name: str
-    joint: str = _NARROW
 
     def text(self, value: float) -> str:
         """A value in this unit, to three digits."""
-        return f"{self.number(value)}{self.joint}{self.name}"
+        return f"{self.number(value)}{_NARROW}{self.name}"
 
     def number(self, value: float) -> str:
         """The same without the unit, for a column that names it at its head."""
@@ -47,9 +45,7 @@ def unit_for(largest: float, name: str) -> Unit:
     least = 0 if name == "Pa" else -12  # mPa would be read as MPa
     most = 3 if name == "m" else 12  # nobody says megametre
     nearest = min(max(exponent, least), most)
-    if nearest - exponent in range(-6, 6):
-        return Unit(10.0**nearest, _PREFIXES[nearest] + name)
-    return Unit(10.0**exponent, f"{_power(exponent)} {name}", " × ")
+    return Unit(10.0**nearest, _PREFIXES[nearest] + name)
 
 
 def quantity(value: float, name: str) -> str:
@@ -72,13 +68,7 @@ def round_below(value: float) -> float:
 
 def times(factor: float) -> str:
     """A magnification in words."""
-    if factor == 1.0:
-        return "displacements to scale"
-    exponent = math.floor(math.log10(factor) + 1e-9)
-    if exponent in range(-4, 9):
-        return f"displacements × {_digits(factor)}"
-    digits = _digits(factor / 10.0**exponent)
-    return f"displacements × {'' if digits == '1' else f'{digits} × '}{_power(exponent)}"
+    return "displacements to scale" if factor == 1.0 else f"displacements × {_digits(factor)}"
 
 
 def number(value: float, digits: int = 6) -> str:
