@@ -325,11 +325,12 @@ def _own(study: Study, quantity: str) -> str:
 
 def _targets(study: Study, quantity: str) -> str:
     """What each accuracy costs, up to the first that is not reached."""
-    best, parts, unsure = study.front(quantity), [], study.certain[quantity].error or 0.0
+    best, unsure = study.front(quantity), study.certain[quantity].error or 0.0
+    parts: dict[str, list[str]] = {}
     for target in _TARGETS:
         row = next((r for r in best if (study.claimed(r, quantity) or 0.0) <= target), None)
         if row is not None:
-            parts.append(f"{_of_error(target)} for {duration(row.seconds)} ({row.text})")
+            parts.setdefault(f"for {duration(row.seconds)} ({row.text})", []).append(_of_error(target))
             continue
         if unsure > target:
             missed = f"cannot be claimed: the reference itself is uncertain by {_of_error(unsure)}"
@@ -337,9 +338,10 @@ def _targets(study: Study, quantity: str) -> str:
             errors = [(e, r) for r in study.rows if (e := r.error(quantity)) is not None]
             least, at = min(errors, key=lambda pair: pair[0])
             missed = f"is not reached here: the best is {_of_error(least)} for {duration(at.seconds)} ({at.text})"
-        parts.append(f"{_of_error(target)} {missed}")
+        parts[missed] = [_of_error(target)]
         break
-    return f"In {NORMS[quantity][1]}: {'; '.join(parts)}."
+    said = (f"{', '.join(targets)} {cost}" for cost, targets in parts.items())
+    return f"In {NORMS[quantity][1]}: {'; '.join(said)}."
 
 
 def _of_error(value: float) -> str:
