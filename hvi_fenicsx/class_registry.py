@@ -7,8 +7,6 @@ import importlib
 import pkgutil
 from collections.abc import Iterable
 
-from .errors import InputError
-
 
 def enter(known: dict[str, type], cls: type, name: str, kind: str) -> None:
     """Enter a class under its name; the same class again (a notebook's cell run twice) replaces it.
@@ -20,13 +18,13 @@ def enter(known: dict[str, type], cls: type, name: str, kind: str) -> None:
         kind: what it is, for the message.
 
     Raises:
-        InputError: the name is no text, or another class has it.
+        TypeError: the name is no text, or another class has it.
     """
     if not isinstance(name, str):
-        raise InputError(f"{kind} class {cls.__name__}: its name must be a text (is {name!r})")
+        raise TypeError(f"{kind} class {cls.__name__}: its name must be a text (is {name!r})")
     old = known.get(name)
     if old is not None and (old.__module__, old.__qualname__) != (cls.__module__, cls.__qualname__):
-        raise InputError(
+        raise TypeError(
             f"{kind} class {cls.__name__}: the name {name!r} is taken by {old.__module__}.{old.__qualname__}; "
             "choose another name"
         )

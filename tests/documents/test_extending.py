@@ -129,7 +129,7 @@ WRONG = {
     "raises.py": ("\n\nraise ValueError('no such steel')\n", "raises.py:3: ValueError: no such steel"),
     "taken.py": (
         "from hvi_fenicsx.solvers import Method\nclass M(Method):\n    name = 'branch'\n",
-        "taken.py:2: InputError: method class M: the name 'branch' is taken",
+        "taken.py:2: TypeError: method class M: the name 'branch' is taken",
     ),
 }
 

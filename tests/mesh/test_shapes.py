@@ -92,12 +92,12 @@ def test_sides_and_regions_of_a_users_shape_are_checked(wedge: type[DomainShape]
 
 
 def test_a_shape_needs_a_name_that_is_free() -> None:
-    with pytest.raises(InputError, match="domain shape class Again: the name 'disk' is taken by"):
+    with pytest.raises(TypeError, match="domain shape class Again: the name 'disk' is taken by"):
 
         class Again(Disk):
             shape: Literal["disk"] = "disk"
 
-    with pytest.raises(InputError, match="domain shape class Nameless: its name must be a text"):
+    with pytest.raises(TypeError, match="domain shape class Nameless: its name must be a text"):
 
         class Nameless(PlaneShape):
             shape: Literal["nameless"]

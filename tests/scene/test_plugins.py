@@ -66,7 +66,7 @@ def test_a_name_that_is_no_text_is_refused(kind: str, tmp_path: Path) -> None:
     text = f"import hvi_fenicsx.{module}\nfrom hvi_fenicsx import {module.split('.')[0]}\n"
     (tmp_path / f"odd_{kind}.py").write_text(f"{text}class A({base}):\n    {name} = {value}\n", encoding="utf-8")
     (tmp_path / "scene.toml").write_text(f'plugins = "odd_{kind}.py"', encoding="utf-8")
-    with pytest.raises(InputError, match=rf"odd_{kind}\.py:3: InputError: {kind} class A: its name must be a text"):
+    with pytest.raises(InputError, match=rf"odd_{kind}\.py:3: TypeError: {kind} class A: its name must be a text"):
         read_scene(tmp_path / "scene.toml")
 
 
