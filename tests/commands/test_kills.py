@@ -19,8 +19,8 @@ from hvi_fenicsx.runtime import manifest
 
 pytestmark = pytest.mark.long
 
-FIRST, ROUNDS, KILLS = int(os.environ.get("HVI_SEED", "0")), int(os.environ.get("HVI_ROUNDS", "14")), 5
-"""Seventy kills in all, HVI_SEED draws others; those while forms compile are in test_kills_compiling.py."""
+FIRST, ROUNDS, KILLS = int(os.environ.get("HVI_SEED", "0")), int(os.environ.get("HVI_ROUNDS", "6")), 5
+"""Thirty kills in all, HVI_SEED draws others; those while forms compile are in tests/runtime/test_forms.py."""
 STARTUP = 0.2
 """The part of a whole run in which Python itself starts, and words its end itself."""
 CELLS = {"few": 4, "more": 8}

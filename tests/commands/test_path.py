@@ -174,7 +174,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict[str, str]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_a_killed_path_is_resumed_to_the_same_rows(
     seed: int, whole: tuple[list[dict[str, str]], float], tmp_path: Path
 ) -> None:
