@@ -36,22 +36,7 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    return _bonds(graph.table, weight, sign)
-
-
-def scaled(arcs: Chain, weight: float, sign: float) -> Chain:
-    """The energy weight * φ(sign * x) of a chain φ.
-
-    Args:
-        arcs: the chain.
-        weight: a factor.
-        sign: +1 or -1 (or a factor of the argument).
-    """
-    return _bonds(np.array(arcs), weight, sign)
-
-
-def _bonds(table: Array, weight: float, sign: float) -> Chain:
-    first, last, anchor, value, traction, slope = table.T
+    first, last, anchor, value, traction, slope = graph.table.T
     ends = (first, last) if sign > 0 else (last, first)
     low, high, middle = (place / sign + 0.0 for place in (*ends, anchor))
     rows = np.column_stack([low, high, middle, weight * value, weight * sign * traction, weight * sign * sign * slope])
@@ -98,16 +83,6 @@ def arcs_of(rows: Array) -> list[Arc]:
         rows: (k, 6).
     """
     return list(map(Arc._make, cast("list[list[float]]", rows.tolist())))
-
-
-def energy(arcs: Iterable[Arc], x: float) -> float:
-    """The value of a chain.
-
-    Args:
-        arcs: the chain.
-        x: a point of its interval.
-    """
-    return next(a for a in arcs if x <= a.high).at(x)
 
 
 def apart(a: float, b: float) -> bool:
@@ -312,29 +287,6 @@ class ArcTable:
             self.tractions[rows, i] + self.slopes[rows, i] * (t - self.anchors[rows, i]) for i in (behind, k)
         )
         return np.asarray(after), np.asarray(before)
-
-    def least(self, low: Array, high: Array, added: Array, force: Array) -> tuple[Array, Array]:
-        """The least of φ + ½ d t² - force t over an interval, and the t where it is taken, (n,) each.
-
-        Args:
-            low: of the intervals, finite, (n,).
-            high: of the intervals, finite, (n,).
-            added: d, (n,).
-            force: (n,).
-        """
-        first, last = np.maximum(self.low, low[:, None]), np.minimum(self.high, high[:, None])
-        slope, offset = self.slopes + added[:, None], self.tractions - self.slopes * self.anchors - force[:, None]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            turn = np.clip(np.where(slope > 0.0, -offset / slope, first), first, last)
-            places = np.stack([first, last, turn])
-            d = places - self.anchors
-            values = self.values + (self.tractions + 0.5 * self.slopes * d) * d
-            values += (0.5 * added[:, None] * places - force[:, None]) * places
-        values = np.where(first <= last, values, np.inf)
-        flat = np.moveaxis(values, 0, 1).reshape(len(low), -1)
-        k = np.argmin(flat, axis=1)[:, None]
-        at = np.moveaxis(places, 0, 1).reshape(len(low), -1)
-        return np.take_along_axis(flat, k, axis=1)[:, 0], np.take_along_axis(at, k, axis=1)[:, 0]
 
 
 def _finite(ends: Array, others: Array) -> Array:

@@ -17,7 +17,7 @@ from enumeration import Floor, polyline
 from scenes import DELTA, block, model
 
 from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain, energy
+from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain
 from hvi_fenicsx.equilibrium_search.boxes import Box
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
@@ -237,11 +237,12 @@ def test_an_envelope_is_the_hull_of_samples_and_never_above_the_law(seed: int) -
     low, high = np.sort(random.uniform(-4, 4, 2))
     added = random.uniform(0, 3) * random.integers(0, 2)
     table = ArcTable.of([chain(graph, weight, sign)])
-    arcs = arcs_of(envelopes(table, np.array([low]), np.array([high]), np.array([added]))[0])
+    rows = envelopes(table, np.array([low]), np.array([high]), np.array([added]))[0]
+    arcs, envelope = arcs_of(rows), ArcTable.of([rows])
     inner = sign * graph.breaks
     x = np.unique(np.concatenate([np.linspace(low, high, 1500), inner[(inner > low) & (inner < high)]]))
     law = weight * graph.primitive(sign * x) + 0.5 * added * x * x
-    values = np.array([energy(arcs, v) for v in x])
+    values = np.concatenate([envelope.energy(np.array([v])) for v in x])
     slopes = [t for a in arcs for t in (a.rate(a.low), a.rate(a.high))]
     assert np.all(values <= law + 1e-12 * (1.0 + np.abs(law)))
     steepest = np.max(np.abs(np.diff(np.diff(law) / np.diff(x)))) if len(x) > 2 else 0.0
