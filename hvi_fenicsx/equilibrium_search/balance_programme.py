@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..typing import Array, Integers
-from .boxes import Box
 from .interior_point import Iterate, Programme, iterates
 from .relaxation import Relaxation
-from .scalar_problem import ScalarProblem
+from .scalar_problem import Box, ScalarProblem
 from .weighed_balance import Graphs, Split, weighed
 
 

@@ -15,10 +15,9 @@ from ..typing import Array, Integers, Mask
 from . import stationarity
 from .arcs import on_interval
 from .balance_programme import Guide
-from .boxes import Box, clipped
 from .convex_programme import minimise
 from .relaxation import envelopes
-from .scalar_problem import ScalarProblem
+from .scalar_problem import Box, ScalarProblem, clipped
 from .stationarity import StationaryPoint
 
 

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
 from .arcs import FREE, Chain, chain, total
-from .law_graphs import LawGraph, exact_graph, law_graph
+from .curved_laws import LawGraph, law_graph
 from .lengths import Lengths
 from .rigid_motions import with_motions
 from .scalar_problem import ScalarProblem
@@ -147,7 +147,7 @@ def _graphs(
     laws: Sequence[Bonds], far: Array, tolerance: float | None, thresholds: PolylineThresholds
 ) -> Iterator[LawGraph]:
     """The laws as polylines; those of curved laws share the error by their areas."""
-    area = sum(float(b.weights.sum()) for b in laws if exact_graph(b.law) is None)
+    area = sum(float(b.weights.sum()) for b in laws if b.law.graph is None)
     for b in laws:
         aim = thresholds.coarse * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
         yield law_graph(b.law, _argument(b, far), aim, thresholds)

@@ -14,11 +14,10 @@ import numpy as np
 
 from ..typing import Array
 from .balance_programme import BalanceTest, Look
-from .boxes import Box
 from .cells import PolylineCells, parts, settled
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
-from .scalar_problem import ScalarProblem
+from .scalar_problem import Box, ScalarProblem
 from .stationarity import PointList
 from .tightening import ForceIntervals, clipped_again
 

@@ -11,11 +11,10 @@ import numpy as np
 from ..typing import Array, Integers
 from . import envelopes as convex
 from .arcs import ArcTable
-from .boxes import Box
 from .convex_programme import Optimum, minimise, never
 from .curvature import Curvature, CurvatureShare
 from .length_programme import LengthProgramme
-from .scalar_problem import ScalarProblem
+from .scalar_problem import Box, ScalarProblem
 
 
 def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> ArcTable:

@@ -10,12 +10,10 @@ import numpy as np
 from ..errors import InputError, SolverError
 from ..typing import Array
 from . import stationarity, systematic
-from .boxes import Box
 from .enumeration import Enumeration
 from .found import Found, Saved, Task, counted
-from .level_set import Cut
-from .lowest import LowestSearch, Progress
-from .scalar_problem import ScalarProblem
+from .lowest import Cut, LowestSearch, Progress
+from .scalar_problem import Box, ScalarProblem
 from .stationarity import Kind, PointList, StationaryPoint
 
 NO_POINT = "no equilibrium, proven"

@@ -14,11 +14,10 @@ from scipy.optimize import minimize
 import hvi_fenicsx as hvi
 from hvi_fenicsx.equilibrium_search.arcs import FREE, chain
 from hvi_fenicsx.equilibrium_search.bodies import Equilibria
-from hvi_fenicsx.equilibrium_search.boxes import Box
 from hvi_fenicsx.equilibrium_search.lengths import Lengths
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
-from hvi_fenicsx.equilibrium_search.scalar_problem import ScalarProblem
+from hvi_fenicsx.equilibrium_search.scalar_problem import Box, ScalarProblem
 from hvi_fenicsx.equilibrium_search.stationarity import Kind
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.workflow import prepare

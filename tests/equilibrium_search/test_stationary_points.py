@@ -18,14 +18,13 @@ from scenes import DELTA, block, model
 
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain
-from hvi_fenicsx.equilibrium_search.boxes import Box
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.equilibrium_search.envelopes import envelopes
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_search.rigid_balance import RigidBalance
-from hvi_fenicsx.equilibrium_search.scalar_problem import ScalarProblem
+from hvi_fenicsx.equilibrium_search.scalar_problem import Box, ScalarProblem
 from hvi_fenicsx.equilibrium_search.stationarity import Kind, StationaryPoint
 from hvi_fenicsx.errors import SolverError
 from hvi_fenicsx.laws.traction_graph import TractionGraph
