@@ -1,4 +1,4 @@
-"""Curved laws: polylines near their tractions, how far the energies differ, and stationary points of the laws themselves.
+"""Curved laws: polylines near their tractions, how far the energies differ, and the laws' own stationary points.
 
 Between two nodes a curve's traction becomes two lines that meet in the middle, such that tractions and energies at the
 nodes are the law's own (Schumaker 1983, SIAM Journal on Numerical Analysis 20, with the knot in the middle). The
