@@ -143,15 +143,6 @@ class PlusFunction(Smoothing):
     def smooth(self, law: Superpotential, epsilon_absolute: float) -> PlusSmoothedLaw:
         return PlusSmoothedLaw(law, epsilon_absolute, self)
 
-    def value(self, t: Array, e: float) -> Array:
-        """The function p(t; e), (m,).
-
-        Args:
-            t: arguments (m,).
-            e: width > 0 in the unit of t.
-        """
-        return np.asarray(np.maximum(t, 0.0) + e * self._at(t, e)[0])
-
     def derivative(self, t: Array, e: float) -> Array:
         """The derivative of p(t; e) by t, (m,): from 0 to 1, and 1/2 at 0.
 
@@ -159,22 +150,9 @@ class PlusFunction(Smoothing):
             t: arguments (m,).
             e: width > 0 in the unit of t.
         """
-        slope = self._at(t, e)[1]
+        with np.errstate(over="ignore"):
+            slope = self.profile(np.abs(t) / e)[1]
         return np.where(t >= 0.0, 1.0 + slope, -slope)
-
-    def second(self, t: Array, e: float) -> Array:
-        """The second derivative of p(t; e) by t, (m,).
-
-        Args:
-            t: arguments (m,).
-            e: width > 0 in the unit of t.
-        """
-        with np.errstate(over="ignore"):
-            return np.asarray(self._at(t, e)[2] / e)
-
-    def _at(self, t: Array, e: float) -> tuple[Array, Array, Array]:
-        with np.errstate(over="ignore"):
-            return self.profile(np.abs(t) / e)
 
 
 def _fold(x: Array, *, even: bool) -> tuple[Array, Array]:

@@ -24,8 +24,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from ...schema import Length, vector
 
-_MOST_CELLS = 2e8
-"""Beyond this gmsh, which meshes on one rank, needs more memory than machines have."""
 _AREA_OF_VERTEX = math.sqrt(3) / 2
 """Area that belongs to a vertex in a mesh of equilateral triangles, over h²."""
 
@@ -52,13 +50,6 @@ class PlaneShape(DomainShape):
     def box_area(self) -> float:
         """Area of a box around the shape, m²."""
         return self.outline().box_area
-
-    @model_validator(mode="after")
-    def _affordable(self) -> Self:
-        if self.box_area() / self.mesh_size**2 > _MOST_CELLS:
-            text = f"makes more than {_MOST_CELLS:.0e} cells; make it larger"
-            raise validation_error([Mistake(("mesh_size",), text)])
-        return self
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh that gmsh makes on rank 0. Collective."""
