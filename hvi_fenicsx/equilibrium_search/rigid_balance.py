@@ -2,8 +2,7 @@
 
 With τ = f - Sx the forces that laws and bounds bear, a rigid motion r (Sr = 0) demands r·τ = r·f. And
 x = Tx_p + G(f - τ), where x_p are a few unknowns, pivots, that fix the rigid motion T x_p. So intervals of the forces,
-which also cells that reach far have, bound the differences of displacements: those to the pivots, and of any two that
-all rigid motions move alike, as two vertices that slide on one floor.
+which also cells that reach far have, bound the differences of displacements to those of the pivots.
 
 Elastic forces have no net force: what Sr is off zero by the rounding of S (:mod:`.rigid_motions`) is taken for zero.
 Else a body a million slips away would be held by rounding, where a load that is above its limit by 1e-7 pulls. What is
@@ -12,10 +11,7 @@ beyond rounding counts, and so does what I - T_p - GS is off zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from ..typing import Array, Integers
 from .rigid_motions import RigidMotions
@@ -43,8 +39,6 @@ class RigidBalance:
         motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
         self.pivots: Integers = motions.pivots
         self.motions: Array = motions.shapes
-        self._same = np.all(self.motions[:, None, :] == self.motions, axis=2)
-        self._beside = np.flatnonzero(self._same.sum(axis=1) > 1)
         others = np.ix_(motions.others, motions.others)
         self._flexibility = np.zeros((n, n))
         self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
@@ -78,9 +72,7 @@ class RigidBalance:
         ends = self._graphs.clipped(low, high, forces[0] - rounding, forces[1] + rounding)
         if ends is None or not np.all(np.isfinite(forces)):
             return ends
-        parts = self._elastic_parts(*ends, *forces)
-        moved = self._moved(*ends, *parts.ends)
-        return None if moved is None else self._moved_alike(*moved, parts)
+        return self._moved(*ends, *self._elastic_parts(*ends, *forces))
 
     def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
         """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""
@@ -129,19 +121,7 @@ class RigidBalance:
         low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
         return None if np.any(low > high) else (low, high)
 
-    def _moved_alike(self, low: Array, high: Array, parts: ElasticParts) -> tuple[Array, Array] | None:
-        """Smaller intervals of displacements that all motions move alike: they differ as their elastic parts do."""
-        k = self._beside
-        if not k.size:
-            return low, high
-        most = np.where(self._same[np.ix_(k, k)], parts.differences(k), np.inf)
-        least, low, high = -most.T, low.copy(), high.copy()
-        begin = (low[k] + least - self._widened * (np.abs(low[k]) + np.abs(least))).max(axis=1)
-        end = (high[k] + most + self._widened * (np.abs(high[k]) + np.abs(most))).min(axis=1)
-        low[k], high[k] = np.maximum(low[k], begin), np.minimum(high[k], end)
-        return None if np.any(low > high) else (low, high)
-
-    def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> ElasticParts:
+    def _elastic_parts(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
         """The intervals of e, made short: G is changed along rigid motions, where the net force is known."""
         problem, motions, n = self._problem, self.motions, self._problem.size
         weights = (most - least) ** 2 + 1e-300
@@ -156,7 +136,8 @@ class RigidBalance:
         forces = np.abs(problem.force) + np.maximum(np.abs(least), np.abs(most))
         sizes = np.abs(self._flexibility) @ forces + np.abs(shift) @ (np.abs(motions.T) @ forces)
         error = self._rest @ size + np.abs(shift) @ (self._net.T @ size) + n * EPSILON * sizes
-        return ElasticParts(middle=middle, rows=rows, error=error)
+        reach = reach + error
+        return middle - reach, middle + reach
 
 
 def _product(matrix: Array, low: Array, high: Array) -> tuple[Array, Array]:
@@ -174,34 +155,3 @@ def _sum_of_others(parts: Array) -> Array:
     finite = np.where(infinite, 0.0, parts)
     alone = infinite.sum() - infinite
     return np.where(alone > 0, sign, finite.sum() - finite)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ElasticParts:
-    """The intervals of the elastic parts.
-
-    Attributes:
-        middle: their middles, (n,).
-        rows: half of what each force adds to the length of each interval, with its sign, (n, n).
-        error: by how much G is off, rounding included, (n,).
-    """
-
-    middle: Array
-    rows: Array
-    error: Array
-
-    @property
-    def ends(self) -> tuple[Array, Array]:
-        """The ends of the intervals, (n,) each."""
-        reach = np.abs(self.rows).sum(axis=1) + self.error
-        return self.middle - reach, self.middle + reach
-
-    def differences(self, chosen: Integers) -> Array:
-        """The most by which one part is above another, (k, k): that of the row above that of the column.
-
-        Args:
-            chosen: the parts, (k,).
-        """
-        middle, rows, error = self.middle[chosen], self.rows[chosen], self.error[chosen]
-        reach = cdist(rows, rows, "cityblock") + error[:, None] + error
-        return np.asarray(middle[:, None] - middle + reach)
