@@ -15,8 +15,6 @@ from dolfinx import cpp as _cpp
 from dolfinx import mesh as _mesh
 from petsc4py import PETSc
 
-from .typing import Array, Entities, Integers
-
 VERSION: str = dolfinx.__version__
 
 
@@ -32,7 +30,7 @@ class _Domain(ufl.Mesh):
         return self._cell
 
 
-def geometry_dofmap(mesh: _mesh.Mesh) -> Entities:
+def geometry_dofmap(mesh: _mesh.Mesh) -> npt.NDArray[np.int32]:
     """Geometry nodes of each cell, shape (cells, nodes)."""
     geometry = mesh.geometry
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
@@ -45,8 +43,8 @@ def geometry_degree(mesh: _mesh.Mesh) -> int:
 
 
 def local_entities(
-    mesh: _mesh.Mesh, dimension: int, nodes: npt.NDArray[np.int64], tags: Entities
-) -> tuple[Entities, Entities]:
+    mesh: _mesh.Mesh, dimension: int, nodes: npt.NDArray[np.int64], tags: npt.NDArray[np.int32]
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
     """The local entities that some of the input's entities have become, with their tags. Collective.
 
     Args:
@@ -62,7 +60,7 @@ def local_entities(
     return np.asarray(found.indices), np.asarray(found.values)
 
 
-def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entities]:
+def refine(mesh: _mesh.Mesh, edges: npt.NDArray[np.int32] | None) -> tuple[_mesh.Mesh, npt.NDArray[np.int32]]:
     """Bisect edges by Plaza's rule; children stay on the ranks of their parents. Collective.
 
     Args:
@@ -81,7 +79,13 @@ def refine(mesh: _mesh.Mesh, edges: Entities | None) -> tuple[_mesh.Mesh, Entiti
 
 
 def simplex_mesh(
-    comm: Any, cells: npt.NDArray[Any], points: Array, kind: str, *, spread: bool = False, degree: int = 1
+    comm: Any,
+    cells: npt.NDArray[Any],
+    points: npt.NDArray[np.float64],
+    kind: str,
+    *,
+    spread: bool = False,
+    degree: int = 1,
 ) -> _mesh.Mesh:
     """Mesh of the simplices (c, nodes) over points (n, d), each rank giving some of both. Collective.
 
@@ -116,12 +120,12 @@ TAKES_TOPOLOGY = hasattr(_cpp.mesh.Topology, "set_index_map")
 
 def mesh_of_cells(
     comm: Any,
-    points: Array,
-    cells: Entities,
+    points: npt.NDArray[np.float64],
+    cells: npt.NDArray[np.int32],
     *,
-    index_map: tuple[int, Integers, Entities],
-    inputs: Integers,
-    facets: tuple[Entities, Entities] | None = None,
+    index_map: tuple[int, npt.NDArray[np.int64], npt.NDArray[np.int32]],
+    inputs: npt.NDArray[np.int64],
+    facets: tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]] | None = None,
 ) -> _mesh.Mesh:
     """The mesh of cells that stay where they are, in their order: dolfinx would send and reorder them. Collective.
 
@@ -156,7 +160,7 @@ def mesh_of_cells(
     return _mesh.Mesh(_cpp.mesh.Mesh_float64(comm, topology, geometry), _Domain(element))
 
 
-def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: Array) -> _mesh.Mesh:
+def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: npt.NDArray[np.float64]) -> _mesh.Mesh:
     """A mesh of the same topology whose cells are of second order. Collective.
 
     Args:
