@@ -45,16 +45,18 @@ class Measures:
         self._system, self._scaled, self._scales = system, scaled, system.problem.scales
         self.parts = tuple(driven(system.problem))
         held, touched = _attributed(system.problem, self.parts)
-        columns, constants = list[Array](), list[Array]()
+        columns, loads = list[Array](), list[Array]()
         for part in self.parts:
             for i in range(self._scales.dimension):
                 column, load = self._force(part, held[part], touched[part], i, condensation)
                 columns += [column, self._mean(part, i)]
-                constants += [load, np.zeros(2)]
-        self._constants, self._rows = np.zeros((0, 2)), np.zeros((0, condensation.problem.size))
+                loads += [load, np.zeros(2)]
+        constants, rows = np.zeros((0, 2)), np.zeros((0, condensation.problem.size))
         if columns:
-            products, self._rows = condensation.products(np.column_stack(columns))
-            self._constants = products + np.array(constants)
+            constants, rows = condensation.products(np.column_stack(columns))
+            constants = constants + np.array(loads)
+        # each in one piece, since each row of the path is multiplied
+        self._affine = [(constants[i::2], np.ascontiguousarray(rows[i::2])) for i in range(2)]
         numbers = {dof: number for number, part in enumerate(self.parts) for dof in map(int, held[part])}
         prescribed = loading.make(system, scaled).prescribed
         self._held = [law.remembering() if remember else law for law in find(system.problem, numbers, prescribed)]
@@ -83,7 +85,8 @@ class Measures:
 
     def _values(self, first: int, x: Array, factor: float) -> Array:
         """The forces (0) or means (1) of all parts, (parts, d)."""
-        found = self._constants[first::2] @ np.array([1.0, factor]) + self._rows[first::2] @ x
+        constants, rows = self._affine[first]
+        found = constants @ np.array([1.0, factor]) + rows @ x
         return np.asarray(found.reshape(-1, self._scales.dimension))
 
     def _force(
