@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..geometry import chains
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers
 from .solution_arrays import SolutionArrays
 
 
@@ -109,13 +109,9 @@ class BodyMesh:
         vectors = self._area_vectors(facets)
         return np.asarray(vectors.sum(axis=0) / (np.linalg.norm(vectors, axis=1).sum() or 1.0))
 
-    def among(self, facets: Integers) -> Mask:
-        """Which facets of the boundary are among these facets (j, 2|3), whatever the order of their vertices; (k,)."""
-        return np.asarray(np.isin(self._keys(self.boundary), self._keys(facets)))
-
     def oriented(self, facets: Integers) -> Integers:
         """These facets (j, 2|3) as they are in the boundary; those inside of the body are left out."""
-        return np.asarray(self.boundary[self.among(facets)])
+        return np.asarray(self.boundary[np.isin(self._keys(self.boundary), self._keys(facets))])
 
     def _keys(self, facets: Integers) -> Integers:
         """One number for each set of corners, (k,)."""

@@ -84,12 +84,8 @@ class SolutionArrays:
     parts: Mapping[str, ContactPart] = field(default_factory=dict)
 
 
-def members(arrays: SolutionArrays) -> dict[str, Any]:
-    """The arrays by their keys, in the order of the file; those that are None are left out."""
-    return {key: np.asarray(value) for key, value in _members(arrays)}
-
-
 def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
+    """The arrays by their keys, in the order of the file; those that are None are left out."""
     plain = {key: value for key, value in vars(arrays).items() if not isinstance(value, Mapping)}
     yield from ((key, value) for key, value in plain.items() if value is not None)
     yield from ((f"{_SIDE}{name}", facets) for name, facets in arrays.sides.items())
@@ -112,7 +108,7 @@ def save(path: Path, arrays: SolutionArrays) -> None:
         NotWrittenError: it cannot be written.
     """
     with writing.whole(path) as aside, aside.open("wb") as stream:
-        np.savez(stream, **members(arrays))
+        np.savez(stream, **{key: np.asarray(value) for key, value in _members(arrays)})
 
 
 def load(path: Path) -> SolutionArrays:
@@ -123,7 +119,7 @@ def load(path: Path) -> SolutionArrays:
     """
     try:
         with np.load(path) as stored:
-            return of_members({key: stored[key] for key in stored.files})
+            return _of_members({key: stored[key] for key in stored.files})
     except FileNotFoundError:
         raise ResultError(
             f"{path}: there is no such file; results of earlier versions do not have it: run the scene again"
@@ -132,8 +128,8 @@ def load(path: Path) -> SolutionArrays:
         raise ResultError(f"{path}: damaged ({error})") from None
 
 
-def of_members(members: Mapping[str, Any]) -> SolutionArrays:
-    """The arrays from those by their keys, as :func:`members` gives them."""
+def _of_members(members: Mapping[str, Any]) -> SolutionArrays:
+    """The arrays from those by their keys."""
     plain = {key: value for key, value in members.items() if ":" not in key}
     return SolutionArrays(
         **plain | {"degree": int(members["degree"])},
