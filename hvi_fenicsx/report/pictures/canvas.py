@@ -157,7 +157,12 @@ class Canvas(ABC):
             self.keys.setdefault(str(artist.get_label()), artist)
 
     def remark(self, words: str, colour: str = INK) -> None:
-        """Add words to the legend; what is bad is in vermilion."""
+        """Add words to the legend.
+
+        Args:
+            words: the words.
+            colour: of them; what is bad is in vermilion.
+        """
         self.key(Line2D([], [], color="none", mec=colour, label=words))
 
     def bar(self, colours: Colormap, low: float, high: float, words: str) -> None:

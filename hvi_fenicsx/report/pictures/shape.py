@@ -150,7 +150,12 @@ class Motion:
     generator: Array
 
     def at(self, points: Array, part: float = 1.0) -> Array:
-        """Where points (n, 3) are after a part of the motion, m, (n, 3)."""
+        """Where points are after a part of the motion, m, (n, 3).
+
+        Args:
+            points: at rest, m, (n, 3).
+            part: of the motion, 0 to 1.
+        """
         from scipy.linalg import expm
 
         way = expm(part * self.generator)
@@ -169,7 +174,12 @@ def escaping(body: BodyMesh) -> Motion:
 
 
 def followed(body: BodyMesh, motion: Motion) -> Array:
-    """Points to follow on their way: one far out in each diagonal direction that moves, (j, 3)."""
+    """Points to follow on their way: one far out in each diagonal direction that moves, (j, 3).
+
+    Args:
+        body: the body at rest.
+        motion: that it makes.
+    """
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * body.dimension)).reshape(body.dimension, -1).T
     points = body.points[body.outermost]
     far = points[np.unique(np.argmax((points - points.mean(axis=0))[:, : body.dimension] @ signs.T, axis=0))]

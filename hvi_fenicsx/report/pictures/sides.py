@@ -22,7 +22,7 @@ SHEAR = 0.2
 
 
 TINTS = ("#eef2f5", "#dbe3d3", "#e6dccb", "#d9d5e3", "#d3dfe6", "#e8d9d6")
-"""Of regions: pale, since marks and names stand on them; with more regions they come again."""
+"""The colours of regions: pale, since marks and names stand on them; with more regions they come again."""
 
 
 @dataclass(frozen=True)

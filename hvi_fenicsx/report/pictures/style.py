@@ -93,7 +93,12 @@ def figure(height: float) -> Figure:
 
 
 def resize(fig: Figure, height: float) -> None:
-    """Give a picture another height below its heading, inches."""
+    """Give a picture another height below its heading.
+
+    Args:
+        fig: the picture.
+        height: inches.
+    """
     fig.set_figheight(HEADING + height)
     engine = fig.get_layout_engine()
     assert engine is not None
@@ -134,7 +139,13 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
 
 
 def few_ticks(axes: Axes, axis: str, most: int = 4) -> None:
-    """Number an axis ("x" or "y") at a few round values."""
+    """Number an axis at a few round values.
+
+    Args:
+        axes: the panel.
+        axis: "x" or "y".
+        most: so many numbers, about.
+    """
     axes.locator_params(axis=axis, nbins=most, steps=[1, 2, 2.5, 5, 10])
 
 
