@@ -11,7 +11,7 @@ from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.system import direct
 from hvi_fenicsx.system.factorisation import form_of
-from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
+from hvi_fenicsx.system.held_solver import HeldPreconditioner
 from hvi_fenicsx.system.linear_settings import LinearSettings
 
 FRICTION = {"law": "quadratic_linear", "gamma1": 3e6, "gamma2": 1.5e6, "delta": 9e-6}
@@ -38,7 +38,7 @@ def main() -> None:
     whole = HeldPreconditioner(system, (), LinearSettings("lu"), Timer())
     condensed = direct.SchurDirect(form_of(system), {"pc_type": "cholesky"})
     whole.prepare(held)
-    whole.solve(load, expected, Goal(rtol=1e-12))
+    whole.solve(load, expected, 1e-12)
     condensed.prepare(held)
     condensed.apply(load, found)
     found.axpy(-1.0, expected)

@@ -14,7 +14,7 @@ from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.timing import Timer
 from hvi_fenicsx.system import direct
 from hvi_fenicsx.system.factorisation import form_of
-from hvi_fenicsx.system.held_solver import Goal, HeldPreconditioner
+from hvi_fenicsx.system.held_solver import HeldPreconditioner
 from hvi_fenicsx.system.linear_settings import LinearSettings
 from hvi_fenicsx.system.system import System
 
@@ -40,7 +40,7 @@ def test_condensed_it_solves_what_a_factorisation_of_the_whole_solves(every: int
         direct.SchurDirect(form_of(system), {"pc_type": "cholesky"}),
     )
     whole.prepare(held)
-    whole.solve(load, expected, Goal(rtol=1e-12))
+    whole.solve(load, expected, 1e-12)
     condensed.prepare(held)
     condensed.apply(load, found)
     found.axpy(-1.0, expected)
