@@ -201,7 +201,7 @@ class HeldLaw:
             reached: the least and the greatest factor so far.
         """
         laws = self.laws
-        for end in reached:
+        for end in reached if laws.memory is not None else ():
             laws = laws.remembering(*self._at(laws, end))
         return np.asarray(self.forces * self._at(laws, factor)[1][:, None])
 
