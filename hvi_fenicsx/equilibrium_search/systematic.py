@@ -23,7 +23,7 @@ from .stationarity import PointList
 PROGRAMMES = [[k / 8 for k in range(1, 9)], [2, 1.5, 1], [4, 2, 1], [-1, 0, 1]]
 """Load factors, one after the other; each programme begins at rest."""
 MULTIPLES = (0, 0.5, 2, 5, 20)
-"""Of the state that the first one leads to."""
+"""They multiply the state that the first programme leads to."""
 
 
 def candidates(problem: ScalarProblem, known: PointList, stop: Callable[[], bool]) -> Iterator[Array]:

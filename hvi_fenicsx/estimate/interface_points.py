@@ -48,7 +48,12 @@ class SideBubbles:
     blocks: Integers
 
     def values(self, e: fem.Function, dimension: int) -> Array:
-        """The bubbles of each intersection's facet, (f, k, d). Collective."""
+        """The bubbles of each intersection's facet, (f, k, d). Collective.
+
+        Args:
+            e: all bubbles.
+            dimension: of the space.
+        """
         known = np.zeros((self.count, dimension))
         known[self.owned] = e.x.array.reshape(-1, dimension)[self.blocks]
         return np.asarray(self.comm.allreduce(known)[self.of_facet[self.facets]])

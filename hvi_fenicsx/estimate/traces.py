@@ -37,7 +37,12 @@ class BoundaryBubbles:
     sign = 1.0
 
     def values(self, e: fem.Function, dimension: int) -> Array:
-        """The bubbles of each facet, (f, k, d)."""
+        """The bubbles of each facet, (f, k, d).
+
+        Args:
+            e: all bubbles.
+            dimension: of the space.
+        """
         return np.asarray(e.x.array.reshape(-1, dimension)[self.blocks])
 
     def collected(self, sums: Array) -> tuple[Integers, Array]:
