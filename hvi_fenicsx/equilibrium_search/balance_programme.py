@@ -71,7 +71,7 @@ class BalanceProgramme:
         np.maximum.at(most, points.owner, points.t)
         np.minimum.at(least, points.owner, points.t)
         forces = np.maximum(most - least, np.abs(self._problem.stiffness) @ self._half)
-        forces = np.maximum(forces, 1e-3 * float(forces.max()) + 1e-300)
+        forces = np.maximum(forces, float(forces.max()) / self._problem.thresholds.cells.price + 1e-300)
         largest = np.maximum(np.abs(most), np.abs(least)) + np.abs(self._problem.force)
         return forces, float(largest @ self._half) + 1e-300
 

@@ -80,8 +80,8 @@ class CurvatureShare:
         slope, drops = problem.arcs.least_slope(low, high), problem.arcs.drops(low, high)
         own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
         own[problem.size :] = 0.0
-        most = float(seen[undecided].max(initial=0.0))
-        strength = np.where(drops > 0.0, drops, -slope * (high - low)) * (seen / most + 0.1 if most > 0.0 else 1.0)
+        most, least = float(seen[undecided].max(initial=0.0)), problem.thresholds.bounds.least_weight
+        strength = np.where(drops > 0.0, drops, -slope * (high - low)) * (seen / most + least if most > 0.0 else 1.0)
         need = np.where(drops > 0.0, np.inf, np.maximum(-slope, 0.0))
         matrix = problem.stiffness + np.diag(problem.diagonal(own))
         if lend:

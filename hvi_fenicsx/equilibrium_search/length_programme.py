@@ -161,7 +161,9 @@ class LengthProgramme:
         axis, joints = self.problem.lengths.unknowns[rows, frames.axis], self.laws.ends[len(x) :]
         size = np.abs(y[axis])
         at = joints[rows, np.argmin(np.abs(joints - size[:, None]), axis=1)]
-        y[axis] = np.where(np.abs(at - size) <= 1e-12 * size, np.copysign(at, y[axis]), y[axis])
+        y[axis] = np.where(
+            np.abs(at - size) <= self.problem.thresholds.cells.widened * size, np.copysign(at, y[axis]), y[axis]
+        )
         return y
 
     def _rounding(self, y: Array) -> float:

@@ -142,7 +142,7 @@ class LowestSearch:
     @property
     def _allowed(self) -> float:
         """The gap as an energy; a little less, so that rounding lifts no told gap above it."""
-        return max(0.999 * self.gap * self._size, ROUNDING * self._parts)
+        return max(self._thresholds.share_used * self.gap * self._size, ROUNDING * self._parts)
 
     @property
     def _parts(self) -> float:
@@ -192,11 +192,15 @@ class LowestSearch:
 
     def _smaller(self, box: Box, found: Minimum) -> Box:
         """What strong convexity leaves of a box below the lowest energy found."""
-        reach = found.curvature.radii * math.sqrt(2.0 * max(self.upper - found.bound, 0.0)) * (1.0 + 1e-9)
-        at, n = self.problem.arguments(found.x), self.problem.size
+        reach = (
+            found.curvature.radii
+            * math.sqrt(2.0 * max(self.upper - found.bound, 0.0))
+            * (1.0 + self.problem.thresholds.points.accuracy)
+        )
+        at, n, wide = self.problem.arguments(found.x), self.problem.size, self.problem.thresholds.cells.widened
         low, high = np.maximum(box.low, at - reach), np.minimum(box.high, at + reach)
         least, most = self.problem.lengths.within(low[:n], high[:n])
-        low[n:], high[n:] = np.maximum(low[n:], least * (1.0 - 1e-12)), np.minimum(high[n:], most * (1.0 + 1e-12))
+        low[n:], high[n:] = np.maximum(low[n:], least * (1.0 - wide)), np.minimum(high[n:], most * (1.0 + wide))
         return replace(box, low=low, high=high)
 
     def _try(self, x: Array) -> None:

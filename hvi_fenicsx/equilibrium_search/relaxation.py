@@ -133,7 +133,7 @@ class Relaxation:
         if not shapes.size:
             return None
         ends = np.sort(np.stack([shapes * low[:n, None], shapes * high[:n, None]]), axis=0)
-        slack = 1e-12 * np.abs(ends).sum(axis=(0, 1))
+        slack = self.problem.thresholds.cells.widened * np.abs(ends).sum(axis=(0, 1))
         first, last = ends.sum(axis=1)
         return _Lent(shapes=shapes, stiffness=self._share.lent, low=first - slack, high=last + slack)
 

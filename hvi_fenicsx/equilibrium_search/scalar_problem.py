@@ -65,7 +65,7 @@ class ScalarProblem:
         Args:
             x: the point, (n,).
         """
-        return bool(np.max(np.abs(x), initial=0.0) >= (1.0 - 1e-9) * self.far)
+        return bool(np.max(np.abs(x), initial=0.0) >= (1.0 - self.thresholds.points.accuracy) * self.far)
 
     @cached_property
     def force_size(self) -> float:

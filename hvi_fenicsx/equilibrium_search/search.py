@@ -174,7 +174,9 @@ def _refined(task: Task, refined: Callable[[float, Array], ScalarProblem]) -> Lo
     size = max(abs(first.upper), 1e-6 * task.problem.energy_size(first.x))
     n = task.problem.size
     problem = refined(limits.error_share * task.gap * size, np.max(np.abs(first.region), axis=0)[:n])
-    left = task.gap - 2.1 * problem.error / size  # what the polylines differ on both sides, and some more
+    left = (
+        task.gap - 2.0 * (1.0 + limits.error_share) * problem.error / size
+    )  # what the polylines differ on both sides, and some more
     search = LowestSearch(problem=problem, gap=max(left, limits.error_share * task.gap), cut=task.stop)
     if task.saved is None:
         search.start([first.x], first.region)
@@ -187,7 +189,10 @@ def _proof(task: Task, search: LowestSearch) -> Found:
     kind = Kind.UNDECIDED if len(problem.lengths) else stationarity.kind(problem, search.x)
     point = StationaryPoint(x=search.x, energy=search.upper + problem.error, kind=kind)
     if (exact := None if task.exact is None else task.exact(search.x)) is not None:
-        same = abs(exact.energy - search.upper) <= 1e-11 * problem.energy_size(search.x) and not problem.error
+        same = (
+            abs(exact.energy - search.upper) <= problem.thresholds.points.zero * problem.energy_size(search.x)
+            and not problem.error
+        )
         point = exact if same else replace(point, kind=exact.kind)
     lower = now.lower - problem.error
     open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)

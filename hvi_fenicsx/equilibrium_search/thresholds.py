@@ -90,21 +90,25 @@ class BoundThresholds:
 
     Attributes:
         part: share of the largest curvature that laws are given.
+        least_weight: share of the weights of this that does not follow from where envelopes were not tight.
         tight: an envelope below its law by less than this share of the energy's parts is tight.
         slack: energy, relative to its parts, that is added to the level for what the relaxation's residual could hide.
         most_rounds: how often a box is bounded before it is divided.
         worthwhile: a round that closes less than this share of a box's gap is the last.
         lost: share of a box's gap that the chords of rigid motions may take off.
+        share_used: share of the allowed gap that a search uses: so that rounding lifts no told gap above it.
         coarse_gap: gap of the first search where laws are curved, from which the error of their polylines is chosen.
         error_share: share of the gap that this error is aimed at.
     """
 
     part: float = 0.8
+    least_weight: float = 0.1
     tight: float = 1e-14
     slack: float = 1e-6
     most_rounds: int = 6
     worthwhile: float = 0.15
     lost: float = 0.25
+    share_used: float = 0.999
     coarse_gap: float = 1e-3
     error_share: float = 0.05
 
