@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ..errors import InputError
 
@@ -29,8 +29,8 @@ def parser() -> argparse.ArgumentParser:
     commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     scene, folder, solve = _scene(), _folder(), _solve()
 
-    def add(name: str, text: str, *parents: argparse.ArgumentParser) -> argparse.ArgumentParser:
-        return commands.add_parser(name, help=text, description=text, parents=parents)
+    def add(name: str, text: str, *parents: Any) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text, parents=list(parents))
 
     _run(add("run", "solve a scene; by default into results/SCENE", scene, folder, solve))
     text = "follow the equilibria of a scene over its load, through peak and unloading; by default into"

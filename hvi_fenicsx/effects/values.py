@@ -161,7 +161,7 @@ class VectorFunction(PythonFunction):
                 raise InputError(f"{self.source}: must return {count} components, ({count}, n)")
             return values[i]
 
-        component.__name__ = f"{self.source.removeprefix('Python function ')}[{i}]"
+        component.__name__ = f"{str(self.source).removeprefix('Python function ')}[{i}]"
         return component
 
 

@@ -47,7 +47,8 @@ class BoundaryBubbles:
 
     def collected(self, sums: Array) -> tuple[Integers, Array]:
         """Forces (f, k, d) on them as those at local blocks."""
-        return self.blocks.ravel(), sums.reshape(-1, sums.shape[2])
+        blocks: Integers = self.blocks.ravel()
+        return blocks, np.asarray(sums.reshape(-1, sums.shape[2]))
 
 
 class PartPoints:

@@ -51,7 +51,8 @@ class Measures:
                 column, load = self._force(part, held[part], touched[part], i, condensation)
                 columns += [column, self._mean(part, i)]
                 loads += [load, np.zeros(2)]
-        constants, rows = np.zeros((0, 2)), np.zeros((0, condensation.problem.size))
+        constants: Array = np.zeros((0, 2))
+        rows: Array = np.zeros((0, condensation.problem.size))
         if columns:
             constants, rows = condensation.products(np.column_stack(columns))
             constants = constants + np.array(loads)

@@ -50,7 +50,7 @@ class Chain:
 
     def edges(self) -> Iterator[tuple[Point, Point]]:
         """The edges, in order."""
-        yield from pairwise((x, y) for x, y in self.points.tolist())
+        yield from pairwise((float(x), float(y)) for x, y in self.points)
 
     def thinned(self, factor: float, most: float) -> Chain:
         """The chain with fewer vertices, at equal distances along it.

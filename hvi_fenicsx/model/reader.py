@@ -276,9 +276,12 @@ def _as_written(place: Keys, value: Any) -> Keys:
     for step in place:
         if step == WHOLE:
             continue
-        if isinstance(value, dict) or (isinstance(value, list) and isinstance(step, int)):
+        if isinstance(value, dict):
             written.append(step)
-            value = value.get(step) if isinstance(value, dict) else (value[step : step + 1] or [None])[0]
+            value = value.get(step)
+        elif isinstance(value, list) and isinstance(step, int):
+            written.append(step)
+            value = value[step] if step < len(value) else None
     return tuple(written)
 
 
@@ -287,4 +290,4 @@ def _reduced(model: Model) -> tuple[Any, ...]:
     return read_tables, (model.tables(),)
 
 
-copyreg.pickle(Model, _reduced)  # type: ignore[arg-type]
+copyreg.pickle(Model, _reduced)

@@ -155,14 +155,14 @@ class EnergyBalance:
 
     def _of_bonds(self, values: Values) -> tuple[float, Array, Array]:
         """What bonds give back, what each has lost for 1 at its mode, and the scales by mode, (b,)."""
-        back, lost, scales = 0.0, [np.zeros(0)], [np.zeros(0)]
+        back, lost, scales = 0.0, list[Array](), list[Array]()
         for vertices, at in zip(self._laws, self._at, strict=True):
             x, scale, laws = values.lengths[at], values.energies[at], vertices[0].laws
             traction = self._tractions(values, vertices, at)
             back += float(scale @ laws.recoverable(x, traction))
             lost.append(laws.dissipated(x, traction))
             scales.append(scale)
-        return back, np.concatenate(lost), np.concatenate(scales)
+        return back, np.concatenate([np.zeros(0), *lost]), np.concatenate([np.zeros(0), *scales])
 
     def _tractions(self, values: Values, vertices: Sequence[VertexLaw], at: Integers) -> Array:
         """What each vertex has of the force of all laws at its point, (r,)."""

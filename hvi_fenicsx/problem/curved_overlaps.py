@@ -203,8 +203,7 @@ def in_space(first: Facets, second: Facets) -> CurvedPolygons:
     pairs = _pairs(first, second)
     pair, of_second = _parts(second, pairs.other, DEFAULT.rim_parts)
     outlines = _outlines(first, second, pairs, pair, of_second, DEFAULT.rim)
-    one_rim = replace(uncovered=max(DEFAULT.uncovered, DEFAULT.rim))
-    clipped = facet_polygons.clip(outlines, pairs.number[pair], pairs.distance[pair], len(first.nodes), one_rim)
+    clipped = facet_polygons.clip(outlines, pairs.number[pair], pairs.distance[pair], len(first.nodes), DEFAULT.rim)
     own, part = pair[clipped.outline], facet_polygons.barycentric(outlines[clipped.outline], clipped.corners)
     number, x, y = pairs.number[own], *np.moveaxis(clipped.corners, 2, 0)
     return CurvedPolygons(

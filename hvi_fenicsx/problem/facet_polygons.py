@@ -194,7 +194,9 @@ class Clipped:
     covered: Mask
 
 
-def clip(outlines: Array, number: Integers, distance: Array, count: int) -> Clipped:
+def clip(
+    outlines: Array, number: Integers, distance: Array, count: int, uncovered: float = DEFAULT.uncovered
+) -> Clipped:
     """Outlines clipped by the first side's facets, without what lies behind nearer ones.
 
     Args:
@@ -202,6 +204,7 @@ def clip(outlines: Array, number: Integers, distance: Array, count: int) -> Clip
         number: the facet of each, (p,).
         distance: from it, (p,).
         count: of the first side's facets, f.
+        uncovered: part of a facet at its end that may lie beyond the other side.
     """
     over = np.flatnonzero(np.all((outlines.min(axis=1) < 1.0) & (outlines.max(axis=1) > 0.0), axis=1))
     pieces = clip_triangles(outlines[over])
@@ -210,7 +213,7 @@ def clip(outlines: Array, number: Integers, distance: Array, count: int) -> Clip
     near = _nearest(pieces, number[outline], distance[outline])
     pieces, outline = pieces.chosen(near), outline[near]
     corners, of_piece = pieces.fans(DEFAULT.rounding)
-    covered = _covered(pieces, number[outline], count)
+    covered = _covered(pieces, number[outline], count, uncovered)
     return Clipped(corners=corners, outline=outline[of_piece], covered=covered)
 
 
@@ -279,10 +282,10 @@ def _nearest(pieces: Polygons, number: Integers, distance: Array) -> Mask:
     return kept
 
 
-def _covered(pieces: Polygons, number: Integers, count: int) -> Mask:
+def _covered(pieces: Polygons, number: Integers, count: int, uncovered: float) -> Mask:
     """Whether the pieces fill the angle at each corner of the first side's facets, (count, 3)."""
     filled = np.zeros((count, 3))
     for corner, place in enumerate(CORNERS):
-        polygon, angles = pieces.angles_at(place, DEFAULT.uncovered)
+        polygon, angles = pieces.angles_at(place, uncovered)
         np.add.at(filled[:, corner], number[polygon], angles)
-    return np.asarray(filled >= (1.0 - DEFAULT.uncovered) * _ANGLES)
+    return np.asarray(filled >= (1.0 - uncovered) * _ANGLES)

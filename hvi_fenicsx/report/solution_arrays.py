@@ -107,8 +107,9 @@ def save(path: Path, arrays: SolutionArrays) -> None:
     Raises:
         NotWrittenError: it cannot be written.
     """
+    members: dict[str, Any] = {key: np.asarray(value) for key, value in _members(arrays)}
     with writing.whole(path) as aside, aside.open("wb") as stream:
-        np.savez(stream, **{key: np.asarray(value) for key, value in _members(arrays)})
+        np.savez(stream, **members)
 
 
 def load(path: Path) -> SolutionArrays:

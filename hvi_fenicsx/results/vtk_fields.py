@@ -231,11 +231,11 @@ def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]
 
 def _fields(problem: Problem, state: ContactState) -> dict[str, Array]:
     """The columns of ``contact.csv`` at a part's vertices, its normals and tangents, and what is of ParaView alone."""
-    found = dict.fromkeys(("gap", "contact"), np.full(len(state.pressure), np.nan))
+    found: dict[str, Array] = dict.fromkeys(("gap", "contact"), np.full(len(state.pressure), np.nan))
     found |= {name: values for name, values in columns_of(problem, state).items() if name not in ("x", "y", "z")}
     tangents = np.moveaxis(state.surface.tangents, 1, 0)
     found |= {"normal": _spatial(state.surface.normals)}
-    found |= {f"t{i + 1}": _spatial(tangent) for i, tangent in enumerate(tangents)}
+    found |= {f"t{i + 1}": _spatial(np.asarray(tangent)) for i, tangent in enumerate(tangents)}
     if (both := state.of_both_modes) is not None:
         found["mode_mixity"] = both.slip_share
     distances = [law.term.multiplier * law.distance for law in state.laws] or [0.0 * state.pressure]

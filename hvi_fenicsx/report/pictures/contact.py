@@ -211,7 +211,8 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
     colours, low, high = pressure_scale(float(values.min()), largest)
     if field.kind != "pressure":
         colours, low = shades("#f4f4f1", field.colour), 0.0
-    mesh = Triangulation(*(flat.points / unit).T, flat.facets)
+    x, y = flat.points.T / unit
+    mesh = Triangulation(x, y, flat.facets)
     drawn = axes.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=low, vmax=high or 1.0)
     idle = part.idle[flat.facets].all(axis=1)
     if idle.any():
@@ -250,7 +251,8 @@ def _drop_lines(axes: Axes, flat: FlatPart, part: ContactPart) -> Iterator[str]:
         at = f"at {quantity(float(drop[0]), 'm')}" if np.ptp(drop) == 0.0 else "at lengths that change"
         reached = bool(np.nanmin(slip) < 1.0 < np.nanmax(slip))
         if reached:
-            mesh = Triangulation(*(flat.points / flat.unit.size).T, flat.facets)
+            x, y = flat.points.T / flat.unit.size
+            mesh = Triangulation(x, y, flat.facets)
             axes.tricontour(mesh, slip, [1.0], colors=INK, linestyles="--")
         yield f"dashed: the law drops {at}" if reached else f"the law drops {at}, not reached"
 

@@ -47,11 +47,12 @@ class PlaneCanvas(Canvas):
         self._outline(points, shape.body.outline, ec=INK, lw=1.6, zorder=4)
         self.key(Line2D([], [], color=GREY, label="undeformed outline", **dashed))
 
-    def _fill(self, points: Array, cells: Integers, values: Array, **look: Any) -> None:
+    def _fill(self, points: Array, cells: Integers, values: Any, **look: Any) -> None:
         """Fill cells in the colours of values by vertex, or by corner of each cell: matplotlib's quickest way."""
         if len(values) == cells.size:
             points, cells = points[cells].reshape(-1, 2), np.arange(cells.size).reshape(-1, 3)
-        self.axes.tripcolor(Triangulation(*points.T, cells), values, shading="gouraud", vmin=0.0, zorder=1, **look)
+        x, y = points.T
+        self.axes.tripcolor(Triangulation(x, y, cells), values, shading="gouraud", vmin=0.0, zorder=1, **look)
 
     def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
         """See :meth:`.Canvas.show`."""

@@ -87,7 +87,7 @@ class SpaceCanvas(Canvas):
     ) -> None:
         """See :meth:`.Canvas.paint`; cells are in the colours of the scale itself, without light."""
         body = shape.body
-        look = {"lighting": False} if by_cell else {"ambient": 0.6, "diffuse": 0.45}
+        look: dict[str, Any] = {"lighting": False} if by_cell else {"ambient": 0.6, "diffuse": 0.45}
         mesh = len(body.boundary) <= LEGIBLE and not by_cell
         self._skin(
             shape.points, body.boundary, scalars=values[body.behind] if by_cell else values, cmap=colours,
@@ -206,7 +206,7 @@ class SpaceCanvas(Canvas):
         corner.set_axis_off()
         for name, end in zip("xyz", self.project(np.eye(3)), strict=True):
             arrow = {"arrowstyle": "<|-", "color": GREY, "shrinkA": 0, "shrinkB": 0}
-            where = (float(end[0]), float(end[1]))
+            where = float(end[0]), float(end[1])
             corner.annotate(name, (0, 0), where, color=GREY, ha="center", va="center", size=11, arrowprops=arrow)
 
 

@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 import matplotlib
 import numpy as np
@@ -138,7 +139,7 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
     grey.set_fontsize(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
 
 
-def few_ticks(axes: Axes, axis: str, most: int = 4) -> None:
+def few_ticks(axes: Axes, axis: Literal["x", "y"], most: int = 4) -> None:
     """Number an axis at a few round values.
 
     Args:
