@@ -195,7 +195,7 @@ class LengthProgramme:
 
     def _along(self, here: _Frame, v: int, *, one_sided: bool) -> list[list[float]]:
         """The arcs of a cut u·v, on both sides of zero alike; one-sided where a negative opening would count in -u."""
-        rows = self.laws.rows(len(self.b) + v).tolist()
+        rows: list[list[float]] = [list(map(float, row)) for row in self.laws.rows(len(self.b) + v)]
         turned = [[-high, -low, -anchor, value, -rate, slope] for low, high, anchor, value, rate, slope in rows[::-1]]
         if not one_sided:
             return [*turned, *rows]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -54,8 +55,8 @@ def _all(task: Task) -> Found:
     for x in task.known if task.saved is None else task.saved["x"]:
         search.enter(x)
     if task.saved is not None:
-        ends = zip(task.saved["low"], task.saved["high"], strict=True)
-        search.waiting = [Box.around(low, high, 0.5 * (low + high)) for low, high in ends]
+        boxes = list[Array](np.stack([task.saved["low"], task.saved["high"]], axis=1))
+        search.waiting = [Box.around(low=box[0], high=box[1], x=box.mean(axis=0)) for box in boxes]
     else:
         search.start()
         limit = task.problem.thresholds.systematic.first_boxes
@@ -147,7 +148,7 @@ def lowest(task: Task) -> Found:
         if task.saved is None and not search.waiting:
             search.start()
         elif task.saved is not None:
-            boxes = zip(task.saved["low"], task.saved["high"], task.saved["bound"], strict=True)
+            boxes = zip(*(list[Any](task.saved[key]) for key in ("low", "high", "bound")), strict=True)
             search.resume(boxes, task.saved["x"][0])
     except SolverError as error:
         return Found(reason=str(error), nodes=search.boxes)

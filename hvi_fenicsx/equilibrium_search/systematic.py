@@ -20,7 +20,7 @@ from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
 from .stationarity import PointList
 
-PROGRAMMES = [[k / 8 for k in range(1, 9)], [2, 1.5, 1], [4, 2, 1], [-1, 0, 1]]
+PROGRAMMES: list[list[float]] = [[k / 8 for k in range(1, 9)], [2, 1.5, 1], [4, 2, 1], [-1, 0, 1]]
 """Load factors, one after the other; each programme begins at rest."""
 MULTIPLES = (0, 0.5, 2, 5, 20)
 """They multiply the state that the first programme leads to."""
@@ -70,7 +70,7 @@ def _starts(problem: ScalarProblem, stop: Callable[[], bool]) -> Iterator[Array]
 
 def _loaded(problem: ScalarProblem, programme: Sequence[float], stop: Callable[[], bool]) -> Array:
     """The state that a programme of loads leads to from rest."""
-    x = np.zeros(problem.size)
+    x: Array = np.zeros(problem.size)
     for factor in programme:
         x = _descended(problem.under(factor * problem.force), x, stop)
     return x

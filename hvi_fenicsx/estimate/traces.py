@@ -47,8 +47,7 @@ class BoundaryBubbles:
 
     def collected(self, sums: Array) -> tuple[Integers, Array]:
         """Forces (f, k, d) on them as those at local blocks."""
-        blocks: Integers = self.blocks.ravel()
-        return blocks, np.asarray(sums.reshape(-1, sums.shape[2]))
+        return np.asarray(self.blocks.ravel(), dtype=np.int64), np.asarray(sums.reshape(-1, sums.shape[2]))
 
 
 class PartPoints:

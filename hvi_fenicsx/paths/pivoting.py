@@ -181,9 +181,8 @@ class StraightBranch(Branch):
     def _correct(self, change: Array) -> None:
         """Take a change off, the driving variable held; if that is a slow one, to the nearest point of the branch."""
         if (driver := self._basis.driver) != FACTOR:
-            along = self.motion
-            scale = _largest(along) or 1.0
-            along, rate, own = along / scale, self.factor_rate / scale, float(change[driver])
+            scale = _largest(self.motion) or 1.0
+            along, rate, own = self.motion / scale, self.factor_rate / scale, float(change[driver])
             change[driver] = 0.0
             slow = abs(self.rates[driver]) < self._thresholds.slow * scale
             way = float(along @ change) / (float(along @ along) or 1.0) if slow else 0.0

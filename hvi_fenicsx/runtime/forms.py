@@ -88,7 +88,8 @@ class FormCache:
                 self._checked = tempfile.TemporaryDirectory(prefix="hvi-forms-", ignore_cleanup_errors=True)
                 text = "they are compiled again at each start: make room there, or set XDG_CACHE_HOME to another folder"
                 _LOG.warning("compiled forms cannot be kept in %s (%s); %s", wanted, error.strerror, text)
-        return self._checked if isinstance(self._checked, Path) else Path(self._checked.name)
+        kept: Any = self._checked
+        return kept if isinstance(kept, Path) else Path(kept.name)
 
 
 def _built(form: Any, comm: MPI.Comm, kept: Path) -> fem.Form:

@@ -187,7 +187,7 @@ class SpaceCanvas(Canvas):
         try:
             plotter.window_size = [1600, max(1, round(1600 * (top - bottom) / wide))]
             plotter.camera_position = [middle + self.toward * (max(self._depths) + far), middle, self.up]
-            plotter.enable_parallel_projection()
+            plotter.enable_parallel_projection()  # type: ignore[call-arg]
             plotter.camera.parallel_scale = (top - bottom) / 2
             plotter.camera.clipping_range = (far / 2, 3 * far)
             image = plotter.screenshot(transparent_background=True, return_img=True)
@@ -204,10 +204,11 @@ class SpaceCanvas(Canvas):
         corner = self.axes.inset_axes((0.0, 0.0, 0.17, 0.17), zorder=8)
         corner.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), aspect="equal")
         corner.set_axis_off()
-        for name, end in zip("xyz", self.project(np.eye(3)), strict=True):
+        for name, (x, y) in zip("xyz", list[Array](self.project(np.eye(3))), strict=True):
             arrow = {"arrowstyle": "<|-", "color": GREY, "shrinkA": 0, "shrinkB": 0}
-            where = float(end[0]), float(end[1])
-            corner.annotate(name, (0, 0), where, color=GREY, ha="center", va="center", size=11, arrowprops=arrow)
+            corner.annotate(
+                name, (0, 0), (float(x), float(y)), color=GREY, ha="center", va="center", size=11, arrowprops=arrow
+            )
 
 
 def _view(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
@@ -221,7 +222,7 @@ def _view(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
 def _surface(points: Array, facets: Integers) -> pyvista.PolyData:
     """Facets as pyvista's, without the points that none of them has; ``vertex`` is the number of each point."""
     used, index = np.unique(facets, return_inverse=True)
-    skin = pyvista.PolyData.from_regular_faces(points[used], index.reshape(facets.shape))
+    skin = pyvista.PolyData.from_regular_faces(points[used], index.reshape(facets.shape))  # type: ignore[arg-type]
     skin.point_data["vertex"] = used
     skin.set_active_scalars(None)
     return skin
