@@ -20,16 +20,16 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LIMITS = {
-    "lines of code": 38400,
-    "tokens": 452200,
-    "files": 350,
-    "lines of the largest room": 3810,
+    "lines of code": 34410,
+    "tokens": 409100,
+    "files": 320,
+    "lines of the largest room": 3200,
     "flat modules": 12,
-    "tuning numbers": 385,
-    "class names used twice": 26,
-    "lines of the longest function": 46,
-    "floors": 17,
-    "lines of tests": 28300,
+    "tuning numbers": 255,
+    "class names used twice": 8,
+    "lines of the longest function": 45,
+    "floors": 15,
+    "lines of tests": 21400,
     "lines of benchmarks": 2600,
 }
 """They go down with the house, never up without a reason that is written beside."""

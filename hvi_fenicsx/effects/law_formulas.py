@@ -152,20 +152,12 @@ def _at_some_place(name: str, table: Mapping[str, Any]) -> laws.Superpotential:
 
 
 def _parameters(law: laws.Superpotential, formulas: Mapping[str, Formula]) -> list[Parameter]:
-    """The numbers of a law that have a unit, with the powers of it: how they change where the law is scaled tells."""
-    scaled = law.scaled(0.5, 1.0), law.scaled(1.0, 0.5)
-    if any(type(one) is not type(law) for one in scaled):
-        return []
-    tables = [dict(_leaves(laws.describe(one))) for one in scaled]
-    found = []
-    for key, number in _leaves(laws.describe(law)):
-        if isinstance(number, bool | str) or not number:
-            continue
-        length, traction = (float(np.log2(table[key] / number)) for table in tables)
-        if (length, traction) != (0.0, 0.0) and length.is_integer() and traction.is_integer():
-            given = formulas.get(key) or Formula(float(number))
-            found.append(Parameter(key=key, given=given, number=float(number), powers=(int(length), int(traction))))
-    return found
+    """The numbers of a law that have a unit, with the powers of it."""
+    return [
+        Parameter(key=key, given=formulas.get(key) or Formula(float(number)), number=float(number), powers=powers)
+        for key, number in _leaves(laws.describe(law))
+        if (powers := law.powers.get(re.sub(r"\[\d+\]", "[]", key, count=1))) is not None and number
+    ]
 
 
 def _product(pair: list[Parameter], powers: Array) -> SpatialValue:

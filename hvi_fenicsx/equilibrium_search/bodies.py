@@ -94,7 +94,6 @@ class Equilibria:
             return NONE
         if not lowest and saved is None and (only := self._only()) is not None:
             return only
-        scales = self._prepared.problem.scales
         task = Task(
             problem=self.problem,
             lowest=lowest,
@@ -107,12 +106,18 @@ class Equilibria:
             has_potential=self._prepared.problem.has_potential,
             no_lowest=self._no_lowest,
             known=() if lowest or saved is not None or stop() else self._known(stop),
-            unit=Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J"),
+            unit=self._unit,
             exact=self._exact,
             refined=self._refined,
         )
         with self._prepared.timer("solve"):
             return find(task)
+
+    @property
+    def _unit(self) -> Unit:
+        """Of energies."""
+        scales = self._prepared.problem.scales
+        return Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J")
 
     @property
     def _no_lowest(self) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import inspect
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -25,6 +26,7 @@ from .parameter_checks import require_positive
 from .traction_bounds import Extremes, extremes
 from .traction_graph import TractionGraph
 
+Powers = Mapping[str, tuple[int, int]]
 _REGISTRY: dict[str, type] = {}
 
 
@@ -37,6 +39,8 @@ class Superpotential(SplitLaw):
     """
 
     name: ClassVar[str]
+    powers: ClassVar[Powers] = {}
+    """The powers of length and traction in the units of parameters, for which formulas may then stand."""
 
     def __init_subclass__(cls, *, register: bool = True, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -113,7 +117,7 @@ def _refuse_hidden_properties(cls: type[Superpotential]) -> None:
     """A parameter called `peak`, say, would silently replace the property of that name."""
     known = {key for base in Superpotential.__mro__ for key in vars(base) if not key.startswith("_")}
     reserved = known | _KEYS_BESIDE
-    hidden = sorted(reserved & (inspect.get_annotations(cls).keys() - {"name"}))
+    hidden = sorted(reserved & (inspect.get_annotations(cls).keys() - {"name", "powers"}))
     if hidden:
         raise InputError(
             f"law class {cls.__name__}: the parameter name {hidden[0]!r} is taken by a property that "

@@ -9,11 +9,13 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from typing_extensions import override
 
 from ..errors import InputError
+from .base import Powers
 from .parameter_checks import require_count, require_number, require_ordered, require_positive
 from .polyline import PolylineLaw
 from .traction_bounds import DEFAULT
@@ -29,6 +31,7 @@ class QuadraticLinear(PolylineLaw):
     """
 
     name = "quadratic_linear"
+    powers: ClassVar[Powers] = {"gamma1": (0, 1), "gamma2": (0, 1), "delta": (1, 0)}
     gamma1: float
     gamma2: float
     delta: float
@@ -56,6 +59,7 @@ class QuadraticLinearLiteral(PolylineLaw):
     """
 
     name = "quadratic_linear_literal"
+    powers: ClassVar[Powers] = {"gamma1": (0, 1), "gamma2": (0, 1), "delta": (1, 0)}
     gamma1: float
     gamma2: float
     delta: float
@@ -83,6 +87,7 @@ class Tresca(PolylineLaw):
     """
 
     name = "tresca"
+    powers: ClassVar[Powers] = {"yield_traction": (0, 1)}
     yield_traction: float
     reference_slip: float = 1e-6
 
@@ -104,6 +109,7 @@ class LinearSpring(PolylineLaw):
     """j(x) = ½ stiffness x², stiffness in N/m³. There is no kink; `reference_slip` (m) gives the energy scale only."""
 
     name = "linear_spring"
+    powers: ClassVar[Powers] = {"stiffness": (-1, 1)}
     stiffness: float
     reference_slip: float = 1e-6
 
@@ -131,6 +137,7 @@ class Sawtooth(PolylineLaw):
     """
 
     name = "sawtooth"
+    powers: ClassVar[Powers] = {"peak_traction": (0, 1), "residual_traction": (0, 1), "delta": (1, 0)}
     peak_traction: float
     residual_traction: float
     delta: float
@@ -166,6 +173,7 @@ class Graph(PolylineLaw):
     """
 
     name = "graph"
+    powers: ClassVar[Powers] = {"points[][0]": (1, 0), "points[][1]": (0, 1)}
     points: tuple[tuple[float, float], ...]
     one_sided: bool = False
 

@@ -11,7 +11,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..typing import Array
-from .base import Superpotential
+from .base import Powers, Superpotential
 from .convex_parts import ConvexPart, DifferentiablePart, Directional, folded
 from .parameter_checks import require_ordered, require_positive
 from .polyline import PolylinePart
@@ -32,6 +32,7 @@ class WeakeningLaw(Superpotential):
     """
 
     concave_shape: ClassVar[bool] = False
+    powers: ClassVar[Powers] = {"peak_traction": (0, 1), "residual_traction": (0, 1), "delta": (1, 0)}
     peak_traction: float
     residual_traction: float
     delta: float

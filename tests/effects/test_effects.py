@@ -320,10 +320,6 @@ REFUSED: dict[str, tuple[Table, str]] = {
         changed(domain={"shape": "disk", "radius": 1.0, "mesh_size": 0.1}),
         'unknown side "left"',
     ),
-    "a mesh beyond measure": (
-        changed(domain={"shape": "disk", "radius": 1.0, "mesh_size": 1e-6}),
-        "make it larger",
-    ),
     "a region of a shape that has none": (
         changed(body={"region": "core", "force": [0.0, -1.0]}),
         "a rectangle has no regions",

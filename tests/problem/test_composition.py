@@ -45,15 +45,15 @@ SCENES: dict[str, tuple[Table, int, str, bool]] = {
         "linear",
         False,
     ),
-    # with bounds or laws: normals and lumped areas of the part; for each law its traction
-    "an elastic support": (scene({"support": SPRING}), 3 + 2 + 1, "linear", False),
+    # with bounds or laws: normals and lumped areas of the part
+    "an elastic support": (scene({"support": SPRING}), 3 + 2, "linear", False),
     "contact": (scene({"contact": {"gap": 0.0}}), 3 + 2, "convex", True),
-    "contact on springs": (scene({"contact": {"gap": 0.0}, "friction": SPRING}), 3 + 2 + 1, "convex", True),
-    "friction": (rolling(friction=LAW), 3 + 2 + 1, "branch", False),
-    "contact and friction": (scene({"contact": {"gap": 0.0}, "friction": LAW}), 3 + 2 + 1, "branch", True),
+    "contact on springs": (scene({"contact": {"gap": 0.0}, "friction": SPRING}), 3 + 2, "convex", True),
+    "friction": (rolling(friction=LAW), 3 + 2, "branch", False),
+    "contact and friction": (scene({"contact": {"gap": 0.0}, "friction": LAW}), 3 + 2, "branch", True),
     "adhesion more": (
         scene({"contact": {"gap": 0.0}, "friction": LAW, "adhesion": LAW}),
-        3 + 2 + 1 + 1,
+        3 + 2,
         "branch",
         True,
     ),
