@@ -138,12 +138,11 @@ def examine(
     mixity = _mixity(comm, states)
     passed = passed and _within(net, tolerance) and (mixity or 0.0) <= tolerance
     true, error = (largest(comm, value) for value in _inclusion_true(states))
-    allowed = max(tolerance, rounding or 0.0)
-    second_order = stability.status(known, u, forces.reaction, allowed, inertia=inertia and passed)
+    limit = max(tolerance, rounding or 0.0)
     certificate = Certificate(
         **{name: float(np.max(values)) for name, values in (entries | net).items()},
         inclusion_true=true,
-        second_order=second_order,
+        second_order=stability.status(known, u, forces.reaction, limit, inertia=inertia and passed),
         tolerance=tolerance,
         passed=passed,
         mixity=mixity,
