@@ -12,7 +12,9 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    ModelWrapValidatorHandler,
     PlainSerializer,
+    PrivateAttr,
     ValidationError,
     ValidationInfo,
     create_model,
@@ -51,6 +53,15 @@ class _EffectTable(Table):
     """A table of a place, with the effects that act there."""
 
     place: ClassVar[Place]
+    _written: tuple[str, ...] = PrivateAttr(default=())
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _with_order(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Keep the order of the keys: effects are told in that of the file."""
+        table = handler(data)
+        table._written = tuple(data) if isinstance(data, dict) else table._written
+        return table
 
     @classmethod
     def with_effects(cls) -> type[Self]:
@@ -69,7 +80,7 @@ class _EffectTable(Table):
 
     def effects(self, name: str) -> Iterator[Effect]:
         """Its effects at their place, where its name is this."""
-        for _, value in self:
+        for value in (getattr(self, key) for key in self._written):
             if isinstance(value, Effect):
                 yield value.at(self.stands(name), name)
 
