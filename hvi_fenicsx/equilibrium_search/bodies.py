@@ -115,7 +115,7 @@ class Equilibria:
 
     @property
     def _unit(self) -> Unit:
-        """Of energies."""
+        """The unit of energies."""
         scales = self._prepared.problem.scales
         return Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J")
 
