@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LIMITS = {
-    "lines of code": 34410,
+    "lines of code": 34420,
     "tokens": 409100,
     "files": 320,
     "lines of the largest room": 3200,

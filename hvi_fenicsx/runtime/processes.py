@@ -145,9 +145,11 @@ def stop_asked() -> bool:
 
 
 def raise_on_stop() -> None:
-    """Have the signals of a stop raise KeyboardInterrupt, until a command catches them itself."""
+    """Have a first stop raise KeyboardInterrupt, until a command catches them itself; a second one kills."""
 
     def stop(number: int, frame: FrameType | None) -> None:
+        for each in STOP:
+            signal.signal(each, signal.SIG_DFL)
         raise KeyboardInterrupt
 
     catch(STOP, stop)

@@ -84,7 +84,9 @@ def test_a_full_disk_ends_a_study_in_one_message_and_nothing_finished_is_lost(
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("hvi: --out")
     assert "could not be written: File too large" in done.stderr
-    assert {name: (copy / "out" / name).read_bytes() for name in before} == before
+    after = {name: (copy / "out" / name).read_bytes() for name in before}
+    assert after.pop("study.journal").startswith(before.pop("study.journal"))  # points that were finished join it
+    assert after == before
     assert [name for name in names(copy) if "hvi-" in name] == []
 
 
