@@ -287,9 +287,9 @@ class CurvedBranch(Events):
 
     def _turns_back(self, after: CurvePoint) -> bool:
         """Whether the tangent there leads back in units of the laws: a long spring beside them hides a fold."""
-        way = (after.values.s - self.here.values.s) / self.points.reach(after.values)
-        rates = self.rates_at(after) / self.points.reach(after.values)
-        return float(way @ rates) < 0.0
+        units = self.points.reach(after.values)
+        rates = self.rates_at(after)
+        return float(((after.values.s - self.here.values.s) / units) @ (rates / units)) < 0.0
 
     def _checked(self, move: CurveStep, way: float) -> CurveStep:
         """The step, if it did not leave the curve."""
