@@ -100,6 +100,10 @@ def ended_together(comm: MPI.Comm) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         raise
+    except ImportError:
+        if processes.stop_asked():  # a library's own import makes this of a KeyboardInterrupt within it
+            raise KeyboardInterrupt from None
+        raise
     except HviError as error:
         if error.everywhere or _raised_by_all(twin):
             raise

@@ -8,8 +8,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import FrameType
 
 import pytest
+from mpi4py import MPI
+
+from hvi_fenicsx.runtime import processes
+from hvi_fenicsx.runtime.mpi import ended_together
 
 SUPPORT = Path(__file__).parents[1] / "support"
 FEWEST = 100
@@ -46,3 +51,21 @@ def test_ctrl_c_while_the_program_is_loaded_ends_it_without_a_traceback(tmp_path
     environment = {**os.environ, "PYTHONPATH": path}
     done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=120)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_a_stop_that_a_library_tells_as_a_failed_import_is_an_interruption() -> None:
+    """VTK's modules in C make an ImportError of a KeyboardInterrupt that comes while they load."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise ImportError
+
+    before = signal.getsignal(signal.SIGUSR1)
+    processes.catch([signal.SIGUSR1], stop)
+    try:
+        with pytest.raises(KeyboardInterrupt), ended_together(MPI.COMM_SELF):
+            signal.raise_signal(signal.SIGUSR1)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+        processes.forget_signals()
+    with pytest.raises(ImportError), ended_together(MPI.COMM_SELF):
+        raise ImportError
