@@ -100,7 +100,7 @@ class _StateFile:
         """What an earlier search has left, if this one shall go on from it. Rank 0 only."""
         if not self._call.options.resume:
             return None
-        return next(iter(journal.read(self._call.folder.target / JOURNAL, self._identity)), None)
+        return next(iter(journal.read_journal(self._call.folder.target / JOURNAL, self._identity)), None)
 
     def keep(self, state: Callable[[], Saved]) -> None:
         """Write what is left, if it is time.
@@ -112,7 +112,7 @@ class _StateFile:
         if COMM.rank or self._broken or began < self._next:
             return
         try:
-            journal.replace(self._call.folder.announce(JOURNAL), self._identity, [state()])
+            journal.write_journal(self._call.folder.announce(JOURNAL), self._identity, [state()])
         except NotWrittenError as error:
             self._broken = True
             LOG.info("%s; a kill would lose the search", error)
@@ -126,7 +126,7 @@ class _StateFile:
             state: what is left; nothing is written where it is empty.
         """
         if state:
-            journal.replace(self._call.folder.work / JOURNAL, self._identity, [state])
+            journal.write_journal(self._call.folder.work / JOURNAL, self._identity, [state])
 
 
 def _picture_and_page(folder: Path, *, draw: bool) -> None:

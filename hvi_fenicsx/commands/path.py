@@ -64,7 +64,7 @@ class _StateFile:
     def known(self) -> list[journal.Record]:
         """The states of a path that was begun and shall go on. Rank 0 only."""
         if self._call.options.resume:
-            self._known = journal.read(self._call.folder.target / path_files.JOURNAL, self._call.identity)
+            self._known = journal.read_journal(self._call.folder.target / path_files.JOURNAL, self._call.identity)
         return self._known
 
     def keep(self, record: journal.Record) -> None:

@@ -38,7 +38,7 @@ class Journal:
 
     def __init__(self, path: Path, identity: str) -> None:
         self._path = path
-        self.records, whole = _read(path, identity)
+        self.records, whole = _journal(path, identity)
         with writing.told(path):
             self._file = path.open("r+b" if whole else "wb")
             self._file.truncate(whole)
@@ -69,7 +69,7 @@ class Journal:
             os.fsync(self._file.fileno())
 
 
-def replace(path: Path, identity: str, records: Iterable[Record]) -> None:
+def write_journal(path: Path, identity: str, records: Iterable[Record]) -> None:
     """Write a journal of some records, whole or not at all.
 
     Args:
@@ -84,17 +84,17 @@ def replace(path: Path, identity: str, records: Iterable[Record]) -> None:
         aside.write_bytes(b"".join(map(_line, [{"identity": identity}, *records])))
 
 
-def read(path: Path, identity: str) -> list[Record]:
+def read_journal(path: Path, identity: str) -> list[Record]:
     """The records of a journal; none where there is no journal, or one of another computation.
 
     Args:
         path: the file.
         identity: what the computation is of.
     """
-    return _read(path, identity)[0]
+    return _journal(path, identity)[0]
 
 
-def _read(path: Path, identity: str) -> tuple[list[Record], int]:
+def _journal(path: Path, identity: str) -> tuple[list[Record], int]:
     """The records, and the length of the file as far as they are whole."""
     try:
         content = path.read_bytes()

@@ -26,8 +26,8 @@ def write(path: Path, identity: str = "this") -> None:
 
 def test_another_path_has_no_records_here(tmp_path: Path) -> None:
     write(tmp_path / "j")
-    assert journal.read(tmp_path / "j", "that") == []
-    assert journal.read(tmp_path / "absent", "this") == []
+    assert journal.read_journal(tmp_path / "j", "that") == []
+    assert journal.read_journal(tmp_path / "absent", "this") == []
 
 
 def test_wherever_the_end_is_torn_off_the_whole_records_stay_and_the_next_follows_them(tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_wherever_the_end_is_torn_off_the_whole_records_stay_and_the_next_follow
         with closing(Journal(tmp_path / "j", "this")) as opened:
             counts.add(len(opened.records))
             opened.append(RECORDS[1])
-        assert journal.read(tmp_path / "j", "this")[-1]["event"] == "end"
+        assert journal.read_journal(tmp_path / "j", "this")[-1]["event"] == "end"
     assert counts == {0, 1}
 
 
@@ -49,4 +49,4 @@ def test_a_changed_byte_ends_the_journal_before_its_record(at: int, tmp_path: Pa
     content = bytearray((tmp_path / "j").read_bytes())
     content[at] ^= 1
     (tmp_path / "j").write_bytes(content)
-    assert len(journal.read(tmp_path / "j", "this")) < len(RECORDS)
+    assert len(journal.read_journal(tmp_path / "j", "this")) < len(RECORDS)
