@@ -26,10 +26,10 @@ from mpi4py import MPI
 from hvi_fenicsx import Model, read_scene
 from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
-from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
+from hvi_fenicsx.accuracy.control import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, prolong
 from hvi_fenicsx.certify import contact_state
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime.cost import Timer
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "accuracy.md"

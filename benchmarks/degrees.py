@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.accuracy import control
-from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
+from hvi_fenicsx.accuracy.control import AccuracyResult, Goal
 
 STORE = accuracy.ROOT / "docs" / "benchmarks" / "degrees.json"
 ACCURACIES = (1e-1, 1e-2, 1e-3)

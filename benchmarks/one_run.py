@@ -23,8 +23,8 @@ from hvi_fenicsx import read_scene
 from hvi_fenicsx.estimate.contact_errors import ratio
 from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.model import Model
-from hvi_fenicsx.runtime import timing
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime import cost
+from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.context import RunControl
@@ -122,7 +122,7 @@ def main() -> None:
     """Run what the argument says."""
     task = json.loads(sys.argv[1])
     if task.get("clock") == "cpu":
-        timing.time.perf_counter = time.process_time  # type: ignore[attr-defined]
+        cost.time.perf_counter = time.process_time  # type: ignore[attr-defined]
     warm(task)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     scene = read_scene(Path(task["scene"]), task["overrides"])

@@ -6,7 +6,7 @@ from typing import Any
 
 from petsc4py import PETSc
 
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system.law_models import Cells, VertexModel

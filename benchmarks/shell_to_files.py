@@ -35,20 +35,20 @@ def one(words: list[str]) -> None:
     """`hvi run` in this process, its timer on processor time where so wanted; the time before its timer as JSON."""
     cpu, words = words[0] == "cpu", words[1:]
     began = 0.0 if cpu else time.perf_counter()
-    from hvi_fenicsx.runtime import timing
+    from hvi_fenicsx.runtime import cost
 
     if cpu:
-        timing.time.perf_counter = processor_time  # type: ignore[attr-defined]
+        cost.time.perf_counter = processor_time  # type: ignore[attr-defined]
     from hvi_fenicsx.commands import cli
 
     made: list[float] = []
-    init = timing.Timer.__init__
+    init = cost.Timer.__init__
 
-    def timed(self: timing.Timer) -> None:
+    def timed(self: cost.Timer) -> None:
         made.append((processor_time() if cpu else time.perf_counter()) - began)
         init(self)
 
-    timing.Timer.__init__ = timed  # type: ignore[method-assign]
+    cost.Timer.__init__ = timed  # type: ignore[method-assign]
     code = cli.main(words)
     from mpi4py import MPI  # not before: the program starts PETSc first
 

@@ -87,7 +87,7 @@ if TYPE_CHECKING:
     from .model import Body, Model, dump_scene, read_scene, read_tables
     from .model.energy import Energy
     from .runtime.log import NewtonStep, set_log_level
-    from .runtime.versions import __version__
+    from .runtime.manifest import __version__
     from .workflow import prepare
 
 

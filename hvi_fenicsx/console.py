@@ -13,7 +13,7 @@ from .paths.load_path import LoadPath
 from .problem import effect_summary
 from .reduced import loading
 from .rigid import AnyBody, LoadFactors, Mode
-from .runtime.terminal import percent
+from .runtime.log import percent
 from .solvers import nested_iteration, registry
 from .solvers.method import Counts
 from .workflow import Preparation, Solution

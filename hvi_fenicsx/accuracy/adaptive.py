@@ -20,9 +20,9 @@ from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
 from ..model import Model
 from ..problem.problem import Problem
+from ..runtime.cost import Timer
 from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
-from ..runtime.timing import Timer
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.levels import Level, Levels

@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from ..errors import ExitCode
 from ..mesh import nodes
 from ..mesh.domain import Domain
 from ..model import Model
-from ..runtime import memory
+from ..runtime import cost
 from ..runtime.mpi import largest
+from ..workflow import Solution
 from . import adaptive, quantities
 from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, ControlThresholds
-from .goal import AccuracyResult, AdaptiveStep, Goal
 from .quantity_base import Quantity
 
 _INTERRUPTED = "interrupted"
@@ -93,7 +95,7 @@ class AdaptiveRun:
             domain: the body on the first mesh (:meth:`.AdaptiveSolver.first_domain`).
         """
         self.comm, start = domain.mesh.comm, time.perf_counter()
-        self.room = memory.room(self.comm) - memory.peak(self.comm)
+        self.room = cost.memory_room(self.comm) - cost.peak_memory(self.comm)
         level = self.solver.begin(adaptive.coarsest(self.scene), domain, self.thresholds)
         why = self._record(level, start)
         while why is None and not (self._known and self.steps[-1].error <= self.goal.accuracy):
@@ -153,7 +155,7 @@ class AdaptiveRun:
             epsilon=level.solution.epsilon,
             tolerance=level.solution.scene.solver.tolerance,
             seconds=seconds,
-            memory=memory.peak(self.comm),
+            memory=cost.peak_memory(self.comm),
         )
 
     def _next(self, level: AdaptiveLevel) -> AdaptiveLevel | str:
@@ -213,7 +215,7 @@ class Elements:
 
     def memory(self, dofs: float) -> float:
         """What so many unknowns take, about, on meshes refined where the error is, MB."""
-        return memory.needed_by_all_meshes(dofs, self.dimension, self.degree)
+        return cost.memory_of_all_meshes(dofs, self.dimension, self.degree)
 
     def needed(self, dofs: int, times: float, quantity: Quantity) -> float:
         """The unknowns that an error so many times smaller takes, at the best rate of convergence.
@@ -305,3 +307,96 @@ class ErrorBalance:
         if 10 * last.algebraic > max(last.discretisation, self.accuracy):
             values["tolerance"] = solver.tolerance / 10
         return scene.with_solver(**values)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is asked for.
+
+    Attributes:
+        accuracy: relative error.
+        quantity: name of the target quantity.
+    """
+
+    accuracy: float
+    quantity: str = "energy"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For ``summary.json``."""
+        return {"requested": self.accuracy, "quantity": self.quantity}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdaptiveStep:
+    """One adaptive step: its cost and what it gave.
+
+    Attributes:
+        dofs: unknowns.
+        error: estimated, relative, of the quantity asked for (infinite: none yet).
+        discretisation: the mesh's part of the error in the energy norm, relative.
+        smoothing: smoothing's part of the quantity's error, relative.
+        algebraic: the solver's part of the error in the energy norm, relative.
+        epsilon: relative width of the smoothing, or None.
+        tolerance: of the solver.
+        seconds: wall time of this step.
+        memory: the program's peak so far, MB.
+    """
+
+    dofs: int
+    error: float
+    discretisation: float
+    smoothing: float
+    algebraic: float
+    epsilon: float | None
+    tolerance: float
+    seconds: float
+    memory: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccuracyResult:
+    """The result of a run to a goal.
+
+    Attributes:
+        goal: what was asked for.
+        level: the last mesh and its solution.
+        solution: the same solution, as that of the scene.
+        degree: of the elements.
+        steps: all adaptive steps.
+        why: why it ended without reaching the goal; None where it was reached.
+        interrupted: whether it ended because it was to stop.
+    """
+
+    goal: Goal
+    level: AdaptiveLevel
+    solution: Solution
+    degree: int
+    steps: tuple[AdaptiveStep, ...]
+    why: str | None
+    interrupted: bool
+
+    @property
+    def description(self) -> str:
+        """What the accuracy is of, in words."""
+        return quantities.find(self.goal.quantity).description
+
+    @property
+    def exit_code(self) -> int:
+        """The solution's, or *interrupted* or *not converged* where the accuracy was not reached."""
+        if self.interrupted and not self.solution.exit_code:
+            return ExitCode.INTERRUPTED
+        return self.solution.exit_code or (ExitCode.NOT_CONVERGED if self.why else ExitCode.CERTIFIED)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For ``summary.json``."""
+        last = self.steps[-1] if self.steps else None
+        return {
+            **self.goal.as_dict(),
+            "estimated": last.error if last else None,
+            "reached": self.why is None,
+            "why": self.why,
+            "degree": self.degree,
+            "tolerance": last.tolerance if last else None,
+            "epsilon": last.epsilon if last else None,
+            "levels": [asdict(step) for step in self.steps],
+        }

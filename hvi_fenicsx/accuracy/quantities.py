@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..certify.contact_state import ContactState
     from ..estimate.contact_errors import ContactErrors
     from .adaptive import AdaptiveLevel
-    from .goal import AdaptiveStep
+    from .control import AdaptiveStep
 
 
 class EnergyNorm(Quantity):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dolfinx import fem
 
     from .adaptive import AdaptiveLevel
-    from .goal import AdaptiveStep
+    from .control import AdaptiveStep
 
 ORDERS = (0.5, 2.0)
 """The orders of convergence in h that are believed of a quantity: P1 has no larger one."""

@@ -17,8 +17,8 @@ from ..problem.contact_surface import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..rigid import Solvability, kernel
+from ..runtime.log import percent
 from ..runtime.mpi import largest, total
-from ..runtime.terminal import percent
 from ..system import existence
 from ..typing import Array
 from .certificate import Examination

@@ -22,7 +22,7 @@ from ..laws import Length, Superpotential
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
-from ..runtime.timing import Timer
+from ..runtime.cost import Timer
 from ..system import local_frames
 from ..system.factorisation import Factorisation, form_of
 from ..system.law_models import Cells, VertexModel

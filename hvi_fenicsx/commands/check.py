@@ -14,7 +14,7 @@ from .. import console
 from ..errors import ExitCode
 from ..model import read_scene
 from ..problem import boundary_parts
-from ..runtime import terminal
+from ..runtime import log
 from ..runtime.mpi import on_root
 from ..solvers import obstacle_force
 from ..system import existence
@@ -35,7 +35,7 @@ def execute(options: argparse.Namespace) -> int:
     prepared = prepare(scene, COMM)
     text = _report(prepared, options.loads, as_json=options.json)
     if COMM.rank == 0:
-        terminal.say(text)
+        log.say(text)
     return _CODES.get(prepared.solvability.state, ExitCode.CERTIFIED)
 
 

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import math
+import re
 import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
 
 from ..errors import ExitCode, HviError, InputError
-from ..runtime import log, processes, terminal
-from .arguments import parser
+from ..runtime import log, processes
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code by the contract. Collective under mpirun."""
-    terminal.prepare()
+    log.prepare()
     processes.ensure_home()
     words = _with_petsc_joined(sys.argv[1:] if arguments is None else arguments)
     try:
@@ -28,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _print_error("hvi: interrupted; nothing was written")
         return ExitCode.INTERRUPTED
     finally:
-        terminal.finish()
+        log.finish()
         processes.forget_signals()
 
 
@@ -109,13 +112,136 @@ def _placed(options: argparse.Namespace) -> Iterator[None]:
 
 def _version() -> int:
     processes.start_petsc()
-    from ..runtime.versions import versions
+    from ..runtime.manifest import versions
 
     if processes.is_first_rank():
-        terminal.say("\n".join(f"{name} {version}" for name, version in versions().items()))
+        log.say("\n".join(f"{name} {version}" for name, version in versions().items()))
     return ExitCode.CERTIFIED
 
 
 def _print_error(message: str) -> None:
     if processes.is_first_rank():
-        terminal.complain(message)
+        log.complain(message)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Errors of the command line are input errors like any other: one message, exit code 2."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; see `{self.prog} --help`")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    main_parser = _Parser(
+        prog="hvi",
+        description="Semicoercive hemivariational inequalities: elastic bodies held by contact and nonmonotone laws.",
+        epilog="Exit codes: 0 certified, 2 bad input, 3 no solution exists, 4 not converged, 130 interrupted.",
+    )
+    commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    scene, folder, solve = _scene(), _folder(), _solve()
+
+    def add(name: str, text: str, *parents: Any) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text, parents=list(parents))
+
+    _run(add("run", "solve a scene; by default into results/SCENE", scene, folder, solve))
+    text = "follow the equilibria of a scene over its load, through peak and unloading; by default into"
+    add("path", f"{text} results/SCENE-path", scene, folder, solve)
+    _check(add("check", "validate a scene and say whether a solution exists; solves nothing", scene))
+    text = "find all equilibria of a scene, or the lowest with a proof; by default into results/SCENE-equilibria"
+    _equilibria(add("equilibria", text, scene, folder, solve))
+    text = "measure what accuracy costs in time, along several axes; by default into results/SCENE-study"
+    _study(add("study", text, scene, folder))
+    add("version", "versions of everything")
+    return main_parser
+
+
+def _scene() -> argparse.ArgumentParser:
+    """What all commands have that read a scene."""
+    found = _Parser(add_help=False)
+    found.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
+    text = "override a value of the scene, like domain.cells=[64,64]"
+    found.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help=text)
+    return found
+
+
+def _folder() -> argparse.ArgumentParser:
+    """What all commands have that write a folder."""
+    found = _Parser(add_help=False)
+    found.add_argument("--out", type=Path, metavar="DIR", help="the folder for the result")
+    found.add_argument("--force", action="store_true", help="replace what is there")
+    text = "keep a finished result of the same scene; else go on with what was stopped, or begin"
+    found.add_argument("--resume", action="store_true", help=text)
+    found.add_argument("--np", type=_whole_number(4096), metavar="N", help="run on N MPI ranks")
+    return found
+
+
+def _solve() -> argparse.ArgumentParser:
+    """What all commands have that solve one scene into a folder."""
+    found = _Parser(add_help=False)
+    text = 'PETSc options, like "-hvi_ksp_monitor"; those of the solvers begin with -hvi_'
+    found.add_argument("--petsc", default="", metavar="OPTIONS", help=text)
+    found.add_argument("--no-pictures", action="store_true", help="write no pictures")
+    return found
+
+
+def _run(run: argparse.ArgumentParser) -> None:
+    text = "choose mesh, ε and tolerances so that the relative error is below REL, like 1e-2"
+    run.add_argument("--accuracy", type=_relative, metavar="REL", help=text)
+    run.add_argument("--quantity", metavar="NAME", help="whose error --accuracy bounds, by default energy")
+    run.add_argument("--no-report", action="store_true", help="write no report.html")
+
+
+def _check(check: argparse.ArgumentParser) -> None:
+    text = "also print the factors of this load, the others constant: its part or region, or PART.traction"
+    check.add_argument("--load", action="append", default=[], dest="loads", metavar="NAME", help=text)
+    check.add_argument("--json", action="store_true", help="print the report as JSON")
+
+
+def _equilibria(equilibria: argparse.ArgumentParser) -> None:
+    equilibria.add_argument("--lowest", action="store_true", help="the lowest energy with a proof, instead of all")
+    text = "what the proof of the lowest energy may leave open, relative to the energy; by default 1e-8"
+    equilibria.add_argument("--gap", type=_relative, default=1e-8, metavar="REL", help=text)
+    equilibria.add_argument("--limit", type=_seconds, metavar="SECONDS", help="stop the search after so many seconds")
+
+
+def _study(study: argparse.ArgumentParser) -> None:
+    text = (
+        "solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, tolerance, "
+        "linear_solver or accuracy; several axes: all combinations; none: the program plans the study"
+    )
+    study.add_argument("--axis", action="append", default=[], metavar="NAME=VALUE,...", help=text)
+    text = "solve a point at most N times for its time, by default 9"
+    study.add_argument("--repeat", type=_whole_number(1000), default=9, metavar="N", help=text)
+    text = "give a point up after so many seconds, by default 120"
+    study.add_argument("--limit", type=_seconds, default=120.0, metavar="SECONDS", help=text)
+
+
+def _number(below: float, allowed: str) -> Callable[[str], float]:
+    """Reads a number above 0."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not 0 < value < below:
+            raise argparse.ArgumentTypeError(f"must be {allowed} (is {text!r})")
+        return value
+
+    return read
+
+
+_relative = _number(1.0, "a relative error between 0 and 1, like 1e-2")
+_seconds = _number(math.inf, "a number of seconds above 0")
+
+
+def _whole_number(most: int) -> Callable[[str], int]:
+    """Reads a number of things."""
+
+    def read(text: str) -> int:
+        if not re.fullmatch(r"[1-9][0-9]{0,8}", text) or int(text) > most:
+            raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most}, in digits like 2 (is {text!r})")
+        return int(text)
+
+    return read

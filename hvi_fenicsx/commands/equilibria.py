@@ -26,9 +26,9 @@ from ..report.pictures.draw import draw as draw_pictures
 from ..results import ResultFolder, plain, tables
 from ..results.summary import common
 from ..results.whole import begin_whole, made, picture_process, write_record
-from ..runtime import journal, writing
+from ..runtime import writing
+from ..runtime.cost import Timer
 from ..runtime.mpi import largest, on_root, time_over
-from ..runtime.timing import Timer
 from ..typing import Array
 from ..workflow import Preparation, Solution, prepare
 from . import session
@@ -100,7 +100,7 @@ class _StateFile:
         """What an earlier search has left, if this one shall go on from it. Rank 0 only."""
         if not self._call.options.resume:
             return None
-        return next(iter(journal.read_journal(self._call.folder.target / JOURNAL, self._identity)), None)
+        return next(iter(writing.read_journal(self._call.folder.target / JOURNAL, self._identity)), None)
 
     def keep(self, state: Callable[[], Saved]) -> None:
         """Write what is left, if it is time.
@@ -112,7 +112,7 @@ class _StateFile:
         if COMM.rank or self._broken or began < self._next:
             return
         try:
-            journal.write_journal(self._call.folder.announce(JOURNAL), self._identity, [state()])
+            writing.write_journal(self._call.folder.announce(JOURNAL), self._identity, [state()])
         except NotWrittenError as error:
             self._broken = True
             LOG.info("%s; a kill would lose the search", error)
@@ -126,7 +126,7 @@ class _StateFile:
             state: what is left; nothing is written where it is empty.
         """
         if state:
-            journal.write_journal(self._call.folder.work / JOURNAL, self._identity, [state])
+            writing.write_journal(self._call.folder.work / JOURNAL, self._identity, [state])
 
 
 def _picture_and_page(folder: Path, *, draw: bool) -> None:

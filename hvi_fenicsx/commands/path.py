@@ -11,10 +11,10 @@ from ..load_paths.following import Control, PathRun
 from ..model import PathTable
 from ..paths.load_path import PathRow
 from ..paths.state import End
-from ..runtime import journal
-from ..runtime.journal import Journal
+from ..runtime import writing
+from ..runtime.cost import Timer
 from ..runtime.mpi import on_root
-from ..runtime.timing import Timer
+from ..runtime.writing import Journal
 from ..workflow import prepare
 from . import session
 from .session import COMM, LOG, Command, Session, say, tell_moving
@@ -59,19 +59,19 @@ class _StateFile:
     """Keeps each new state in the folder of the result; the file is opened with the first of them."""
 
     def __init__(self, call: Session) -> None:
-        self._call, self._journal, self._known = call, list[Journal](), list[journal.Record]()
+        self._call, self._journal, self._known = call, list[Journal](), list[writing.Record]()
 
-    def known(self) -> list[journal.Record]:
+    def known(self) -> list[writing.Record]:
         """The states of a path that was begun and shall go on. Rank 0 only."""
         if self._call.options.resume:
-            self._known = journal.read_journal(self._call.folder.target / path_files.JOURNAL, self._call.identity)
+            self._known = writing.read_journal(self._call.folder.target / path_files.JOURNAL, self._call.identity)
         return self._known
 
-    def keep(self, record: journal.Record) -> None:
+    def keep(self, record: writing.Record) -> None:
         """Keep a state. Collective."""
         on_root(COMM, lambda: self._append(record))
 
-    def _append(self, record: journal.Record) -> None:
+    def _append(self, record: writing.Record) -> None:
         if not self._journal:
             file = self._call.folder.announce(path_files.JOURNAL)
             if not self._known:

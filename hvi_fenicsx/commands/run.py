@@ -1,23 +1,23 @@
-"""``hvi run``: a scene solved into a result folder."""
+"""``hvi run``: a scene solved into a result folder, also to an accuracy that is asked for."""
 
 from __future__ import annotations
 
 import argparse
-import functools
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from .. import console, results
 from ..errors import ExitCode, InputError
 from ..load_paths import last_borne
 from ..results.whole import BegunResult, begin_whole, picture_process
-from ..runtime.timing import Timer
+from ..runtime.cost import Timer
 from ..workflow import Solution, find_solution, prepare
 from . import session
 from .session import COMM, LOG, Command, Record, Session, say
 
 if TYPE_CHECKING:
-    from ..accuracy.goal import Goal
+    from ..accuracy.control import AccuracyResult, Goal  # a tenth of a second, for runs that ask for it
 
 Begin = Callable[[Solution], BegunResult]
 """Writes what pictures are drawn from, and lets them be drawn. Collective."""
@@ -32,47 +32,46 @@ def execute(options: argparse.Namespace) -> int:
     if options.accuracy is None and options.quantity is not None:
         raise InputError("--quantity: says what --accuracy is of; give it too")
     timer, scene = Timer(), session.scene_of(options)
-    goal = None if options.accuracy is None else _goal(options)  # a plugin of the scene may define its quantity
+    goal = _goal(options)  # a plugin of the scene may define its quantity
 
     def done(record: Record) -> bool:
         of_run = all(record.get(other) is None for other in ("path", "equilibria"))
         ended = record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
-        return of_run and ended and _is_of(goal, record["accuracy"])
+        accuracy = record["accuracy"]
+        same = accuracy is None if goal is None else goal.as_dict().items() <= (accuracy or {}).items()
+        return of_run and ended and same
 
     command = Command(suffix="", again="the scene is run again", done=done)
     return session.execute(options, scene, command, timer, lambda call: _run(call, goal))
 
 
-def _goal(options: argparse.Namespace) -> Goal:
-    from . import to_accuracy  # a tenth of a second, for runs that ask for it
+def _goal(options: argparse.Namespace) -> Goal | None:
+    """The accuracy that is asked for; None where none is."""
+    if options.accuracy is None:
+        return None
+    from ..accuracy import control, quantities
 
-    return to_accuracy.goal_of(options.accuracy, options.quantity)
-
-
-def _is_of(goal: Goal | None, recorded: Record | None) -> bool:
-    """Whether a result has the accuracy that is asked for, or none where none is."""
-    if goal is None:
-        return recorded is None
-    from . import to_accuracy
-
-    return to_accuracy.is_of(goal, recorded)
+    goal = control.Goal(options.accuracy, options.quantity or "energy")
+    quantities.find(goal.quantity)
+    return goal
 
 
 def _run(call: Session, goal: Goal | None) -> int:
     """Solve, write and tell; the exit code. Collective."""
     drawn = not call.options.no_pictures
     with picture_process(call.folder, call.scene.dimension, LOG.info, wanted=drawn) as pictures:
-        begin = functools.partial(begin_whole, call.folder, timer=call.timer, tell=LOG.info, pictures=pictures)
+
+        def begin(solution: Solution) -> BegunResult:
+            return begin_whole(call.folder, solution, call.timer, LOG.info, pictures)
+
+        given = dict[str, object](call.given)
         if goal is None:
             solution, begun = _solved(call, begin)
-            given: dict[str, Any] = {}
         else:
-            from . import to_accuracy
-
-            reached = to_accuracy.solve(call, goal)
+            reached = _solved_to_goal(call, goal)
             solution, begun = reached.solution, begin(reached.solution)
-            given = {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
-        record = begun.finish(solution, {**call.given, **given}, report=not call.options.no_report)
+            given |= {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
+        record = begun.finish(solution, given, report=not call.options.no_report)
     return int(record["exit_code"])
 
 
@@ -87,3 +86,31 @@ def _solved(call: Session, begin: Begin) -> tuple[Solution, BegunResult]:
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
     say([*console.outcome(solution), *console.warnings(new)])
     return solution, begun
+
+
+def _solved_to_goal(call: Session, goal: Goal) -> AccuracyResult:
+    """The solution of the accuracy that was asked for, and how it was reached, which is told. Collective."""
+    from ..accuracy import adaptive, control
+
+    solver = adaptive.AdaptiveSolver(timer=call.timer, interrupted=call.interrupted)
+    reached = control.solve_to_goal(call.scene, COMM, goal, solver, LOG.info)
+    shown = last_borne.in_place_of(reached.level.prepared, reached.solution, call.interrupted)
+    reached = replace(reached, solution=shown)
+    say([*console.outcome(shown), *console.warnings(shown.warnings), *_lines(reached)])
+    return reached
+
+
+def _lines(reached: AccuracyResult) -> Iterator[str]:
+    """What was chosen for an accuracy, and what it cost."""
+    goal, steps = reached.goal, reached.steps
+    if reached.why is not None:
+        yield f"accuracy not reached: {reached.why}"
+    if not steps:
+        return
+    last, asked = steps[-1], f" ({console.share(goal.accuracy)} was asked for)"
+    epsilon = "" if last.epsilon is None else f", ε {last.epsilon:.2g}"
+    yield (
+        f"accuracy: {console.share(last.error)}{asked} of {reached.description}, at degree {reached.degree} by "
+        f"{len(steps)} meshes up to {last.dofs:,} unknowns, tolerance {last.tolerance:.0e}{epsilon}, "
+        f"{sum(s.seconds for s in steps):.1f} s"
+    )

@@ -17,10 +17,10 @@ from .. import console, results
 from ..model import Model, dump_scene, read_scene
 from ..report.page import NAME as PAGE
 from ..results.output_folder import existing, inputs_of, read_finished
-from ..runtime import log, terminal
+from ..runtime import log
+from ..runtime.cost import Timer
+from ..runtime.manifest import __version__
 from ..runtime.mpi import Interrupt, on_root
-from ..runtime.timing import Timer
-from ..runtime.versions import __version__
 from ..system import petsc_options
 
 COMM = MPI.COMM_WORLD
@@ -131,10 +131,10 @@ def _finished(target: Path, scene: Model, command: Command) -> int | None:
     """The exit code of a finished result of the same scene, which is told; None where there is none. Rank 0 only."""
     record, fault = read_finished(target, scene)
     if fault is not None:
-        terminal.say(f"{target}: {fault}; {command.again}")
+        log.say(f"{target}: {fault}; {command.again}")
     if record is None or not command.done(record):
         return None
-    terminal.say(f"{target}: finished already ({record['reason']})")
+    log.say(f"{target}: finished already ({record['reason']})")
     return int(record["exit_code"])
 
 

@@ -20,8 +20,8 @@ from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..problem.vectors import turn
+from ..runtime.cost import Timer
 from ..runtime.mpi import total
-from ..runtime.timing import Timer
 from ..system.held_solver import HeldPreconditioner
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings

@@ -14,8 +14,8 @@ from dolfinx import fem
 
 from ..certify.certificate import Examination
 from ..problem.problem import Problem
+from ..runtime.log import percent
 from ..runtime.mpi import total
-from ..runtime.terminal import percent
 from ..system.levels import Levels
 from ..system.system import System
 from ..typing import Array

@@ -20,7 +20,7 @@ from ..problem.factored_problem import FactoredProblem
 from ..problem.problem import Problem
 from ..reduced import loading
 from ..reduced.condensation import Condensation
-from ..runtime.journal import Record
+from ..runtime.writing import Record
 from ..solvers import obstacle_force
 from ..system import existence
 from ..workflow import Preparation

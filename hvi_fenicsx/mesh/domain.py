@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..geometry import Curve
-from ..runtime import memory
+from ..runtime import cost
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from .transfer import Transfer
@@ -149,7 +149,7 @@ def check_affordable(comm: MPI.Comm, unknowns: float, dimension: int, place: str
     Raises:
         InputError: on all ranks alike.
     """
-    needed, room = memory.needed(unknowns, dimension), memory.room(comm)
+    needed, room = cost.memory_needed(unknowns, dimension), cost.memory_room(comm)
     if needed > room:
         raise InputError(
             f"{place}: {unknowns:.1e} unknowns need {needed / 1024:.3g} GB or more; there are "

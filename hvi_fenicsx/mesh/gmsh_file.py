@@ -18,7 +18,7 @@ from mpi4py import MPI
 from .. import compat
 from ..errors import InputError
 from ..geometry import Outline
-from ..runtime import helper_process, memory
+from ..runtime import cost, processes
 from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
 from ..typing import Entities
@@ -86,10 +86,10 @@ def _read(
         path=str(path.absolute()),
         is_script=_is_script(path),
         dimension=dimension,
-        memory=thresholds.gmsh_share * memory.free(),
+        memory=thresholds.gmsh_share * cost.free_memory(),
     )
     try:
-        done = helper_process.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], thresholds.gmsh_file_seconds)
+        done = processes.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], thresholds.gmsh_file_seconds)
     except subprocess.TimeoutExpired:
         text = (
             f"gmsh has not done with it after {thresholds.gmsh_file_seconds:g} s; look for an endless loop, or give "

@@ -4,7 +4,7 @@ REQUEST is JSON, see :class:`Request`; what is printed is an npz: the arrays of 
 as JSON, ``names``, the tags of the physical groups by dimension and name; or ``fault``, what is wrong with the file.
 
 It is a process of its own since gmsh reads all kinds of programs: whatever a file holds, from the moment on that it is
-opened nothing can be started or written (:mod:`..runtime.helper_process`). Where the system cannot see to that, no
+opened nothing can be started or written (:mod:`..runtime.processes`). Where the system cannot see to that, no
 script is opened.
 """
 
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..runtime import helper_process, processes
+from ..runtime import processes
 from ..typing import Array, Entities, Integers
 from . import cell_checks, gmsh_arrays
 
@@ -86,7 +86,7 @@ def _read(request: Request) -> dict[str, Any]:
     gmsh_arrays.start(gmsh)
     path, dimension = Path(request.path), request.dimension
     opened = path if request.is_script else _linked(path)
-    if not helper_process.confine(request.memory) and request.is_script:
+    if not processes.confine(request.memory) and request.is_script:
         raise InputError(
             f"mesh file {path}: is a script, which may run programs, and this system cannot forbid it (Linux can from "
             "5.13 on, by Landlock); mesh it by gmsh and give the .msh that it saves"

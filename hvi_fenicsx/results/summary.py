@@ -9,7 +9,7 @@ import numpy as np
 
 from ..problem import effect_summary
 from ..problem.problem import Problem
-from ..runtime import memory, versions
+from ..runtime import cost, manifest
 from ..runtime.mpi import agree, largest
 from ..workflow import Preparation, Solution
 
@@ -62,8 +62,8 @@ def _frame(of: Solution | Preparation, dofs: int) -> dict[str, Any]:
         "ranks": comm.size,
         "solvability": of.solvability.summary(),
         "time": {name: largest(comm, value) for name, value in of.timer.report().items()},
-        "peak_memory_mb": memory.peak(comm),
-        "versions": versions.versions(),
+        "peak_memory_mb": cost.peak_memory(comm),
+        "versions": manifest.versions(),
     }
 
 

@@ -15,8 +15,8 @@ from ..report import page, solution_arrays
 from ..report.errors import ReportError
 from ..report.pictures.draw import PictureProcess, waiting
 from ..runtime import writing
+from ..runtime.cost import Timer
 from ..runtime.mpi import is_processor_free, on_root
-from ..runtime.timing import Timer
 from ..typing import Array
 from ..workflow import Solution
 from . import gathering, tables, vtk_fields

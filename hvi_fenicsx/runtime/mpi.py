@@ -17,7 +17,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from ..errors import HviError, InputError
-from . import processes, terminal
+from . import log, processes
 
 T = TypeVar("T")
 _TOGETHER = 2.0
@@ -107,7 +107,7 @@ def ended_together(comm: MPI.Comm) -> Iterator[None]:
     except HviError as error:
         if error.everywhere or _raised_by_all(twin):
             raise
-        terminal.complain(f"hvi: {error}")
+        log.complain(f"hvi: {error}")
         comm.Abort(error.exit_code)
     except Exception:
         if comm.size > 1:

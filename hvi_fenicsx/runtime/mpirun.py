@@ -21,7 +21,7 @@ from pathlib import Path
 from types import FrameType
 
 from ..errors import ExitCode, InputError
-from . import processes, terminal
+from . import log, processes
 
 _CODE_FILE = "HVI_EXIT_CODE_FILE"
 _FOLDER = "PRTE_MCA_prte_local_tmpdir_base"
@@ -70,13 +70,13 @@ def _code(command: Sequence[str], folder: Path) -> int:
     )
     processes.catch(processes.STOP, pass_on)
     for line in process.stdout or ():
-        terminal.say(line.rstrip("\r\n"))
+        log.say(line.rstrip("\r\n"))
     ended, agreed = process.wait(), file.read_text(encoding="ascii")
     if signalled and ended and not agreed:  # before the ranks could catch it
         raise KeyboardInterrupt
     if ended and not agreed:
         room = f"where it says no more, make room in {tempfile.gettempdir()}, or set TMPDIR to another folder"
-        terminal.complain(f"hvi: --np: mpirun ended with code {ended}; {room}")
+        log.complain(f"hvi: --np: mpirun ended with code {ended}; {room}")
     code = ended or int(agreed or 0)
     return ExitCode.INTERRUPTED if signalled and code else code
 

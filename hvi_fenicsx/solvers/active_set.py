@@ -16,7 +16,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..compat import NOT_A_NUMBER
-from ..runtime.timing import Timer
+from ..runtime.cost import Timer
 from ..system.equations import LawModel
 from ..system.held_solver import HeldPreconditioner
 from ..system.levels import Levels

@@ -10,8 +10,8 @@ from pydantic import PrivateAttr
 
 from ..model.options import SolverTable
 from ..rigid import Solvability
+from ..runtime.cost import Timer
 from ..runtime.log import NewtonStep, newton_step
-from ..runtime.timing import Timer
 from ..system.levels import Levels
 from ..system.linear_settings import LinearSettings
 from ..system.system import System

@@ -18,17 +18,16 @@ from typing import Any
 from mpi4py import MPI
 
 from ..accuracy.adaptive import AdaptiveSolver
-from ..accuracy.control import solve_to_goal
-from ..accuracy.goal import Goal
+from ..accuracy.control import Goal, solve_to_goal
 from ..errors import ExitCode, HviError
 from ..model import dump_scene
 from ..results.gathering import solution_arrays
 from ..results.summary import summary
 from ..runtime import log
-from ..runtime.journal import Journal, Record
+from ..runtime.cost import Timer
+from ..runtime.manifest import __version__
 from ..runtime.mpi import largest, on_root, time_over
-from ..runtime.timing import Timer
-from ..runtime.versions import __version__
+from ..runtime.writing import Journal, Record
 from ..solvers.context import never
 from ..workflow import Solution, find_solution, prepare
 from .errors import Fields, ReferenceSolution, stiffness

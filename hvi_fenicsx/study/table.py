@@ -11,8 +11,8 @@ from typing import Any
 
 from ..errors import ExitCode, InputError
 from ..model import SolverTable
-from ..runtime.terminal import percent
-from ..runtime.versions import __version__, versions
+from ..runtime.log import percent
+from ..runtime.manifest import __version__, versions
 from ..schema import unknown
 from .errors import NORMS, Certainty, Errors, certainty
 from .measure import PHASES, Records, name_of

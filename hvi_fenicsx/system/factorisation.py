@@ -15,7 +15,7 @@ from typing_extensions import override
 
 from ..mesh import nodes
 from ..problem.spaces import Dilatation
-from ..runtime.timing import Timer
+from ..runtime.cost import Timer
 from ..typing import Array, Entities, Integers
 from .contact_rows import ContactRows
 from .petsc_options import CHOLESKY, default_options, prefix

@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..runtime.timing import Timer
+from ..runtime.cost import Timer
 from ..typing import Array, Entities
 from . import direct, factorisation
 from .direct import Direct

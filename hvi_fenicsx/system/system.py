@@ -26,7 +26,7 @@ from ..problem.problem import Bounds, Problem
 from ..problem.rigid_part import elastic_forces
 from ..problem.vectors import assembled, new_vector, product, turn
 from ..rigid import Mode
-from ..runtime.timing import Timer
+from ..runtime.cost import Timer
 from ..typing import Array, Entities
 from . import existence, free_motions, local_frames
 from .contact_rows import HoldingForces

@@ -14,8 +14,8 @@ from ..model import Model
 from ..problem.compose import Formulation
 from ..problem.problem import Problem
 from ..rigid import LoadFactors, Solvability
+from ..runtime.cost import Timer
 from ..runtime.log import logger, warn
-from ..runtime.timing import Timer
 from ..solvers.context import SolverOptions
 from ..solvers.registry import options_of
 from ..solvers.thresholds import Thresholds as SolverThresholds

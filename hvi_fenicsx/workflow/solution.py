@@ -14,7 +14,7 @@ from ..estimate.estimator import Estimate
 from ..model import Model
 from ..problem.problem import Problem
 from ..rigid import Solvability
-from ..runtime.timing import Timer
+from ..runtime.cost import Timer
 from ..solvers.method import SolveResult
 from ..solvers.obstacle_force import ObstacleBalance
 from ..typing import Array

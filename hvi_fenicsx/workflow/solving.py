@@ -15,8 +15,8 @@ from ..errors import SolverError
 from ..estimate import estimator
 from ..estimate.estimator import estimate
 from ..model import Model
+from ..runtime.cost import Timer
 from ..runtime.log import logger, newton_step, warn
-from ..runtime.timing import Timer
 from ..solvers import frozen_mixity, nested_iteration, obstacle_force
 from ..solvers.context import Progress, RunControl, never
 from ..solvers.method import SolveResult

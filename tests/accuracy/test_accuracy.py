@@ -18,12 +18,12 @@ from scenes import STEEL, model, quadratic_linear
 from hvi_fenicsx import Model, read_scene, read_tables
 from hvi_fenicsx.accuracy import adaptive, control, quantities
 from hvi_fenicsx.accuracy.adaptive import AdaptiveLevel, AdaptiveSolver
-from hvi_fenicsx.accuracy.goal import AccuracyResult, Goal
+from hvi_fenicsx.accuracy.control import AccuracyResult, Goal
 from hvi_fenicsx.accuracy.quantities import FrictionTraction
 from hvi_fenicsx.accuracy.quantity_base import Observable, contact_norm, prolong
 from hvi_fenicsx.certify import contact_state
-from hvi_fenicsx.runtime import memory
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime import cost
+from hvi_fenicsx.runtime.cost import Timer
 
 COMM = MPI.COMM_WORLD
 DEMOS = Path(__file__).parents[2] / "demos"
@@ -174,7 +174,7 @@ def test_an_accuracy_beyond_all_numbers_is_refused_in_words() -> None:
 
 
 def test_what_memory_cannot_hold_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "room", lambda comm: 400.0)
+    monkeypatch.setattr(cost, "memory_room", lambda comm: 400.0)
     reached = reach(read_tables(STRONG), Goal(1e-5))
     assert reached.exit_code == 4
     assert reached.why is not None

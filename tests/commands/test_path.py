@@ -21,7 +21,7 @@ from hvi_fenicsx.load_paths import path_files
 from hvi_fenicsx.load_paths.following import Control, PathRun
 from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.paths.load_path import LoadPath
-from hvi_fenicsx.runtime.journal import Record
+from hvi_fenicsx.runtime.writing import Record
 
 BAR = ROOT / "demos" / "glued_bar.toml"
 SHORT = ("--set", "domain.size=[0.05, 0.001]", "--set", "domain.cells=[50, 1]")

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 from runs import ROOT
 
+from hvi_fenicsx.runtime.manifest import __version__
 from hvi_fenicsx.runtime.processes import environment
-from hvi_fenicsx.runtime.versions import __version__
 
 pytestmark = pytest.mark.long
 DATA = {".py", ".j2", ".css", ".typed"}

@@ -24,7 +24,7 @@ from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.gmsh_reader import Request
 from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
-from hvi_fenicsx.runtime import memory, processes
+from hvi_fenicsx.runtime import cost, processes
 from hvi_fenicsx.runtime.mpi import Interrupt
 
 TRIANGLE = """Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {0, 1, 0};
@@ -119,7 +119,7 @@ def test_a_script_that_ends_gmsh_or_never_ends_is_refused(command: str, tmp_path
 @pytest.mark.long
 def test_a_script_that_fills_the_memory_is_refused(tmp_path: Path) -> None:
     """The machine's other programs lose nothing: gmsh gets a share of what is free, here 1.5 GB."""
-    thresholds = Thresholds(gmsh_share=1500 / memory.free())
+    thresholds = Thresholds(gmsh_share=1500 / cost.free_memory())
     script = written(tmp_path / "m.geo", "a[] = {0:1000000000};\n" + TRIANGLE)
     with pytest.raises(InputError, match=r"wants more than the 1\.5 GB that it may use"):
         gmsh_file.read(MPI.COMM_WORLD, script, 2, thresholds=thresholds)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hvi_fenicsx.runtime import journal
-from hvi_fenicsx.runtime.journal import Journal
+from hvi_fenicsx.runtime import writing
+from hvi_fenicsx.runtime.writing import Journal
 
 RECORDS: list[dict[str, Any]] = [
     {"factor": 0.1 + 0.2, "event": "kink", "x": np.array([1.0, np.nextafter(1.0, 2.0)]), "memory": None},
@@ -26,8 +26,8 @@ def write(path: Path, identity: str = "this") -> None:
 
 def test_another_path_has_no_records_here(tmp_path: Path) -> None:
     write(tmp_path / "j")
-    assert journal.read_journal(tmp_path / "j", "that") == []
-    assert journal.read_journal(tmp_path / "absent", "this") == []
+    assert writing.read_journal(tmp_path / "j", "that") == []
+    assert writing.read_journal(tmp_path / "absent", "this") == []
 
 
 def test_wherever_the_end_is_torn_off_the_whole_records_stay_and_the_next_follows_them(tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_wherever_the_end_is_torn_off_the_whole_records_stay_and_the_next_follow
         with closing(Journal(tmp_path / "j", "this")) as opened:
             counts.add(len(opened.records))
             opened.append(RECORDS[1])
-        assert journal.read_journal(tmp_path / "j", "this")[-1]["event"] == "end"
+        assert writing.read_journal(tmp_path / "j", "this")[-1]["event"] == "end"
     assert counts == {0, 1}
 
 
@@ -49,4 +49,4 @@ def test_a_changed_byte_ends_the_journal_before_its_record(at: int, tmp_path: Pa
     content = bytearray((tmp_path / "j").read_bytes())
     content[at] ^= 1
     (tmp_path / "j").write_bytes(content)
-    assert len(journal.read_journal(tmp_path / "j", "this")) < len(RECORDS)
+    assert len(writing.read_journal(tmp_path / "j", "this")) < len(RECORDS)

@@ -20,7 +20,7 @@ from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.pictures.draw import PictureProcess
 from hvi_fenicsx.results import ResultFolder
 from hvi_fenicsx.results.whole import begin_whole
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.workflow import Solution, finish, prepare
 
 COMM = MPI.COMM_WORLD

@@ -13,7 +13,7 @@ from scenes import model
 from hvi_fenicsx import InputError, prepare, read_tables
 from hvi_fenicsx.mesh.shapes import DomainShape
 from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
-from hvi_fenicsx.runtime import memory
+from hvi_fenicsx.runtime import cost
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_the_limits_of_a_cgroup_and_of_those_around_it_hold(
     (tmp_path / "cgroup" / file).parent.mkdir(parents=True)
     (tmp_path / "cgroup" / file).write_text(f"{3 * 2**20}\n")
     (tmp_path / "cgroup" / "cgroup.procs").write_text("max\n")
-    assert memory.cgroup_limits(tmp_path / "table", tmp_path / "cgroup") == wanted
+    assert cost.cgroup_limits(tmp_path / "table", tmp_path / "cgroup") == wanted
 
 
 SHAPES: dict[str, tuple[dict[str, Any], int, float]] = {
@@ -53,10 +53,10 @@ def test_a_mesh_of_any_shape_that_memory_cannot_hold_is_refused(
     meshes.make(tmp_path / "m.msh", meshes.GOOD)
     shape = DomainShape.registry[table["shape"]].model_validate(table, context={"folder": tmp_path})
     measured = unknowns * {2: 1.3, 3: 2.6}[dimension] / 1024
-    monkeypatch.setattr(memory, "room", lambda comm: 0.8 * measured)
+    monkeypatch.setattr(cost, "memory_room", lambda comm: 0.8 * measured)
     with pytest.raises(InputError, match=r"domain\.\w+: .* unknowns need .* GB or more; there are"):
         shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
-    monkeypatch.setattr(memory, "room", lambda comm: 1.5 * measured)
+    monkeypatch.setattr(cost, "memory_room", lambda comm: 1.5 * measured)
     shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
 
 
@@ -72,8 +72,8 @@ def test_what_degree_two_and_several_bodies_take_is_foreseen(place: str, monkeyp
     """Each body alone, and the mesh at degree 1, have room enough."""
     table, unknowns = TOGETHER[place]
     scene, measured = read_tables(table), unknowns * 1.3 / 1024
-    monkeypatch.setattr(memory, "room", lambda comm: 0.8 * measured)
+    monkeypatch.setattr(cost, "memory_room", lambda comm: 0.8 * measured)
     with pytest.raises(InputError, match=rf"^{place}: .* unknowns need .* GB or more; there are"):
         prepare(scene)
-    monkeypatch.setattr(memory, "room", lambda comm: 1.2 * measured)
+    monkeypatch.setattr(cost, "memory_room", lambda comm: 1.2 * measured)
     prepare(scene)

@@ -11,7 +11,7 @@ import pytest
 from runs import ROOT, command, process, summary, write_scene
 from scenes import block, model, quadratic_linear
 
-from hvi_fenicsx.runtime import terminal
+from hvi_fenicsx.runtime import log
 
 
 @pytest.fixture
@@ -26,8 +26,8 @@ def broken_pipe() -> TextIO:
 
 
 def test_what_is_not_printable_is_escaped() -> None:
-    assert terminal.printable("ε = 1 µm\n") == "ε = 1 µm\n"
-    assert terminal.printable("\x1b[31m \x7f \u202e \udce9") == r"\u001b[31m \u007f \u202e \udce9"
+    assert log.printable("ε = 1 µm\n") == "ε = 1 µm\n"
+    assert log.printable("\x1b[31m \x7f \u202e \udce9") == r"\u001b[31m \u007f \u202e \udce9"
 
 
 @pytest.mark.parametrize(

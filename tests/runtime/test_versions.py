@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hvi_fenicsx.runtime.versions import __version__, with_revision
+from hvi_fenicsx.runtime.manifest import __version__, with_revision
 
 COMMIT = "3812cfc10a9d4f5e6b7c8d9e0f1a2b3c4d5e6f70"
 SHOWN = f"{__version__}+g3812cfc10a"

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hvi_fenicsx import Solution, read_tables, solve
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl, SolveContext
 from hvi_fenicsx.solvers.nested_iteration import LevelSolution

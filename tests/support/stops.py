@@ -17,9 +17,9 @@ from types import FrameType
 from typing import Any
 
 from hvi_fenicsx.commands import cli
-from hvi_fenicsx.runtime import mpirun, processes, terminal
+from hvi_fenicsx.runtime import log, mpirun, processes
 
-WATCHED = {str(Path(str(module.__file__))) for module in (cli, processes, terminal)}
+WATCHED = {str(Path(str(module.__file__))) for module in (cli, processes, log)}
 WORDS = ["run", "scene.toml", "--np", "2"]
 """A command whose ranks another program starts, in whose place something is run here."""
 ESCAPED, NO_MORE = 99, 98

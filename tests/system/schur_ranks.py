@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.system import direct
 from hvi_fenicsx.system.factorisation import form_of
 from hvi_fenicsx.system.held_solver import HeldPreconditioner

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from scenes import NESTED, Table, model, two_blocks
 
 from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.runtime.timing import Timer
+from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl
 from hvi_fenicsx.system.held_solver import HeldPreconditioner

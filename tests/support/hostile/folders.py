@@ -18,7 +18,7 @@ import tomli_w
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.commands.cli import main
-from hvi_fenicsx.runtime.journal import Journal
+from hvi_fenicsx.runtime.writing import Journal
 
 from .case import OUT, RUN, SCENE, Case, write
 from .requests import STUDY

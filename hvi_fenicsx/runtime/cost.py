@@ -1,4 +1,4 @@
-"""How much memory the program has used, and how much there is."""
+"""What a run costs: its time by phase, the memory that it has used, and how much there is."""
 
 from __future__ import annotations
 
@@ -6,18 +6,63 @@ import math
 import os
 import resource
 import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from mpi4py import MPI
 
 from .mpi import on_this_machine, total
 
+PHASES = ("jit", "mesh", "assembly", "existence", "setup", "solve", "certificate", "estimate", "output")
+
+
+class Timer:
+    """Adds up time (s) by phase; the time of an inner phase does not count for the one around it.
+
+    Args:
+        clock: seconds since any moment; by default wall time, ``time.perf_counter`` as it is when the timer is made.
+
+    Attributes:
+        seconds: by phase, s.
+    """
+
+    def __init__(self, clock: Callable[[], float] | None = None) -> None:
+        self._clock = clock or time.perf_counter
+        self.seconds = dict.fromkeys(PHASES, 0.0)
+        self._start = self._clock()
+        self._inner: list[float] = []
+
+    @contextmanager
+    def __call__(self, phase: str) -> Iterator[None]:
+        """Time a block as one phase."""
+        start = self._clock()
+        self._inner.append(0.0)
+        try:
+            yield
+        finally:
+            elapsed = self._clock() - start
+            self.seconds[phase] += elapsed - self._inner.pop()
+            if self._inner:
+                self._inner[-1] += elapsed
+
+    @property
+    def total(self) -> float:
+        """Seconds since the timer was made."""
+        return self._clock() - self._start
+
+    def report(self) -> dict[str, float]:
+        """Seconds by phase, with the total."""
+        return {**self.seconds, "total": self.total}
+
+
 _CGROUPS = Path("/sys/fs/cgroup")
 _PLANE, _ADAPTIVE = 1.3, 3.0
 """KB that an unknown of a plane body takes, by multigrid on a mesh refined uniformly or not; in space twice."""
 
 
-def needed(unknowns: float, dimension: int) -> float:
+def memory_needed(unknowns: float, dimension: int) -> float:
     """What so many unknowns take at least, MB, from the mesh to the estimate (measured: docs/benchmarks.md).
 
     Args:
@@ -27,7 +72,7 @@ def needed(unknowns: float, dimension: int) -> float:
     return unknowns * _PLANE * (dimension - 1) / 1024
 
 
-def needed_by_all_meshes(unknowns: float, dimension: int, degree: int) -> float:
+def memory_of_all_meshes(unknowns: float, dimension: int, degree: int) -> float:
     """What a mesh that was refined where the error is takes, about, MB: all coarser ones are kept, too.
 
     Args:
@@ -38,26 +83,26 @@ def needed_by_all_meshes(unknowns: float, dimension: int, degree: int) -> float:
     return unknowns * _ADAPTIVE * (dimension - 1) * degree / 1024
 
 
-def peak(comm: MPI.Comm) -> float:
+def peak_memory(comm: MPI.Comm) -> float:
     """The sum over the ranks of the most memory that each has used at any time, MB. Collective."""
     found = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return total(comm, found / 2**20 if sys.platform == "darwin" else found / 2**10)
 
 
-def limit() -> float:
+def memory_limit() -> float:
     """The memory that this process may use, MB: the machine's, or what its cgroup or ``ulimit`` leaves of it."""
     return min(_of_machine(), _of_process())
 
 
-def free() -> float:
-    """What of :func:`limit` no process of this machine uses now, MB, as far as the machine tells."""
+def free_memory() -> float:
+    """What of :func:`memory_limit` no process of this machine uses now, MB, as far as the machine tells."""
     table = Path("/proc/meminfo")
     lines = table.read_text(encoding="ascii").splitlines() if table.is_file() else []
     found = [int(line.split()[1]) / 2**10 for line in lines if line.startswith("MemAvailable:")]
-    return min([limit(), *found])
+    return min([memory_limit(), *found])
 
 
-def room(comm: MPI.Comm) -> float:
+def memory_room(comm: MPI.Comm) -> float:
     """The memory of all machines that the ranks run on, as far as they may use it, MB. Collective."""
     with on_this_machine(comm) as here:
         machines = total(comm, _of_machine() if here.rank == 0 else 0.0)
