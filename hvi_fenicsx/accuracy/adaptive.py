@@ -271,3 +271,30 @@ def _allowed(comm: MPI.Comm, values: Array, thresholds: ControlThresholds) -> fl
     low = comm.allreduce(float(np.min(values, initial=np.inf)), op=MPI.MIN)
     high = comm.allreduce(float(np.max(values, initial=-np.inf)), op=MPI.MAX)
     return max(thresholds.unresolved * (high - low), _ROUNDING * max(abs(low), abs(high)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdaptiveStep:
+    """One adaptive step: its cost and what it gave.
+
+    Attributes:
+        dofs: unknowns.
+        error: estimated, relative, of the quantity asked for (infinite: none yet).
+        discretisation: the mesh's part of the error in the energy norm, relative.
+        smoothing: smoothing's part of the quantity's error, relative.
+        algebraic: the solver's part of the error in the energy norm, relative.
+        epsilon: relative width of the smoothing, or None.
+        tolerance: of the solver.
+        seconds: wall time of this step.
+        memory: the program's peak so far, MB.
+    """
+
+    dofs: int
+    error: float
+    discretisation: float
+    smoothing: float
+    algebraic: float
+    epsilon: float | None
+    tolerance: float
+    seconds: float
+    memory: float

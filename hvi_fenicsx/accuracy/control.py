@@ -19,7 +19,7 @@ from ..runtime import cost
 from ..runtime.mpi import largest
 from ..workflow import Solution
 from . import adaptive, quantities
-from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, ControlThresholds
+from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, AdaptiveStep, ControlThresholds
 from .quantity_base import Quantity
 
 _INTERRUPTED = "interrupted"
@@ -324,33 +324,6 @@ class Goal:
     def as_dict(self) -> dict[str, Any]:
         """For ``summary.json``."""
         return {"requested": self.accuracy, "quantity": self.quantity}
-
-
-@dataclass(frozen=True, kw_only=True)
-class AdaptiveStep:
-    """One adaptive step: its cost and what it gave.
-
-    Attributes:
-        dofs: unknowns.
-        error: estimated, relative, of the quantity asked for (infinite: none yet).
-        discretisation: the mesh's part of the error in the energy norm, relative.
-        smoothing: smoothing's part of the quantity's error, relative.
-        algebraic: the solver's part of the error in the energy norm, relative.
-        epsilon: relative width of the smoothing, or None.
-        tolerance: of the solver.
-        seconds: wall time of this step.
-        memory: the program's peak so far, MB.
-    """
-
-    dofs: int
-    error: float
-    discretisation: float
-    smoothing: float
-    algebraic: float
-    epsilon: float | None
-    tolerance: float
-    seconds: float
-    memory: float
 
 
 @dataclass(frozen=True, kw_only=True)

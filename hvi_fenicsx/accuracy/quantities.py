@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from ..certify.contact_state import ContactState
     from ..estimate.contact_errors import ContactErrors
-    from .adaptive import AdaptiveLevel
-    from .control import AdaptiveStep
+    from .adaptive import AdaptiveLevel, AdaptiveStep
 
 
 class EnergyNorm(Quantity):

@@ -21,8 +21,7 @@ from ..typing import Array
 if TYPE_CHECKING:
     from dolfinx import fem
 
-    from .adaptive import AdaptiveLevel
-    from .control import AdaptiveStep
+    from .adaptive import AdaptiveLevel, AdaptiveStep
 
 ORDERS = (0.5, 2.0)
 """The orders of convergence in h that are believed of a quantity: P1 has no larger one."""

@@ -89,7 +89,7 @@ def test_a_script_is_not_opened_where_the_system_cannot_confine_it(tmp_path: Pat
     request = Request(path=str(file), is_script=True, dimension=2, memory=4e3)
     code = (
         "from hvi_fenicsx.mesh import gmsh_reader\n"
-        "gmsh_reader.helper_process.confine = lambda memory: False\n"
+        "gmsh_reader.processes.confine = lambda memory: False\n"
         "gmsh_reader.main()"
     )
     done = subprocess.run([sys.executable, "-c", code, request.dumps()], capture_output=True, check=True)
