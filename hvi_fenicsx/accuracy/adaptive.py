@@ -18,6 +18,7 @@ from ..estimate.estimator import Estimate
 from ..mesh import nodes, refinement
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
+from ..mesh.thresholds import DEFAULT as MESH
 from ..model import Model
 from ..problem.problem import Problem
 from ..runtime.cost import Timer
@@ -27,7 +28,7 @@ from ..solvers.context import Progress, RunControl, never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.levels import Level, Levels
 from ..typing import Array, Entities
-from ..workflow import DEFAULT, Preparation, Solution, Thresholds, find_solution, prepare
+from ..workflow import Preparation, Solution, find_solution, prepare
 
 _ROUNDING = float(np.sqrt(np.finfo(float).eps))
 """Deviations so small beside the largest value are rounding."""
@@ -94,14 +95,12 @@ class AdaptiveSolver:
         progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
         existence: whether existence is analysed on each mesh, and not on the first only.
-        thresholds: the numbers that tune the runs.
     """
 
     timer: Timer
     progress: Progress = newton_step
     interrupted: Callable[[], bool] = never
     existence: bool = False
-    thresholds: Thresholds = DEFAULT
 
     def first_domain(self, scene: Model, comm: MPI.Comm) -> Domain:
         """The body on the mesh to begin with. Collective.
@@ -114,7 +113,7 @@ class AdaptiveSolver:
             InputError: the scene does not fit its mesh, on all ranks alike.
         """
         with self.timer("mesh"):
-            return coarsest(scene).domain.build_hierarchy(comm, scene.dimension, self.thresholds.mesh)
+            return coarsest(scene).domain.build_hierarchy(comm, scene.dimension, MESH)
 
     def begin(self, scene: Model, domain: Domain, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
         """Solve a scene on a first mesh, which is refined where the data on the boundary ask for it. Collective.
@@ -128,13 +127,13 @@ class AdaptiveSolver:
             InputError: the scene does not fit its mesh, on all ranks alike.
         """
         comm = domain.mesh.comm
-        prepared = prepare(scene, comm, self.timer, domain, thresholds=self.thresholds)
+        prepared = prepare(scene, comm, self.timer, domain)
         while prepared.system.dofs < thresholds.small:
             cells = unresolved(prepared.problem, thresholds)
             if not comm.allreduce(len(cells)):
                 break
             domain = refinement.marked(prepared.problem.domain, cells).domain
-            prepared = prepare(scene, comm, self.timer, domain, thresholds=self.thresholds)
+            prepared = prepare(scene, comm, self.timer, domain)
         found = find_solution(prepared, self.progress, self.interrupted)
         return AdaptiveLevel(prepared=prepared, solution=found.estimated(), levels=found.levels, step=None)
 
@@ -178,7 +177,7 @@ class AdaptiveSolver:
 
     def _prepared(self, level: AdaptiveLevel, scene: Model, domain: Domain) -> Preparation:
         known = None if self.existence else level.solution.solvability
-        return prepare(scene, level.comm, self.timer, domain, known, self.thresholds)
+        return prepare(scene, level.comm, self.timer, domain, known)
 
     def _solved(
         self,

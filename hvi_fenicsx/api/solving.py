@@ -19,8 +19,9 @@ from ..problem import spaces
 from ..runtime.log import newton_step
 from ..schema import Table
 from ..solvers.context import Progress
+from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import petsc_options
-from ..workflow import DEFAULT, Preparation, Solution, Thresholds
+from ..workflow import Preparation, Solution
 from .solution import ModelSolution
 
 
@@ -54,7 +55,7 @@ def solve(
         model: what to solve.
         comm: the ranks, if the model is a scene file; by default all. A body from Python has its own.
         progress: called at each Newton step; by default it is logged.
-        thresholds: the numbers that tune the run.
+        thresholds: the numbers that tune the solvers.
         start: where to begin: the solution of another model of the same body, such as that of the last load; or what
             ``[solver]`` may have.
         estimate: whether to estimate the error, which takes about as long as the solve.
@@ -94,7 +95,7 @@ def check(
     Args:
         model: what to check.
         comm: the ranks, if the model is a scene file; by default all. A body from Python has its own.
-        thresholds: the numbers that tune the run.
+        thresholds: the numbers that tune the solvers.
         **options: the keys of the scene's table ``[solver]``.
 
     Raises:

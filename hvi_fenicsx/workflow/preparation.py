@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from mpi4py import MPI
 
 from ..certify import plausibility
 from ..mesh import nodes
 from ..mesh.domain import Domain, check_affordable
-from ..mesh.thresholds import MeshThresholds
+from ..mesh.thresholds import DEFAULT as MESH
 from ..model import Model
 from ..problem.compose import Formulation
 from ..problem.problem import Problem
@@ -18,27 +18,11 @@ from ..runtime.cost import Timer
 from ..runtime.log import logger, warn
 from ..solvers.context import SolverOptions
 from ..solvers.registry import options_of
-from ..solvers.thresholds import Thresholds as SolverThresholds
+from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import existence
 from ..system.system import System, assemble
 
 _LOG = logger("preparation")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """The numbers that tune a run.
-
-    Attributes:
-        mesh: how mesh hierarchies are made.
-        solvers: how systems are solved.
-    """
-
-    mesh: MeshThresholds = field(default_factory=MeshThresholds)
-    solvers: SolverThresholds = field(default_factory=SolverThresholds)
-
-
-DEFAULT = Thresholds()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,16 +81,16 @@ def prepare(
         timer: where time goes; by default a new one.
         domain: the body on its mesh, where that exists already; by default it is meshed.
         solvability: whether a solution can exist, where that is known.
-        thresholds: the numbers that tune the run.
+        thresholds: the numbers that tune the solvers.
 
     Raises:
         InputError: on all ranks alike.
     """
     timer = timer or Timer()
-    options, model = options_of(scene.solver, thresholds.solvers), scene.formulation()
+    options, model = options_of(scene.solver, thresholds), scene.formulation()
     with timer("mesh"):
-        domain = domain or _meshed(scene, comm, thresholds.mesh)
-    system = assemble(domain, model, timer, thresholds.solvers.linear)
+        domain = domain or _meshed(scene, comm)
+    system = assemble(domain, model, timer, thresholds.linear)
     with timer("existence"):
         solvability = solvability or existence.solvability(system.problem, system.forces)
     margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"
@@ -125,9 +109,9 @@ def prepare(
     )
 
 
-def _meshed(scene: Model, comm: MPI.Comm, thresholds: MeshThresholds) -> Domain:
+def _meshed(scene: Model, comm: MPI.Comm) -> Domain:
     """The body on its mesh; each shape knows what its own vertices take, but neither other bodies nor the degree."""
-    domain, degree = scene.domain.build_hierarchy(comm, scene.dimension, thresholds), scene.solver.degree or 1
+    domain, degree = scene.domain.build_hierarchy(comm, scene.dimension, MESH), scene.solver.degree or 1
     place, mend = ("solver.degree", "use degree 1, or fewer cells") if degree > 1 else ("domain", "use fewer cells")
     unknowns = domain.dimension * nodes.count(domain.mesh, degree)
     check_affordable(comm, unknowns, domain.dimension, place, mend)

@@ -22,9 +22,10 @@ from ..solvers.context import Progress, RunControl, never
 from ..solvers.method import SolveResult
 from ..solvers.nested_iteration import CoarseStart, LevelSolution
 from ..solvers.obstacle_force import ObstacleBalance
+from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import free_motions
 from ..system.levels import Levels
-from .preparation import DEFAULT, Preparation, Thresholds, prepare
+from .preparation import Preparation, prepare
 from .solution import Solution
 
 _LOG = logger("workflow")
@@ -45,7 +46,7 @@ def solve(
         comm: the ranks.
         progress: called at each Newton step; by default it is logged.
         timer: where time goes; by default a new one.
-        thresholds: the numbers that tune the run.
+        thresholds: the numbers that tune the solvers.
 
     Raises:
         InputError: the scene does not fit its mesh, on all ranks alike.

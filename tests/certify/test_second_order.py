@@ -15,7 +15,8 @@ from runs import ROOT
 from scenes import STEEL, Table, displacement, points, solved
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.workflow import DEFAULT, Solution
+from hvi_fenicsx.solvers.thresholds import DEFAULT
+from hvi_fenicsx.workflow import Solution
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "attack"))
 
@@ -149,8 +150,8 @@ def test_a_falling_law_is_decided_by_default_on_a_small_mesh() -> None:
     found = hvi.solve(scene, estimate=False)
     assert found.certificate is not None
     assert found.certificate.second_order == "local minimiser"
-    linear = replace(DEFAULT.solvers.linear, largest_direct={2: 2_000, 3: 2_000})
-    small = replace(DEFAULT, solvers=replace(DEFAULT.solvers, linear=linear))
+    linear = replace(DEFAULT.linear, largest_direct={2: 2_000, 3: 2_000})
+    small = replace(DEFAULT, linear=linear)
     again = hvi.solve(scene, estimate=False, thresholds=small)
     assert again.certificate is not None
     assert again.certificate.second_order == "undecided"

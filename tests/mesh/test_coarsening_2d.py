@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import meshes
@@ -44,6 +43,11 @@ COARSER = Thresholds(hierarchy_from=500, coarsest=100)
 
 def from_file(path: Path, body: str) -> Domain:
     return gmsh_file.read(COMM, meshes.make(path / "m.msh", body), 2)
+
+
+def _nested(given: Model) -> workflow.Solution:
+    domain = given.domain.build_hierarchy(COMM, 2, COARSER)
+    return workflow.finish(workflow.prepare(given, domain=domain, thresholds=NESTED))
 
 
 def coarser_of(body: Domain) -> Domain:
@@ -93,10 +97,9 @@ def scene(path: Path, *overrides: str) -> Model:
 def test_a_start_from_another_mesh_ends_where_mumps_does(tmp_path: Path) -> None:
     """Without friction the minimiser is unique."""
     convex = ["boundary.wall.displacement=[0.0, 0.0]", 'boundary.floor={on="bottom", contact={gap=0.0}}']
-    thresholds = replace(NESTED, mesh=COARSER)
-    nested = workflow.solve(scene(tmp_path, *convex), thresholds=thresholds)
+    nested = _nested(scene(tmp_path, *convex))
     alone = scene(tmp_path, *convex, 'solver={linear_solver="lu"}')
-    direct = workflow.finish(workflow.prepare(alone, domain=alone.domain.build(COMM, 2), thresholds=thresholds))
+    direct = workflow.finish(workflow.prepare(alone, domain=alone.domain.build(COMM, 2), thresholds=NESTED))
     assert nested.solve_result is not None
     assert nested.solve_result.levels > 1
     assert nested.converged
@@ -123,8 +126,7 @@ def test_coarse_bodies_slide_along_a_curved_part_as_the_fine_one_does() -> None:
     law = '{law="quadratic_linear", gamma1=1e4, gamma2=5e3, delta=1e-4}'
     overrides = [f"domain={shape}", 'boundary.top={on="top", traction=[0.0, -2e4]}']
     floor = f'boundary.floor={{on="arc", contact={{gap=0.0}}, friction={law}}}'
-    thresholds = replace(NESTED, mesh=COARSER)
-    found = workflow.solve(read_scene(DEMOS / "hertz.toml", [*overrides, floor]), thresholds=thresholds)
+    found = _nested(read_scene(DEMOS / "hertz.toml", [*overrides, floor]))
     assert found.converged
     assert found.solve_result is not None
     assert found.solve_result.levels > 1

@@ -5,12 +5,12 @@ Each body has its own coarser mesh. What a body does not see it must not move; w
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import meshes
 import pytest
+from mpi4py import MPI
 from runs import LONG_RANKS, on_ranks
 
 from hvi_fenicsx import read_tables, workflow
@@ -50,9 +50,11 @@ def test_each_body_has_its_own_coarser_mesh(dimension: int, size: float, ranks: 
 def test_what_is_solved_does_not_change(tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "two.msh", meshes.TOUCHING.format(size=0.05, dimension=2))
     scene = read_tables(JOINT | {"domain": {"shape": "file", "file": str(file)}})
-    thresholds = workflow.Thresholds(mesh=COARSER, solvers=SolverThresholds(nested_from=500))
-    nested = workflow.solve(scene, thresholds=thresholds)
-    alone = workflow.solve(scene, thresholds=replace(thresholds, mesh=replace(COARSER, hierarchy_from=10**9)))
+    thresholds = SolverThresholds(nested_from=500)
+    nested, alone = (
+        workflow.finish(workflow.prepare(scene, domain=domain, thresholds=thresholds))
+        for domain in (scene.domain.build_hierarchy(MPI.COMM_WORLD, 2, COARSER), scene.domain.build(MPI.COMM_WORLD, 2))
+    )
     assert nested.solve_result.levels > alone.solve_result.levels == 1  # type: ignore[union-attr]
     assert nested.converged
     assert alone.converged

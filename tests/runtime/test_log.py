@@ -13,10 +13,9 @@ from runs import command, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import read_tables, solve
-from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.workflow import Thresholds
+from hvi_fenicsx.solvers.thresholds import Thresholds
 
-NESTED = Thresholds(solvers=SolverThresholds(nested_from=500))
+NESTED = Thresholds(nested_from=500)
 LAW = quadratic_linear(1.0e6)
 
 

@@ -12,8 +12,8 @@ import pytest
 from scenes import P, Table, displacement, energy, far, model, quadratic_linear, solved
 
 from hvi_fenicsx import Solution, prepare, read_tables
-from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
-from hvi_fenicsx.workflow import Thresholds, finish
+from hvi_fenicsx.solvers.thresholds import Thresholds
+from hvi_fenicsx.workflow import finish
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 import petsc_methods  # noqa: F401
@@ -108,7 +108,7 @@ def test_an_interrupt_ends_the_iteration(method: str) -> None:
 
 def test_an_interrupt_on_the_second_level_of_three_gives_what_was_found_there(caplog: pytest.LogCaptureFixture) -> None:
     """The third one was set up, and began at zero."""
-    thresholds = Thresholds(solvers=SolverThresholds(nested_from=500))
+    thresholds = Thresholds(nested_from=500)
     scene = read_tables(model(32, 3e6, friction=quadratic_linear(1.0e6)))
     whole = finish(prepare(scene, thresholds=thresholds)).solve_result
     prepared = prepare(scene, thresholds=thresholds)

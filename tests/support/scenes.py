@@ -12,9 +12,9 @@ from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.context import RunControl, SolveContext
 from hvi_fenicsx.solvers.nested_iteration import LevelSolution
-from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.solvers.thresholds import DEFAULT, Thresholds
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
-from hvi_fenicsx.workflow import DEFAULT, Preparation, Thresholds
+from hvi_fenicsx.workflow import Preparation
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]
@@ -77,9 +77,7 @@ def two_blocks(shape: str, flat: list[float], cells: list[list[int]], elasticity
     }
 
 
-NESTED = Thresholds(
-    solvers=SolverThresholds(nested_from=1_000, linear=LinearThresholds(largest_direct={2: 1_000, 3: 1_000}))
-)
+NESTED = Thresholds(nested_from=1_000, linear=LinearThresholds(largest_direct={2: 1_000, 3: 1_000}))
 """Small meshes have coarser levels too, and take their multigrid."""
 
 
