@@ -19,13 +19,12 @@ from ..errors import InputError
 from ..problem import spaces
 from ..problem.scaling import Scales
 from ..problem.stress import cell_stress, space_of_stress
-from ..report.contact_part import ContactPart
-from ..report.pictures.xserver import x_server
 from ..report.reader import Result
+from ..report.solution_arrays import ContactPart
 from ..results import ResultFolder, gathering
 from ..results.contact_parts import contact_parts
 from ..results.output_folder import existing
-from ..results.whole import begin_whole, picture_process
+from ..results.whole import write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root
 from ..schema import require_kind, require_path
@@ -164,12 +163,8 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
         require_path("folder", folder)
-        comm, dimension = self.problem.domain.mesh.comm, self.problem.scales.dimension
-        with (
-            ResultFolder(comm, Path(folder), existing(force=force)) as target,
-            picture_process(target, dimension, _LOG.warning, wanted=pictures) as process,
-        ):
-            begin_whole(target, self, self.timer, _LOG.warning, process).finish(self, GIVEN)
+        with ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing(force=force)) as target:
+            write_whole(target, self, GIVEN, self.timer, _LOG.warning, pictures=pictures)
             target.commit(self.scene)
 
     @property
@@ -207,7 +202,7 @@ def _draw(solution: Solution, picture: str) -> Figure | None:
 
 def _figure(result: Result, wanted: str) -> Figure:
     """Draw on rank 0."""
-    from ..report.pictures.drawings import drawings
+    from ..report.pictures.drawings import drawings, x_server
 
     known = {drawing.path.stem: drawing for drawing in drawings(result)}
     if wanted not in known:

@@ -25,7 +25,7 @@ from ..report import page
 from ..report.pictures.draw import draw as draw_pictures
 from ..results import ResultFolder, plain, tables
 from ..results.summary import common
-from ..results.whole import begin_whole, made, picture_process, write_record
+from ..results.whole import made, write_record, write_whole
 from ..runtime import writing
 from ..runtime.cost import Timer
 from ..runtime.mpi import largest, on_root, time_over
@@ -157,11 +157,8 @@ def _written(call: Session, bodies: Equilibria, found: Found, i: int) -> Equilib
     solution = bodies.solution(found.points[i])
     name = f"equilibrium-{i + 1:0{len(str(len(found.points)))}d}"
     drawn = not call.options.no_pictures and i < MOST_DRAWN and not call.interrupted()
-    with (
-        results.ResultFolder(COMM, call.folder.work / name) as own,
-        picture_process(own, call.scene.dimension, LOG.info, wanted=drawn) as pictures,
-    ):
-        begin_whole(own, solution, call.timer, LOG.info, pictures).finish(solution, call.given)
+    with results.ResultFolder(COMM, call.folder.work / name) as own:
+        write_whole(own, solution, call.given, call.timer, LOG.info, pictures=drawn)
         own.commit(call.scene)
     return _row(i + 1, bodies, found.points[i], solution, name)
 

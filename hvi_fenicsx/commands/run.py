@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .. import console, results
 from ..errors import ExitCode, InputError
 from ..load_paths import last_borne
-from ..results.whole import BegunResult, begin_whole, picture_process
+from ..results.whole import write_whole
 from ..runtime.cost import Timer
 from ..workflow import Solution, find_solution, prepare
 from . import session
@@ -18,9 +18,6 @@ from .session import COMM, LOG, Command, Record, Session, say
 
 if TYPE_CHECKING:
     from ..accuracy.control import AccuracyResult, Goal  # a tenth of a second, for runs that ask for it
-
-Begin = Callable[[Solution], BegunResult]
-"""Writes what pictures are drawn from, and lets them be drawn. Collective."""
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -58,34 +55,28 @@ def _goal(options: argparse.Namespace) -> Goal | None:
 
 def _run(call: Session, goal: Goal | None) -> int:
     """Solve, write and tell; the exit code. Collective."""
-    drawn = not call.options.no_pictures
-    with picture_process(call.folder, call.scene.dimension, LOG.info, wanted=drawn) as pictures:
-
-        def begin(solution: Solution) -> BegunResult:
-            return begin_whole(call.folder, solution, call.timer, LOG.info, pictures)
-
-        given = dict[str, object](call.given)
-        if goal is None:
-            solution, begun = _solved(call, begin)
-        else:
-            reached = _solved_to_goal(call, goal)
-            solution, begun = reached.solution, begin(reached.solution)
-            given |= {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
-        record = begun.finish(solution, given, report=not call.options.no_report)
+    options, given = call.options, dict[str, Any](call.given)
+    if goal is None:
+        solution = _solved(call)
+    else:
+        reached = _solved_to_goal(call, goal)
+        solution = reached.solution
+        given |= {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
+    wanted = {"pictures": not options.no_pictures, "report": not options.no_report}
+    record = write_whole(call.folder, solution, given, call.timer, LOG.info, **wanted)
     return int(record["exit_code"])
 
 
-def _solved(call: Session, begin: Begin) -> tuple[Solution, BegunResult]:
-    """The solution, and its result, which is begun as soon as it can be. Collective."""
+def _solved(call: Session) -> Solution:
+    """The solution with the estimate of its error, which is told; or the last state that is borne. Collective."""
     prepared = prepare(call.scene, COMM, call.timer)
     say(console.heading(prepared, COMM.size))
     found = find_solution(prepared, interrupted=call.interrupted)
     shown = last_borne.in_place_of(prepared, found.solution, call.interrupted)
-    begun = begin(shown)
     solution = found.estimated(call.interrupted) if shown is found.solution else shown
     new = (warning for warning in solution.warnings if warning not in prepared.warnings)
     say([*console.outcome(solution), *console.warnings(new)])
-    return solution, begun
+    return solution
 
 
 def _solved_to_goal(call: Session, goal: Goal) -> AccuracyResult:

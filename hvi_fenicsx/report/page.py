@@ -19,9 +19,8 @@ import numpy as np
 from ..errors import ExitCode
 from ..runtime import manifest, writing
 from . import reader, units
-from .contact_part import ContactPart
-from .errors import ResultError
 from .reader import Result
+from .solution_arrays import ContactPart, ResultError
 from .units import unless_noise
 
 if TYPE_CHECKING:

@@ -16,9 +16,7 @@ import numpy as np
 from ..typing import Array, Integers, Mask
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
-from .contact_part import ContactPart
-from .errors import ResultError
-from .solution_arrays import SolutionArrays
+from .solution_arrays import ContactPart, ResultError, SolutionArrays
 from .units import ROUNDING
 
 Row = Mapping[str, str]

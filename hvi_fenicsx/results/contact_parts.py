@@ -18,7 +18,7 @@ from ..mesh import nodes
 from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
-from ..report.contact_part import ContactPart
+from ..report.solution_arrays import ContactPart
 from ..runtime.mpi import joined
 from ..typing import Array, Integers
 

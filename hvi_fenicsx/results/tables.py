@@ -14,7 +14,7 @@ from ..certify import placed_forces
 from ..paths.load_path import LoadPath, PathRow
 from ..problem import references, spaces
 from ..problem.vectors import NodalForces
-from ..report.contact_part import ContactPart
+from ..report.solution_arrays import ContactPart
 from ..runtime import writing
 from ..runtime.mpi import joined
 from ..typing import Array, Entities

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 import time
 import traceback
@@ -192,18 +191,6 @@ def on_this_machine(comm: MPI.Comm) -> Iterator[MPI.Comm]:
         yield here
     finally:
         here.Free()
-
-
-def is_processor_free(comm: MPI.Comm) -> bool:
-    """Whether this rank's machine has more processors than ranks. Collective.
-
-    The processors are those of the machine: an mpirun may bind each rank to one.
-
-    Args:
-        comm: all ranks.
-    """
-    with on_this_machine(comm) as here:
-        return here.size < (os.cpu_count() or 1)
 
 
 class Interrupt:

@@ -9,7 +9,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from ..report import page
-from ..report.errors import ReportError
+from ..report.solution_arrays import ReportError
 from ..results import ResultFolder
 from ..results.output_folder import Existing
 from ..runtime import writing

@@ -15,8 +15,7 @@ from scipy import sparse, spatial
 
 from ..accuracy.quantity_base import ORDERS
 from ..problem import spaces
-from ..report.contact_part import ContactPart
-from ..report.solution_arrays import SolutionArrays
+from ..report.solution_arrays import ContactPart, SolutionArrays
 from ..runtime.mpi import joined
 from ..typing import Array, Mask
 from ..workflow import Solution

@@ -15,8 +15,7 @@ from scipy.sparse import csgraph
 
 from .. import compat
 from ..mesh import nodes, transfer
-from ..report.contact_part import ContactPart
-from ..report.solution_arrays import SolutionArrays
+from ..report.solution_arrays import ContactPart, SolutionArrays
 from ..typing import Array, Integers
 
 _KINDS = {1: "interval", 2: "triangle", 3: "tetrahedron"}

@@ -31,9 +31,8 @@ from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
-from hvi_fenicsx.report.contact_part import ContactPart
 from hvi_fenicsx.report.pictures import bodies, draw, sides
-from hvi_fenicsx.report.solution_arrays import FILE, SolutionArrays, load, save
+from hvi_fenicsx.report.solution_arrays import FILE, ContactPart, SolutionArrays, load, save
 from hvi_fenicsx.runtime import processes
 
 Array = npt.NDArray[np.float64]
@@ -280,12 +279,12 @@ def test_a_process_that_dies_takes_the_picture_with_it_that_it_was_drawing(tmp_p
     write_sides(folder, square(4), **ON)
     code = (
         "import os, signal, sys; from pathlib import Path; from hvi_fenicsx.report import reader\n"
-        "from hvi_fenicsx.report.pictures import __main__, drawings\n"
+        "from hvi_fenicsx.report.pictures import drawings\n"
         "found = list(drawings.drawings(reader.read(Path(sys.argv[1]))))\n"
         "first = drawings.Drawing(found[0].path, '', lambda: os.kill(os.getpid(), signal.SIGKILL))\n"
         "drawings.drawings = lambda result: [first, *found[1:]]\n"
         "os.cpu_count = lambda: int(sys.argv[2])\n"
-        "print(*__main__.draw_all(Path(sys.argv[1])))\n"
+        "print(*drawings.draw_all(Path(sys.argv[1])))\n"
     )
     command = [*processes.PYTHON, "-c", code, str(folder), str(processors)]
     done = subprocess.run(command, env=processes.environment(), capture_output=True, text=True, check=True)

@@ -7,7 +7,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from full_disk import room_for
@@ -17,9 +17,8 @@ from scenes import STEEL, Table, model, quadratic_linear, two_blocks
 from hvi_fenicsx import read_tables
 from hvi_fenicsx.errors import HviError, NotWrittenError
 from hvi_fenicsx.report import reader
-from hvi_fenicsx.report.pictures.draw import PictureProcess
 from hvi_fenicsx.results import ResultFolder
-from hvi_fenicsx.results.whole import begin_whole
+from hvi_fenicsx.results.whole import write_whole
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.workflow import Solution, finish, prepare
 
@@ -59,7 +58,7 @@ def solved(scene: Table) -> Solution:
 def written(folder: Path, scene: Table) -> dict[str, Any] | None:
     """The tables of a result; of its arrays the sums, by which numbers of vertices do not count. None but on rank 0."""
     with ResultFolder(COMM, folder) as target:
-        begin_whole(target, found := solved(scene), Timer(), print, None).finish(found, {})
+        write_whole(target, solved(scene), {}, Timer(), print, pictures=False)
         target.commit(read_tables(scene))
     if COMM.rank:
         return None
@@ -82,30 +81,10 @@ def without_room(folder: Path) -> list[Any]:
             ResultFolder(COMM, folder / "full") as target,
             room_for(1 << 10) if COMM.rank == 0 else contextlib.nullcontext(),
         ):
-            begin_whole(target, solution, Timer(), print, None).finish(solution, {})
+            write_whole(target, solution, {}, Timer(), print, pictures=False)
     except NotWrittenError as error:
         return [COMM.allgather(error.reason), sorted(file.name for file in folder.glob("*full*"))]
     raise AssertionError
-
-
-class Pen:
-    """Stands for the process that draws: keeps whether it was told to begin."""
-
-    begun = False
-
-    def begin(self) -> None:
-        """The line that lets it draw."""
-        self.begun = True
-
-
-def begun_early(folder: Path) -> bool:
-    """Whether rank 0 lets pictures be drawn before the error is estimated."""
-    pen = Pen() if COMM.rank == 0 else None
-    solution = solved(model(2, friction=quadratic_linear(1e6)))
-    with ResultFolder(COMM, folder / "r") as result:
-        begin_whole(result, solution, Timer(), print, cast("PictureProcess | None", pen))
-        result.discard()
-    return bool(COMM.bcast(pen is not None and pen.begun))
 
 
 def main() -> None:
@@ -113,7 +92,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(COMM.bcast(name))
         results = {name: written(folder / name, scene) for name, scene in SCENES.items()}
-        found = {"results": results, "begun": begun_early(folder), "full": without_room(folder)}
+        found = {"results": results, "full": without_room(folder)}
         COMM.barrier()
     if COMM.rank == 0:
         print(json.dumps(found))

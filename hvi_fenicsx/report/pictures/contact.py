@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 
 from ...typing import Array, Integers, Mask
 from ..body_mesh import BodyMesh
-from ..contact_part import ContactPart
 from ..reader import Result
+from ..solution_arrays import ContactPart
 from ..units import Unit, quantity, unit_for
 from .shape import PartGeometry, part_geometries
 from .style import (

@@ -1,19 +1,46 @@
-"""What there is to draw of a finished folder: its pictures, each with its file. A new one is a row of `PICTURES`."""
+"""``python3 -m hvi_fenicsx.report.pictures.drawings FOLDER``: draw a finished folder's pictures, print their names.
+
+A new picture of a body is a row of `PICTURES`. Each picture has a process of its own, as many at a time as there are
+processors: one that dies takes its picture with it and no other. Exit code 0, or 1 with a message for each picture that
+failed; the others are there even so.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import argparse
+import contextlib
+import gc
+import multiprocessing
+import os
+import random
+import select
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import NoReturn
 
 from matplotlib.figure import Figure
 
+from ...errors import HviError, NotWrittenError
+from ...runtime import processes, writing
 from .. import reader
-from ..errors import PictureError
 from ..reader import Result
 from . import bodies, contact, equilibria
 from . import path as path_picture
+from .draw import COMPLAINT, PictureError
+from .style import save
+
+READY_WITHIN = 15
+"""Seconds until a display is there."""
+DISPLAYS = range(1000, 50000)
+"""Far from those that people use."""
+_ADVICE = "; VTK draws on a display: unset DISPLAY and install Xvfb, or use a VTK from 9.4 on"
 
 
 @dataclass(frozen=True)
@@ -95,3 +122,128 @@ def drawings(result: Result) -> Iterator[Drawing]:
         name, words = ("contact", "the contact part") if alone else (f"contact_{part.name}", f"“{part.name}”")
         caption = f"Along {words}: displacement, friction and pressure."
         yield Drawing(result.folder / f"{name}.png", caption, partial(contact.contact, result, part))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command; its exit code."""
+    parser = argparse.ArgumentParser(description="Draw a result's pictures.")
+    parser.add_argument("folder", type=Path, help="a finished result folder")
+    folder = parser.parse_args(arguments).folder
+    signal.signal(signal.SIGTERM, _terminated)
+    processes.die_with_parent()  # or it would write into the folder of the next run
+    processes.stand_back()  # the ranks may still be computing
+    try:
+        failures = draw_all(folder)
+    except HviError as error:
+        failures = [error]
+    for failure in failures:
+        print(f"{COMPLAINT}{failure}", file=sys.stderr)
+    for failure in failures:
+        if isinstance(failure, NotWrittenError):
+            return writing.hand_over(failure)
+    return 1 if failures else 0
+
+
+def _terminated(*_: object) -> NoReturn:
+    """End in good order, so that the X server goes too."""
+    raise SystemExit(128 + signal.SIGTERM)
+
+
+def draw_all(folder: Path) -> list[HviError]:
+    """Draw the pictures of a folder side by side and print the names of those that are there.
+
+    Returns:
+        What went wrong with the others.
+
+    Raises:
+        ResultError: the folder is damaged.
+        PictureError: there is nothing to draw.
+    """
+    found, at_once = drawings_of(folder), os.cpu_count() or 1
+    with x_server(wanted=any(drawing.rendered for drawing in found)):
+        gc.freeze()  # the processes share what is there; a collection in one of them would copy it
+        batches = (found[start : start + at_once] for start in range(0, len(found), at_once))
+        return [failure for batch in batches for failure in _drawn(batch)]
+
+
+def _drawn(batch: Sequence[Drawing]) -> Iterator[HviError]:
+    """Draw pictures side by side, each in a process of its own; what went wrong with them."""
+    context, running = multiprocessing.get_context("fork"), []
+    for drawing in batch:
+        receiving, sending = context.Pipe(duplex=False)
+        process = context.Process(target=_draw, args=(drawing, sending), daemon=True)
+        process.start()
+        sending.close()
+        running.append((drawing, process, receiving))
+    for drawing, process, receiving in running:
+        try:
+            failure = receiving.recv()
+        except EOFError:
+            process.join()
+            code = process.exitcode or 0
+            reason = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+            failure = _failed(drawing, f"the drawing process ended with {reason}{_ADVICE * drawing.rendered}")
+        process.join()
+        if failure is None:
+            print(drawing.path.name, flush=True)
+        else:
+            yield failure
+
+
+def _draw(drawing: Drawing, connection: Connection) -> None:
+    """Draw one picture in a process of its own; say what went wrong, if anything did."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    failure: HviError | None = None
+    try:
+        save(drawing.make(), drawing.path, drawing.caption)
+    except NotWrittenError as error:
+        failure = error
+    except ModuleNotFoundError as error:
+        failure = _failed(drawing, f"needs the package {error.name}, which is not installed here")
+    except Exception as error:  # whatever it is, it is reported in one line
+        failure = _failed(drawing, str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}")
+    connection.send(failure)
+
+
+def _failed(drawing: Drawing, why: str) -> PictureError:
+    return PictureError(f"{drawing.path.name}: {why}")
+
+
+@contextlib.contextmanager
+def x_server(*, wanted: bool) -> Iterator[None]:
+    """Have a display while VTK draws: Xvfb, which ends with this process whatever ends that; it says when it is ready.
+
+    A server that fails is left out: VTK may do without, as it does from 9.4 on. The display's number is random: a
+    server that ends removes the socket of its number, and of the first free one that may be another's by then.
+
+    Args:
+        wanted: whether VTK draws.
+    """
+    if not wanted or os.environ.get("DISPLAY") or shutil.which("Xvfb") is None:
+        yield
+        return
+    ready, told = os.pipe()
+    display = f":{random.SystemRandom().choice(DISPLAYS)}"
+    size = ["-screen", "0", "640x480x24"]  # pictures are drawn beside the screen, whatever its size
+    server = subprocess.Popen(
+        ["Xvfb", display, "-displayfd", str(told), *size, "-nolisten", "tcp", "-noreset"],
+        pass_fds=[told],
+        preexec_fn=processes.die_with_parent,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(told)
+    try:
+        if select.select([ready], [], [], READY_WITHIN)[0] and (number := os.read(ready, 16).decode().strip()):
+            os.environ["DISPLAY"] = f":{number}"
+        yield
+    finally:
+        os.environ.pop("DISPLAY", None)
+        os.close(ready)
+        server.terminate()
+        server.wait()
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

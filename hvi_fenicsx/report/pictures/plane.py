@@ -18,7 +18,7 @@ from matplotlib.tri import Triangulation
 from ...geometry import chains
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
-from ..contact_part import NOTHING
+from ..solution_arrays import NOTHING
 from ..units import quantity
 from .canvas import Canvas, Label
 from .shape import ARROW, DeformedBody, PartGeometry

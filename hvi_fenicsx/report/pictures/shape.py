@@ -10,8 +10,8 @@ import numpy as np
 
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
-from ..contact_part import ContactPart
 from ..reader import Result
+from ..solution_arrays import ContactPart
 from ..units import round_below, times
 
 VISIBLE = 0.1

@@ -23,9 +23,9 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from ...runtime import writing
-from ..contact_part import NOTHING
 from ..page import CAPTION
 from ..reader import Result
+from ..solution_arrays import NOTHING
 from ..units import thousands
 from .draw import UNFINISHED
 
