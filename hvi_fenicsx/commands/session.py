@@ -20,7 +20,7 @@ from ..results.output_folder import existing, inputs_of, read_finished
 from ..runtime import log
 from ..runtime.cost import Timer
 from ..runtime.manifest import __version__
-from ..runtime.mpi import Interrupt, on_root
+from ..runtime.mpi import on_root, stop_on_signals
 from ..system import petsc_options
 
 COMM = MPI.COMM_WORLD
@@ -45,7 +45,7 @@ class Command:
     done: Callable[[Record], bool]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Session:
     """One call of such a command.
 
@@ -110,15 +110,11 @@ def execute(
         return code
     kept = existing(force=options.force or options.resume)
     with results.ResultFolder(COMM, target, kept, inputs=[options.scene]) as folder:
-        interrupt = Interrupt(COMM)
-        interrupt.watch()
+        interrupted = stop_on_signals(COMM)
         run_logs = on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
         with log.handled(*on_first_rank(log.TerminalDisplay)):
             with log.handled(*run_logs):
-                session = Session(
-                    options=options, scene=scene, folder=folder, timer=timer, interrupted=interrupt.requested
-                )
-                code = work(session)
+                code = work(Session(options, scene, folder, timer, interrupted))
             on_root(COMM, lambda: _finish(run_logs))
             folder.commit(scene)
             say(console.warnings([*folder.kept, *petsc_options.unread(options.petsc)]))

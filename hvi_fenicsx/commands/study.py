@@ -11,7 +11,7 @@ from ..model import read_scene
 from ..results.output_folder import Existing
 from ..runtime import log
 from ..runtime.manifest import MARKS
-from ..runtime.mpi import Interrupt, on_root
+from ..runtime.mpi import on_root, stop_on_signals
 from ..study import plan
 from ..study.conduct import conduct
 from ..study.table import Study
@@ -29,8 +29,7 @@ def execute(options: argparse.Namespace) -> int:
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     planned = plan.make(scene, [plan.read_axis(text) for text in options.axis])
     existing: Existing = "replace" if options.force else "resume" if options.resume else "refuse"
-    interrupt = Interrupt(COMM)
-    interrupt.watch()
+    interrupted = stop_on_signals(COMM)
     default = Path("results") / f"{options.scene.stem}-study"
     folder = on_root(COMM, lambda: results.resolved(options.out or default))
     with log.handled(*on_first_rank(log.TerminalDisplay)):
@@ -42,7 +41,7 @@ def execute(options: argparse.Namespace) -> int:
             existing=existing,
             inputs=[options.scene],
             limit=options.limit,
-            interrupted=interrupt.requested,
+            interrupted=interrupted,
         )
         told = [f"warning: {text}" for text in warnings]
         say([*_heading(study), *study.sentences, *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])

@@ -14,7 +14,7 @@ import os
 import shutil
 import sysconfig
 import tempfile
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -47,15 +47,15 @@ class FormCache:
     """Compiles forms and keeps them; where the cache cannot be written, in a folder that goes with this process.
 
     Args:
-        folder: of the cache; None: dolfinx's, from XDG_CACHE_HOME or the options of dolfinx.
+        wanted: the folder of the cache; None: dolfinx's, from XDG_CACHE_HOME or the options of dolfinx.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
-        self._folder = folder
-        self._checked: tempfile.TemporaryDirectory[str] | Path | None = None
+    def __init__(self, wanted: Path | None = None) -> None:
+        self._wanted = wanted
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
 
     def compiled(self, form: Any) -> fem.Form:
-        """The compiled form. Collective.
+        """A UFL form, compiled now or by an earlier run. Collective.
 
         Args:
             form: UFL, not empty.
@@ -64,7 +64,7 @@ class FormCache:
             CompilationError: it cannot be compiled, on all ranks alike.
         """
         form, comm = _renumbered(form), compat.comm_of(form)
-        kept = on_root(comm, self.folder) / _name(form)
+        kept = on_root(comm, lambda: self.folder / _name(form))
         if all(agree(comm, kept.is_dir())):
             with contextlib.suppress(CompilationError):
                 return _made(form, comm, kept)
@@ -76,20 +76,22 @@ class FormCache:
             if comm.rank == 0:
                 os.close(lock)
 
+    @cached_property
     def folder(self) -> Path:
         """The folder of the cache, which can be written. Rank 0 only."""
-        if self._checked is None:
-            wanted = self._folder or _cache_folder() / "hvi_fenicsx"
-            try:
-                wanted.mkdir(parents=True, exist_ok=True)
-                with tempfile.TemporaryFile(dir=wanted):
-                    self._checked = wanted
-            except OSError as error:
-                self._checked = tempfile.TemporaryDirectory(prefix="hvi-forms-", ignore_cleanup_errors=True)
-                text = "they are compiled again at each start: make room there, or set XDG_CACHE_HOME to another folder"
-                _LOG.warning("compiled forms cannot be kept in %s (%s); %s", wanted, error.strerror, text)
-        kept: Any = self._checked
-        return kept if isinstance(kept, Path) else Path(kept.name)
+        usual = Path(options()["cache_dir"])
+        if not usual.is_absolute():  # or empty: the default, as XDG wants it
+            usual = Path.home() / ".cache" / "fenics"
+        wanted = self._wanted or usual / "hvi_fenicsx"
+        try:
+            wanted.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=wanted):
+                return wanted
+        except OSError as error:
+            self._temporary = tempfile.TemporaryDirectory(prefix="hvi-forms-", ignore_cleanup_errors=True)
+            text = "they are compiled again at each start: make room there, or set XDG_CACHE_HOME to another folder"
+            _LOG.warning("compiled forms cannot be kept in %s (%s); %s", wanted, error.strerror, text)
+            return Path(self._temporary.name)
 
 
 def _built(form: Any, comm: MPI.Comm, kept: Path) -> fem.Form:
@@ -124,25 +126,8 @@ def _made(form: Any, comm: MPI.Comm, folder: Path) -> fem.Form:
     raise CompilationError(f"a form cannot be compiled: {faults[0]}; it needs a C compiler and Python's headers")
 
 
-_CACHE = FormCache()
-
-
-def compiled(form: Any) -> fem.Form:
-    """A UFL form, compiled now or by an earlier run. Collective.
-
-    Args:
-        form: UFL, not empty.
-
-    Raises:
-        CompilationError: it cannot be compiled, on all ranks alike.
-    """
-    return _CACHE.compiled(form)
-
-
-def _cache_folder() -> Path:
-    """The folder that dolfinx keeps forms in; where that is relative or empty, the default, as XDG wants it."""
-    folder = Path(options()["cache_dir"])
-    return folder if folder.is_absolute() else Path.home() / ".cache" / "fenics"
+compiled = FormCache().compiled
+"""The cache of this process."""
 
 
 @cache
@@ -200,32 +185,22 @@ def _renumbered(form: Any) -> Any:
     over = [i for i in form.integrals() if i.integral_type() == "exterior_facet" and _has_numbers(i)]
     if not form.arguments() or len({id(i.subdomain_data()) for i in over}) != 1:
         return form
-    alike = _alike(over)
-    old = [[n for integral in group for n in _numbers(integral)] for group in alike]
-    if any(len(set(numbers)) < len(numbers) for numbers in old):  # an integrand counts twice there
+    first, numbers = dict[Any, Any](), dict[Any, list[int]]()
+    for one in over:
+        integrand = one.integrand(), str(one.metadata())
+        first.setdefault(integrand, one)
+        numbers.setdefault(integrand, []).extend(_numbers(one))
+    if any(len(set(each)) < len(each) for each in numbers.values()):  # an integrand counts twice there
         return form
-    new = _new_numbers(old)
+    integrands = {n: tuple(n in each for each in numbers.values()) for each in numbers.values() for n in each}
+    kinds = sorted(set(integrands.values()))
+    new = {n: 1 + kinds.index(kind) for n, kind in integrands.items()}
     tags = _selected(form.arguments()[0].ufl_function_space().mesh, over[0].subdomain_data(), new)
-    rest = [i for i in form.integrals() if not any(i is one for one in over)]
-    ids = [tuple(sorted({new[n] for n in numbers})) for numbers in old]
-    return ufl.Form(
-        [*rest, *(g[0].reconstruct(subdomain_id=i, subdomain_data=tags) for g, i in zip(alike, ids, strict=True))]
-    )
-
-
-def _alike(integrals: list[Any]) -> list[list[Any]]:
-    """Integrals in groups of one integrand and rule."""
-    groups: dict[Any, list[Any]] = {}
-    for integral in integrals:
-        groups.setdefault((integral.integrand(), str(integral.metadata())), []).append(integral)
-    return list(groups.values())
-
-
-def _new_numbers(old: list[list[int]]) -> dict[int, int]:
-    """A number from 1 on for each number: one for all that are in the same groups."""
-    groups_of = {n: tuple(n in numbers for numbers in old) for numbers in old for n in numbers}
-    kinds = sorted(set(groups_of.values()))
-    return {n: 1 + kinds.index(kind) for n, kind in groups_of.items()}
+    made = [i for i in form.integrals() if not any(i is one for one in over)]
+    for integrand, one in first.items():
+        ids = tuple(sorted({new[n] for n in numbers[integrand]}))
+        made.append(one.reconstruct(subdomain_id=ids, subdomain_data=tags))
+    return ufl.Form(made)
 
 
 def _has_numbers(integral: Any) -> bool:
@@ -239,8 +214,6 @@ def _numbers(integral: Any) -> tuple[int, ...]:
 
 def _selected(mesh: Any, tags: Any, new: dict[int, int]) -> Any:
     """The entities that have one of these numbers, with the new ones."""
-    found = [tags.find(number) for number in new]
-    entities = np.concatenate(found)
-    values = np.repeat(np.array(list(new.values()), dtype=np.int32), [len(f) for f in found])
-    order = np.argsort(entities)
-    return meshtags(mesh, tags.dim, entities[order], values[order])
+    kept = np.isin(tags.values, list(new))
+    values = np.array([new[number] for number in tags.values[kept]], dtype=np.int32)
+    return meshtags(mesh, tags.dim, tags.indices[kept], values)

@@ -22,8 +22,8 @@ from . import writing
 
 PACKAGE = __name__.partition(".")[0]
 COMMANDS = f"{PACKAGE}.commands"
-TOLD_BY_COMMANDS = (f"{PACKAGE}.preparation", f"{PACKAGE}.workflow")
-"""Loggers whose records a command tells in words of its own."""
+_STANDARD = 2
+"""The last of the descriptors of standard input, output and error."""
 logging.getLogger(PACKAGE).addHandler(logging.NullHandler())
 
 
@@ -96,7 +96,9 @@ def _on_first_rank(record: logging.LogRecord) -> bool:
     return mpi is None or mpi.COMM_WORLD.rank == 0
 
 
-_SOLVERS = logger("solvers")
+def _is_not_told_by_commands(record: logging.LogRecord) -> bool:
+    """Whether a record is of no logger whose records a command tells in words of its own."""
+    return record.name not in (f"{PACKAGE}.preparation", f"{PACKAGE}.workflow")
 
 
 def newton_step(step: NewtonStep) -> None:
@@ -105,7 +107,7 @@ def newton_step(step: NewtonStep) -> None:
     Args:
         step: the step.
     """
-    _SOLVERS.debug("%s", step, extra={"moving": True})
+    logger("solvers").debug("%s", step, extra={"moving": True})
 
 
 class RunLog(logging.FileHandler):
@@ -121,8 +123,11 @@ class RunLog(logging.FileHandler):
         with writing.told(path):
             super().__init__(path, mode="w", encoding="utf-8")
         self._error: OSError | None = None
-        self.addFilter(lambda record: record.name not in TOLD_BY_COMMANDS)
-        self.setFormatter(_ElapsedFormatter())
+        self.addFilter(_is_not_told_by_commands)
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line of a record."""
+        return f"{record.relativeCreated / 1000:9.3f} s  {printable(record.getMessage())}"
 
     def handleError(self, record: logging.LogRecord) -> None:
         """Keep the error that is being handled."""
@@ -150,23 +155,12 @@ class RunLog(logging.FileHandler):
                 raise self._error
 
 
-class _ElapsedFormatter(logging.Formatter):
-    """Records with the seconds since it was made."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._start = time.time()
-
-    def format(self, record: logging.LogRecord) -> str:
-        return f"{record.created - self._start:9.3f} s  {printable(record.getMessage())}"
-
-
 class WarningDisplay(logging.Handler):
     """Warnings on standard error, except those on a scene, which the command tells with its lines."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self.addFilter(lambda record: record.name not in TOLD_BY_COMMANDS)
+        self.addFilter(_is_not_told_by_commands)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show one record."""
@@ -185,7 +179,15 @@ class TerminalDisplay(logging.Handler):
         self._line: Any = None
         self.addFilter(lambda record: record.name == COMMANDS or hasattr(record, "moving"))
         if sys.stderr.isatty():
-            self._line, self._spinner = _moving_line()
+            from rich.console import Console
+            from rich.live import Live
+            from rich.spinner import Spinner
+
+            shared = sys.stdout.isatty()  # then lines on standard output go above the moving one
+            self._spinner, to = Spinner("line", style="status.spinner"), Console(stderr=True)
+            self._line = Live(
+                self._spinner, console=to, refresh_per_second=12.5, transient=True, redirect_stdout=shared
+            )
             self._line.start()
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -202,18 +204,6 @@ class TerminalDisplay(logging.Handler):
                 self._line.stop()
             self._line = None
         super().close()
-
-
-def _moving_line() -> tuple[Any, Any]:
-    """A line on standard error, and its spinner; lines on standard output go above it, where that is a terminal too."""
-    from rich.console import Console
-    from rich.live import Live
-    from rich.spinner import Spinner
-
-    shared = sys.stdout.isatty()
-    spinner = Spinner("line", style="status.spinner")
-    console = Console(stderr=True)
-    return Live(spinner, console=console, refresh_per_second=12.5, transient=True, redirect_stdout=shared), spinner
 
 
 @contextlib.contextmanager
@@ -237,10 +227,6 @@ def handled(*handlers: logging.Handler) -> Iterator[None]:
         package.setLevel(level)
 
 
-_STANDARD = 2
-"""The last of the descriptors of standard input, output and error."""
-
-
 def prepare() -> None:
     """Open what the caller has closed of the standard streams; write characters that a stream lacks as escapes.
 
@@ -249,15 +235,11 @@ def prepare() -> None:
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= _STANDARD:
         pass
     os.close(descriptor)
-    sys.stdout = sys.stdout or _nowhere()
-    sys.stderr = sys.stderr or _nowhere()
-    for stream in (sys.stdout, sys.stderr):
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name) or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+        setattr(sys, name, stream)
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _nowhere() -> TextIO:
-    return open(os.devnull, "w", encoding="utf-8")
 
 
 def say(text: str) -> None:
@@ -285,15 +267,10 @@ def _write(stream: TextIO, text: str, end: str = "\n") -> None:
     try:
         print(printable(text), end=end, file=stream, flush=True)
     except (OSError, ValueError):  # a broken pipe, a closed terminal, a full disk; a closed stream
-        _silence(stream)
-
-
-def _silence(stream: TextIO) -> None:
-    """Send all that is still written to a stream nowhere; its buffer would raise the same error again at the end."""
-    with contextlib.suppress(OSError, ValueError):
-        descriptor = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(descriptor, stream.fileno())
-        os.close(descriptor)
+        with contextlib.suppress(OSError, ValueError):  # its buffer would raise the same error again at the end
+            descriptor = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(descriptor, stream.fileno())
+            os.close(descriptor)
 
 
 def percent(share: float) -> str:

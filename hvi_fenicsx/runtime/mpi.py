@@ -104,7 +104,7 @@ def ended_together(comm: MPI.Comm) -> Iterator[None]:
             raise KeyboardInterrupt from None
         raise
     except HviError as error:
-        if error.everywhere or _raised_by_all(twin):
+        if error.everywhere or asleep_until_all(twin, _TOGETHER):
             raise
         log.complain(f"hvi: {error}")
         comm.Abort(error.exit_code)
@@ -114,11 +114,6 @@ def ended_together(comm: MPI.Comm) -> Iterator[None]:
             sys.stderr.flush()
             comm.Abort(1)
         raise
-
-
-def _raised_by_all(comm: MPI.Comm) -> bool:
-    """Whether all ranks come here, within a time."""
-    return asleep_until_all(comm, _TOGETHER)
 
 
 def asleep_until_all(comm: MPI.Comm, seconds: float = math.inf) -> bool:
@@ -193,25 +188,20 @@ def on_this_machine(comm: MPI.Comm) -> Iterator[MPI.Comm]:
         here.Free()
 
 
-class Interrupt:
-    """The request to stop, made by the first signal: solvers end, the result is written; a second one ends at once.
+def stop_on_signals(comm: MPI.Comm) -> Callable[[], bool]:
+    """Have the first signal from now on be a request to stop: solvers end, the result is written; a second one ends.
 
     Args:
         comm: the ranks that stop together.
+
+    Returns:
+        Whether any rank was signalled. Collective.
     """
+    processes.catch(processes.SIGNALS, raise_second)
+    return lambda: bool(comm.allreduce(processes.stop_asked(), op=MPI.LOR))
 
-    def __init__(self, comm: MPI.Comm) -> None:
-        self._comm, self._signalled = comm, False
 
-    def watch(self) -> None:
-        """Catch the signals from now on."""
-        processes.catch(processes.SIGNALS, self._on_signal)
-
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        if self._signalled:
-            raise KeyboardInterrupt
-        self._signalled = True
-
-    def requested(self) -> bool:
-        """Whether any rank was signalled. Collective."""
-        return bool(self._comm.allreduce(self._signalled, op=MPI.LOR))
+def raise_second(number: int, frame: FrameType | None) -> None:
+    """A handler of signals: only one that is not the first interrupts."""
+    if processes.stop_asked() > 1:
+        raise KeyboardInterrupt

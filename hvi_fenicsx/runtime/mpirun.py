@@ -2,7 +2,7 @@
 
 Open MPI kills the ranks 0.2 s after it gets a SIGINT or SIGTERM, too soon to write what was found; it passes SIGUSR1 on
 to them (mpirun(1), "Signal Propagation"; MPICH does too). So mpirun runs apart from the terminal, and for the first
-signal this process sends it SIGUSR1, which :class:`.mpi.Interrupt` catches, for a second one SIGTERM.
+signal this process sends it SIGUSR1, which :func:`.mpi.stop_on_signals` catches, for a second one SIGTERM.
 
 mpirun prints a notice of its own when a rank ends with another code than 0, and no option silences it. So the ranks
 agree on the code, rank 0 writes it into a file, and all end with 0. A broken pipe would end mpirun and so the ranks:
@@ -23,7 +23,6 @@ from types import FrameType
 from ..errors import ExitCode, InputError
 from . import log, processes
 
-_CODE_FILE = "HVI_EXIT_CODE_FILE"
 _FOLDER = "PRTE_MCA_prte_local_tmpdir_base"
 """Where Open MPI's mpirun keeps its files, by process number: a killed one's would stop another of its number."""
 
@@ -38,7 +37,7 @@ def run(ranks: int, words: Sequence[str]) -> int:
     Raises:
         InputError: there is no mpirun, or no room for its files.
     """
-    command = [*processes.launcher(ranks), "-m", "hvi_fenicsx", *without_ranks(words)]
+    command = [*processes.launcher(ranks), "-m", "hvi_fenicsx", *words]
     try:
         folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
     except OSError as error:
@@ -49,16 +48,14 @@ def run(ranks: int, words: Sequence[str]) -> int:
 
 def _code(command: Sequence[str], folder: Path) -> int:
     """The exit code of mpirun, which keeps its files in an empty folder."""
-    signalled: list[int] = []
 
     def pass_on(number: int, frame: FrameType | None) -> None:
-        signalled.append(number)
-        process.send_signal(signal.SIGUSR1 if len(signalled) == 1 else signal.SIGTERM)
+        process.send_signal(signal.SIGUSR1 if processes.stop_asked() == 1 else signal.SIGTERM)
 
     file = folder / "code"
     file.touch()
     chosen = any(name.endswith("tmpdir_base") for name in os.environ)
-    own = {_CODE_FILE: str(file)} | ({} if chosen else {_FOLDER: str(folder)})
+    own = {processes.CODE_FILE: str(file)} | ({} if chosen else {_FOLDER: str(folder)})
     process = subprocess.Popen(
         command,
         env={**os.environ, **own},
@@ -72,13 +69,13 @@ def _code(command: Sequence[str], folder: Path) -> int:
     for line in process.stdout or ():
         log.say(line.rstrip("\r\n"))
     ended, agreed = process.wait(), file.read_text(encoding="ascii")
-    if signalled and ended and not agreed:  # before the ranks could catch it
+    if processes.stop_asked() and ended and not agreed:  # before the ranks could catch it
         raise KeyboardInterrupt
     if ended and not agreed:
         room = f"where it says no more, make room in {tempfile.gettempdir()}, or set TMPDIR to another folder"
         log.complain(f"hvi: --np: mpirun ended with code {ended}; {room}")
     code = ended or int(agreed or 0)
-    return ExitCode.INTERRUPTED if signalled and code else code
+    return ExitCode.INTERRUPTED if processes.stop_asked() and code else code
 
 
 def hand_over(code: int) -> int:
@@ -92,12 +89,12 @@ def hand_over(code: int) -> int:
     Returns:
         What this rank shall end with: 0, or the code where nobody would read the file.
     """
-    if code == 0 or _CODE_FILE not in os.environ:
+    if code == 0 or processes.CODE_FILE not in os.environ:
         return code
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
-    written = comm.bcast(_written(os.environ[_CODE_FILE], code) if comm.rank == 0 else False)
+    written = comm.bcast(_written(os.environ[processes.CODE_FILE], code) if comm.rank == 0 else False)
     return 0 if written else code
 
 
@@ -107,11 +104,3 @@ def _written(file: str, code: int) -> bool:
         stream.write(str(int(code)))
         return True
     return False
-
-
-def without_ranks(words: Sequence[str]) -> list[str]:
-    """A command line without its ``--np``."""
-    if "--np" in words:
-        at = words.index("--np")
-        return [*words[:at], *words[at + 2 :]]
-    return [word for word in words if not word.startswith("--np=")]

@@ -33,6 +33,8 @@ SIGNALS = (*STOP, signal.SIGUSR1)
 """Those and what mpirun passes on to its ranks, and what a batch system may send before a job's end."""
 _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 """What mpirun tells each process, before MPI is started."""
+CODE_FILE = "HVI_EXIT_CODE_FILE"
+"""The variable that names a file for the ranks' exit code, where this program has started mpirun."""
 _NICENESS = 10
 """The niceness of a process that stands back: it gets a tenth of the time of one that does not."""
 _PR_SET_PDEATHSIG = 1
@@ -56,7 +58,7 @@ _CAUGHT: list[int] = []
 
 def is_under_mpirun() -> bool:
     """Whether mpirun or a batch system has started this process as a rank."""
-    return any(name in os.environ for name in _RANK)
+    return any(name in os.environ for name in (*_RANK, CODE_FILE))
 
 
 def is_first_rank() -> bool:
@@ -144,9 +146,9 @@ def forget_signals() -> None:
     exec("")
 
 
-def stop_asked() -> bool:
-    """Whether a signal has been caught since the command began: what fails then has failed by it, as children do."""
-    return bool(_CAUGHT)
+def stop_asked() -> int:
+    """How many signals were caught since the command began: what fails then has failed by them, as children do."""
+    return len(_CAUGHT)
 
 
 def raise_on_stop() -> None:
@@ -216,9 +218,8 @@ _READ = 0b1100
 """Reading files and folders, among the kinds of access to files."""
 _KINDS = {1: 13, 2: 14, 3: 15, 5: 16}
 """How many kinds of access to files there are, from which version on."""
-_NETWORK, _SCOPES = 0b11, 0b11
-"""Bind and connect over TCP; abstract sockets and signals."""
-_NETWORK_FROM, _SCOPES_FROM = 4, 6
+_NETWORK = {4: 0b11, 6: 0b11}
+"""Bind and connect over TCP; abstract sockets and signals: from which version on."""
 
 
 def run(module: str, words: Sequence[str], seconds: float) -> subprocess.CompletedProcess[bytes]:
@@ -271,11 +272,8 @@ def confine(memory: float) -> bool:
     Returns:
         Whether the kernel forbids programs, files and network; else there are the limits only.
     """
-    for kind, most in (
-        (resource.RLIMIT_AS, int(memory * 2**20)),
-        (resource.RLIMIT_FSIZE, 0),
-        (resource.RLIMIT_CORE, 0),
-    ):
+    limits = {resource.RLIMIT_AS: int(memory * 2**20), resource.RLIMIT_FSIZE: 0, resource.RLIMIT_CORE: 0}
+    for kind, most in limits.items():
         _, hard = resource.getrlimit(kind)
         lowered = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(kind, (lowered, lowered))
@@ -302,9 +300,5 @@ def _restrict() -> bool:
 def _rules(version: int) -> bytes:
     """What the kernel of this version shall handle, as its struct."""
     kinds = max(count for first, count in _KINDS.items() if first <= version)
-    fields = [(1 << kinds) - 1 & ~_READ]
-    if version >= _NETWORK_FROM:
-        fields.append(_NETWORK)
-    if version >= _SCOPES_FROM:
-        fields.append(_SCOPES)
+    fields = [(1 << kinds) - 1 & ~_READ, *(all_of for first, all_of in _NETWORK.items() if first <= version)]
     return struct.pack(f"={len(fields)}Q", *fields)

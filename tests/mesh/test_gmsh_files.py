@@ -25,7 +25,7 @@ from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.gmsh_reader import Request
 from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.runtime import cost, processes
-from hvi_fenicsx.runtime.mpi import Interrupt
+from hvi_fenicsx.runtime.mpi import raise_second
 
 TRIANGLE = """Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {0, 1, 0};
 Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 1};
@@ -139,7 +139,7 @@ def test_a_signal_ends_the_meshing(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     temporary.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     handler = signal.getsignal(signal.SIGUSR1)
-    processes.catch([signal.SIGUSR1], Interrupt(MPI.COMM_WORLD)._on_signal)
+    processes.catch([signal.SIGUSR1], raise_second)
     try:
         threading.Thread(target=signalled_while_meshing, args=(temporary,)).start()
         with pytest.raises(Interrupted):
