@@ -27,7 +27,7 @@ from hvi_fenicsx.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.mesh import nodes, refinement
 from hvi_fenicsx.problem.spaces import displacement_space
 from hvi_fenicsx.runtime.cost import Timer
-from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers.method import RunControl
 from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, refined_levels, solve, solve_from_coarser
 from hvi_fenicsx.system.system import System, assemble
 from hvi_fenicsx.workflow import prepare

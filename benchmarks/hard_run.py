@@ -20,8 +20,8 @@ from hvi_fenicsx.certify.certificate import Examination
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.load_paths.following import Control, PathRun
 from hvi_fenicsx.model import PathTable
-from hvi_fenicsx.solvers import SolveContext, SolveResult, registry
-from hvi_fenicsx.solvers.context import RunControl
+from hvi_fenicsx.solvers import SolveContext, SolveResult, method, quadratic
+from hvi_fenicsx.solvers.method import RunControl
 from hvi_fenicsx.workflow import Preparation, finish
 from hvi_fenicsx.workflow.solving import examine
 
@@ -32,7 +32,7 @@ Record = dict[str, Any]
 
 def methods() -> list[str]:
     """All methods there are, and PETSc's own, which the plugin adds."""
-    return list(registry.available())
+    return list(method.available())
 
 
 def attempt(case: Case, data: Mapping[str, Any], method: str, limit: float) -> Record:
@@ -121,7 +121,7 @@ def _unsolved(state: str, found: SolveResult) -> str:
 def _solved(case: Case, data: Mapping[str, Any], prepared: Preparation, control: RunControl) -> SolveResult:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
     context = SolveContext.create(prepared.system, (), prepared.solvability, prepared.options, control)
-    method = registry.choose(prepared.options, prepared.system)(context)
+    method = quadratic.choose(prepared.options, prepared.system)(context)
     begin = hard_scenes.branches(case, prepared, data)
     takes = "branches" in inspect.signature(method.solve).parameters
     try:

@@ -27,11 +27,10 @@ from hvi_fenicsx.runtime import cost
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.solvers.registry import options_of
+from hvi_fenicsx.solvers.method import RunControl, options_of
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system import petsc_options
-from hvi_fenicsx.system.linear_settings import LinearSettings
+from hvi_fenicsx.system.held_solver import LinearSettings
 from hvi_fenicsx.system.system import System, assemble
 from hvi_fenicsx.workflow import finish, prepare
 

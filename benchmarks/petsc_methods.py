@@ -20,8 +20,8 @@ from petsc4py import PETSc
 from hvi_fenicsx.compat import NOT_A_NUMBER
 from hvi_fenicsx.errors import InputError
 from hvi_fenicsx.solvers.condensed import onto_bounds
-from hvi_fenicsx.solvers.context import SolveContext
-from hvi_fenicsx.solvers.method import Counts, Method, SolveResult
+from hvi_fenicsx.solvers.convergence import Counts
+from hvi_fenicsx.solvers.method import Method, SolveContext, SolveResult
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system.held_solver import HeldPreconditioner
 from hvi_fenicsx.system.law_models import VertexModel

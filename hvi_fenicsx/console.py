@@ -14,8 +14,8 @@ from .problem import effect_summary
 from .reduced import loading
 from .rigid import AnyBody, LoadFactors, Mode
 from .runtime.log import percent
-from .solvers import nested_iteration, registry
-from .solvers.method import Counts
+from .solvers import nested_iteration, quadratic
+from .solvers.convergence import Counts
 from .workflow import Preparation, Solution
 
 NO_HISTORY = (
@@ -124,7 +124,7 @@ def solver(prepared: Preparation) -> str:
         "mixed": "MINRES for displacements and pressures with geometric multigrid on the mesh hierarchy",
     }[kind]
     bounds = "" if prepared.problem.bounds else ", no bounds"
-    return f"{registry.choose(prepared.options, prepared.system).description}{bounds}, {linear}"
+    return f"{quadratic.choose(prepared.options, prepared.system).description}{bounds}, {linear}"
 
 
 def outcome(solution: Solution) -> Iterator[str]:

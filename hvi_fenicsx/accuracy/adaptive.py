@@ -24,9 +24,9 @@ from ..problem.problem import Problem
 from ..runtime.cost import Timer
 from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
-from ..solvers.context import Progress, RunControl, never
+from ..solvers.method import Progress, RunControl, never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
-from ..system.levels import Level, Levels
+from ..system.multigrid import Level, Levels
 from ..typing import Array, Entities
 from ..workflow import Preparation, Solution, find_solution, prepare
 

@@ -18,7 +18,7 @@ from ..paths.load_path import LoadPath
 from ..problem import spaces
 from ..runtime.log import newton_step
 from ..schema import Table
-from ..solvers.context import Progress
+from ..solvers.method import Progress
 from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import petsc_options
 from ..workflow import Preparation, Solution

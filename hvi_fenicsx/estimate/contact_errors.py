@@ -15,7 +15,7 @@ from ..certify.certificate import Examination
 from ..certify.contact_state import ContactState
 from ..certify.law_state import LawState
 from ..runtime.mpi import total
-from ..system.levels import Levels
+from ..system.multigrid import Levels
 from ..system.system import System
 from ..typing import Array
 from . import coupled_errors

@@ -22,9 +22,8 @@ from ..problem.problem import Problem
 from ..problem.vectors import turn
 from ..runtime.cost import Timer
 from ..runtime.mpi import total
-from ..system.held_solver import HeldPreconditioner
-from ..system.levels import Levels
-from ..system.linear_settings import LinearSettings
+from ..system.held_solver import HeldPreconditioner, LinearSettings
+from ..system.multigrid import Levels
 from ..system.system import System
 from ..system.thresholds import DEFAULT as SYSTEM
 from ..typing import Array, Entities, Integers

@@ -16,7 +16,7 @@ from ..certify.certificate import Examination
 from ..problem.problem import Problem
 from ..runtime.log import percent
 from ..runtime.mpi import total
-from ..system.levels import Levels
+from ..system.multigrid import Levels
 from ..system.system import System
 from ..typing import Array
 from . import coupled_errors, data_errors, defect, dual_norm, part_ends

@@ -20,8 +20,7 @@ from ..problem.problem import Problem
 from ..reduced import loading
 from ..runtime.log import logger
 from ..solvers import frozen_mixity, obstacle_force
-from ..solvers.context import never
-from ..solvers.method import Borne
+from ..solvers.method import Borne, never
 from ..workflow import LastBorne, Preparation, Solution
 
 _LOG = logger("path")

@@ -1,6 +1,5 @@
 """The solution methods, one module each, and nested iteration."""
 
-from .context import SolveContext
-from .method import Method, SolveResult
+from .method import Method, SolveContext, SolveResult
 
 __all__ = ["Method", "SolveContext", "SolveResult"]

@@ -18,14 +18,13 @@ from petsc4py import PETSc
 from ..compat import NOT_A_NUMBER
 from ..runtime.cost import Timer
 from ..system.equations import LawModel
-from ..system.held_solver import HeldPreconditioner
-from ..system.levels import Levels
-from ..system.linear_settings import LinearSettings
+from ..system.held_solver import HeldPreconditioner, LinearSettings
+from ..system.multigrid import Levels
 from ..system.petsc_options import default_options, prefix, raise_python_error
 from ..system.system import System
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
-from .thresholds import DEFAULT, FULL_STEPS, Thresholds
+from .thresholds import DEFAULT, Thresholds
 
 StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
@@ -419,3 +418,11 @@ class InactiveSolve:
         self._active = found
         self._held.prepare(found)
         return bool(self._held.system.comm.allreduce(moved))
+
+
+FULL_STEPS = "basic"
+"""PETSc's name of the line search that shortens no step."""
+EXACT = "cp"
+"""PETSc's name of the one that looks for where the slope of the energy along a step is zero."""
+ENERGY = "bt"
+"""PETSc's name of the one that backtracks by the energy."""

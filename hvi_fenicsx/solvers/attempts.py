@@ -9,10 +9,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..system.equations import LawModel
-from .active_set import ActiveSetSolver
-from .convergence import Outcome
-from .method import Counts
-from .thresholds import ENERGY
+from .active_set import ENERGY, ActiveSetSolver
+from .convergence import Counts, Outcome
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,9 +20,9 @@ from ..errors import SolverError
 from ..system.law_models import VertexModel
 from . import load_path_start, newton_continuation
 from .branch import BranchIteration
-from .context import SolveContext
+from .convergence import Counts
 from .load_path_start import PathStart
-from .method import Counts, SolveResult
+from .method import SolveContext, SolveResult
 from .resting_start import at_rest, resting_start
 
 

@@ -26,10 +26,9 @@ from ..problem.law_term import LawTerm
 from ..system.law_models import Cells
 from ..system.system import System
 from ..typing import Array
-from .context import SolveContext
-from .convergence import Outcome
+from .convergence import Counts, Outcome
 from .convex_step import UNBOUNDED, ConvexStep, no_step
-from .method import Counts, Method, SolveResult
+from .method import Method, SolveContext, SolveResult
 from .resting_start import resting_start
 
 

@@ -23,8 +23,8 @@ from ..system.interior import PREFIX, Interior
 from ..system.law_models import VertexModel
 from ..system.system import System
 from ..typing import Array, Integers
-from .context import SolveContext
-from .method import Counts, Method, SolveResult
+from .convergence import Counts
+from .method import Method, SolveContext, SolveResult
 
 _STATUS = {
     0: "the evaluations are used up",

@@ -275,3 +275,29 @@ class NetForceTest:
 
     def _blocks(self, values: Array) -> Array:
         return values.reshape(-1, self._d)
+
+
+@dataclass
+class Counts:
+    """Iterations spent.
+
+    Attributes:
+        newton: Newton steps.
+        linear: iterations of linear solvers.
+        branch: convex steps.
+    """
+
+    newton: int = 0
+    linear: int = 0
+    branch: int = 0
+
+    def add_outcome(self, step: Outcome) -> None:
+        """Add the iterations of one solve of the active set solver."""
+        self.newton += step.newton
+        self.linear += step.linear
+
+    def add(self, other: Counts) -> None:
+        """Add the iterations of another method."""
+        self.newton += other.newton
+        self.linear += other.linear
+        self.branch += other.branch

@@ -20,11 +20,10 @@ from ..system import boundedness
 from ..system.law_models import Cells, VertexModel
 from ..typing import Array
 from . import kink_bounds
+from .active_set import ENERGY, EXACT, FULL_STEPS
 from .attempts import Attempt, first_success
-from .context import SolveContext
-from .convergence import Outcome
-from .method import Counts
-from .thresholds import ENERGY, EXACT, FULL_STEPS
+from .convergence import Counts, Outcome
+from .method import SolveContext
 
 UNBOUNDED = "the body slides away on what is left of its bonds"
 

@@ -20,8 +20,8 @@ from ..runtime.mpi import largest
 from ..system.system import System
 from ..typing import Array
 from . import nested_iteration
-from .context import RunControl, SolverOptions
-from .method import Counts
+from .convergence import Counts
+from .method import RunControl, SolverOptions
 from .nested_iteration import LevelSolution
 from .thresholds import DEFAULT
 

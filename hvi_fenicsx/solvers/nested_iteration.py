@@ -18,13 +18,13 @@ from ..mesh.transfer import DegreeTransfer, Transfer
 from ..problem.compose import Formulation
 from ..rigid import Solvability
 from ..runtime.log import logger
-from ..system.levels import Level, Levels, prolongation, with_coarser_system
-from ..system.linear_settings import LinearSettings
+from ..system.held_solver import LinearSettings
+from ..system.multigrid import Level, Levels, prolongation, with_coarser_system
 from ..system.system import System, assemble
 from ..typing import Integers
-from . import registry
-from .context import RunControl, SolveContext, SolverOptions
-from .method import Counts, Method, SolveResult
+from . import quadratic
+from .convergence import Counts
+from .method import Method, RunControl, SolveContext, SolveResult, SolverOptions
 from .quadratic import LinearSolve
 from .thresholds import Thresholds
 
@@ -53,7 +53,7 @@ def linear_settings(system: System, options: SolverOptions) -> LinearSettings:
         system: the assembled problem.
         options: method, linear solver and thresholds.
     """
-    kind = registry.choose(options, system)
+    kind = quadratic.choose(options, system)
     nested = _has_coarser(system, options) and (kind.takes_start or kind is LinearSolve)
     return LinearSettings.choose(system, options.linear_solver, options.thresholds.linear, levels=nested)
 
@@ -79,7 +79,7 @@ def solve(
     Raises:
         SolverError: a convex step raised the energy.
     """
-    kind = registry.choose(options, system)
+    kind = quadratic.choose(options, system)
     nested = _has_coarser(system, options)
     coarser = _coarser_system(model, system, control) if nested and kind.takes_start else None
     if coarser is None:
@@ -114,7 +114,7 @@ def solve_from_coarser(
     """
     if start.result.interrupted or control.interrupted():
         return _stopped(system, start, options.thresholds)
-    kind, found = registry.choose(options, system), start.result
+    kind, found = quadratic.choose(options, system), start.result
     takes = found.converged and kind.takes_start
     first = prolonged(start, system, options.thresholds) if takes else None
     context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
@@ -168,7 +168,7 @@ def solve_from_displacement(
     Raises:
         SolverError: a convex step raised the energy.
     """
-    kind = registry.choose(options, system)
+    kind = quadratic.choose(options, system)
     if not kind.takes_start:
         return solve(model, system, solvability, options, control)
     levels = coarser_levels(model, system, options, control)

@@ -19,8 +19,8 @@ from ..laws.catalogue import LinearSpring
 from ..laws.smoothing import QUADRATIC
 from ..typing import Array
 from .branch import BranchIteration, widths
-from .context import SolveContext
-from .method import Counts, SolveResult
+from .convergence import Counts
+from .method import SolveContext, SolveResult
 
 
 def solve(context: SolveContext) -> SolveResult:

@@ -22,9 +22,9 @@ from ..rigid import Solvability
 from ..runtime.log import logger
 from ..system.system import System
 from ..typing import Array
-from . import nested_iteration, registry
-from .context import RunControl, SolveContext, SolverOptions
-from .method import Counts
+from . import nested_iteration, quadratic
+from .convergence import Counts
+from .method import RunControl, SolveContext, SolverOptions
 from .nested_iteration import CoarseStart, LevelSolution
 
 _LOG = logger("solvers")
@@ -207,7 +207,7 @@ class ObstacleForceSolve:
     def _at(self, way: float, before: LevelSolution) -> LevelSolution:
         """From the solution where the obstacle was before; from the coarse meshes where that fails. Collective."""
         system = self._system.with_obstacle_at(way)
-        kind = registry.choose(self._options, system)
+        kind = quadratic.choose(self._options, system)
         if not kind.takes_start:
             return self._anew(way, None)
         first = system.unknowns(before.result.u)

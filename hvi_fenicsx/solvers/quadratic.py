@@ -13,11 +13,11 @@ from petsc4py import PETSc
 
 from ..system.law_models import VertexModel
 from ..system.system import System
+from .active_set import ENERGY, EXACT, FULL_STEPS
 from .attempts import Attempt, first_success
-from .convergence import Outcome
-from .method import Counts, Method, SolveResult
+from .convergence import Counts, Outcome
+from .method import Method, SolveResult, SolverOptions, find
 from .resting_start import at_rest, resting_start
-from .thresholds import ENERGY, EXACT, FULL_STEPS
 
 
 def is_equation(system: System) -> bool:
@@ -121,3 +121,18 @@ class ConvexProgramme(Method):
             return None
         counts.linear += rested[1]
         return rested[0]
+
+
+def choose(options: SolverOptions, system: System) -> type[Method]:
+    """The method that solves a system: the one that is named, or the simplest that the effects allow.
+
+    Args:
+        options: with the name of the method.
+        system: the assembled problem.
+
+    Raises:
+        InputError: there is no such method.
+    """
+    if options.method == "auto" and is_quadratic(system):
+        return LinearSolve if is_equation(system) else ConvexProgramme
+    return find(options.method)

@@ -20,7 +20,7 @@ from ..system.law_models import Cells, TangentAtRest, VertexModel
 from ..system.system import System
 from ..typing import Array, Integers
 from .active_set import ActiveSetSolver
-from .context import SolveContext
+from .method import SolveContext
 
 
 def contact_dofs(system: System) -> Integers:

@@ -7,13 +7,6 @@ from dataclasses import dataclass, field
 from ..paths.thresholds import FollowingThresholds
 from ..system.thresholds import Thresholds as LinearThresholds
 
-FULL_STEPS = "basic"
-"""PETSc's name of the line search that shortens no step."""
-EXACT = "cp"
-"""PETSc's name of the one that looks for where the slope of the energy along a step is zero."""
-ENERGY = "bt"
-"""PETSc's name of the one that backtracks by the energy."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Thresholds:

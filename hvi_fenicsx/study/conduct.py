@@ -15,7 +15,7 @@ from ..results.output_folder import Existing
 from ..runtime import writing
 from ..runtime.manifest import MARKS
 from ..runtime.mpi import on_root
-from ..solvers.context import never
+from ..solvers.method import never
 from . import pictures
 from .measure import Measurement, Records
 from .plan import Plan

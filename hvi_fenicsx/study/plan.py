@@ -15,8 +15,8 @@ from ..mesh.shapes import DomainShape
 from ..model import Model, SolverTable, dump_scene
 from ..report.units import quantity
 from ..schema import unknown
-from ..solvers import registry
-from ..solvers.registry import options_of
+from ..solvers import method
+from ..solvers.method import options_of
 
 EXACT = "exact"
 """The width of a smoothing that is none."""
@@ -160,7 +160,7 @@ def _default(scene: Model) -> Iterator[Values]:
     if scene.laws():
         yield {"epsilon": ("1", "0.001")}
         yield {**widths, "smoothing": smoothing.available()}
-    yield {"method": registry.available()}
+    yield {"method": method.available()}
     yield {**exact, "tolerance": ("1e-4", "1e-10")}
     yield {**exact, "linear_solver": ("lu", "gamg")}
     yield {**meshes, **exact, "degree": ("2",)}

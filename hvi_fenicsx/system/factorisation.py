@@ -18,7 +18,7 @@ from ..problem.spaces import Dilatation
 from ..runtime.cost import Timer
 from ..typing import Array, Entities, Integers
 from .contact_rows import ContactRows
-from .petsc_options import CHOLESKY, default_options, prefix
+from .petsc_options import CHOLESKY, applied_by, default_options, prefix
 from .system import System
 
 
@@ -245,11 +245,8 @@ class Factorisation:
             thing.destroy()
 
 
-_FACTOR_FLOPS = 3  # RINFOG: operations of the elimination
 _FACTOR_ENTRIES = 29  # INFOG: numbers in the factors; in millions with a minus, where they are many
 _NEGATIVE_PIVOTS = 12  # INFOG
-_FLOPS_PER_ENTRY = 4  # a solve multiplies and adds each number twice, forth and back
-_LEAST = 30.0  # solves; measured: 13 to 45 in the plane, where other things than operations take the time
 
 
 def entries(pc: PETSc.PC) -> float:
@@ -271,20 +268,6 @@ def negative_pivots(pc: PETSc.PC) -> int:
         pc: a symmetric matrix, factorised by MUMPS.
     """
     return int(pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
-
-
-def solves_worth(pc: PETSc.PC) -> float:
-    """Number of right-hand sides whose solution costs as much as the factorisation; 0 where the solver does not tell.
-
-    By operations. In space, by processor time, it is 0.8 to 1.2 of this (648 to 14,739 unknowns).
-
-    Args:
-        pc: a factorised matrix.
-    """
-    if pc.getFactorSolverType() != "mumps":
-        return 0.0
-    flops = pc.getFactorMatrix().getMumpsRinfog(_FACTOR_FLOPS)
-    return float(max(_LEAST, flops / (_FLOPS_PER_ENTRY * max(entries(pc), 1.0))))
 
 
 def without_dilatation(system: System) -> System:
@@ -343,3 +326,42 @@ def _compliance(part: Dilatation) -> PETSc.Mat:
     matrix.assemble()
     found.destroy()
     return matrix
+
+
+class Direct:
+    """The factorised matrix, as a preconditioner. Creation is collective.
+
+    Args:
+        form: of the system's matrix; where motions are free, their pins are always held.
+        options: defaults of the factorisation's options.
+
+    Attributes:
+        matrix: what it preconditions: the matrix that is factorised, or the system's where that has pressures too.
+        pc: the PC.
+    """
+
+    def __init__(self, form: FactorForm, options: Mapping[str, object]) -> None:
+        self._system, matrix = form.system, form.matrix()
+        self._factorisation = Factorisation(form, matrix, options)
+        self._factorisation.allow_negative()
+        self.matrix = form.system.jacobian.matrix if form.has_pressures else matrix
+        self.pc = applied_by(self, self.matrix) if form.has_pressures else self._factorisation.pc
+
+    def prepare(self, held: Entities) -> None:
+        """Take over the system's present matrix, hold these unknowns (local, owned, sorted), factorise. Collective."""
+        self._factorisation.refresh()
+        self._factorisation.factorise(np.union1d(held, self._system.pins))
+
+    def apply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve for y of the load x. Collective.
+
+        Args:
+            x: the load.
+            y: where the displacement is written.
+        """
+        self._factorisation.apply(x, y)
+
+    def free(self) -> None:
+        """Free the PETSc objects."""
+        self.pc.destroy()
+        self._factorisation.free()

@@ -9,23 +9,22 @@ which they are held by their diagonals (:meth:`.Jacobian.hold`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..mesh import nodes
 from ..runtime.cost import Timer
 from ..typing import Array, Entities
-from . import direct, factorisation
-from .direct import Direct
-from .factorisation import FactorForm, form_of
-from .levels import Levels
-from .linear_settings import Kind, LinearSettings
-from .multigrid import Algebraic, MixedMultigrid, Multigrid
-from .petsc_options import configure
+from .factorisation import Direct, FactorForm, form_of
+from .multigrid import Algebraic, Levels, MixedMultigrid, Multigrid
+from .petsc_options import CHOLESKY, configure, prefix
 from .system import System
+from .thresholds import DEFAULT, Thresholds
 
 
 class Preconditioner(Protocol):
@@ -68,9 +67,7 @@ class HeldPreconditioner:
         self._preconditioner: Preconditioner | None = None
         self._form: FactorForm | None = None
         self._kind: Kind | None = None
-        self._factorised = 0
         self._in, self._out = system.load.duplicate(), system.load.duplicate()
-        self._runs: list[tuple[slice, slice]] = []
 
     def prepare(self, held: Entities) -> None:
         """Make it suit these held unknowns (local, owned, sorted). Collective."""
@@ -96,7 +93,7 @@ class HeldPreconditioner:
     def report(self, iterations: int, *, failed: bool = False) -> None:
         """Report how a solve went: where iterations grow or it fails, the preconditioner is outdated.
 
-        A direct solver takes over on small systems where a solve is slow, or algebraic multigrid is made too often.
+        A direct solver takes over on small systems where a solve is slow.
 
         Args:
             iterations: of the solve, the same on all ranks.
@@ -104,83 +101,37 @@ class HeldPreconditioner:
         """
         thresholds = self.settings.thresholds
         self._first_iterations = self._first_iterations or iterations
-        self._outdated = failed or iterations > thresholds.slower * self._first_iterations + 5
-        rebuilt = self.settings.kind == "gamg" and self._factorised > thresholds.slow
-        if (failed or rebuilt or iterations > thresholds.slow) and self.settings.replaceable:
+        self._outdated = failed or iterations > 2 * self._first_iterations
+        if (failed or iterations > thresholds.slow) and self.settings.replaceable:
             self.settings, self._outdated = LinearSettings("lu", thresholds), True
 
     def _build(self, held: Entities) -> None:
-        kind, condensing = self.settings.kind, self._condensing
-        if kind != self._kind or self._preconditioner is None or (condensing and not self._condensed):
-            self._free_preconditioner()
-            self._preconditioner, self._kind, self._factorised = self._new(condensing=condensing), kind, 0
+        if self.settings.kind != self._kind or self._preconditioner is None:
+            self.destroy()
+            self._preconditioner, self._kind = self._new(), self.settings.kind
         self._preconditioner.prepare(held)
-        self._factorised += 1
 
     @property
     def inner_iterations(self) -> int:
         """Iterations so far of the solves that one application of the preconditioner consists of."""
         return self._preconditioner.iterations if isinstance(self._preconditioner, MixedMultigrid) else 0
 
-    @property
-    def _condensing(self) -> bool:
-        """Whether the body is to be condensed. Collective."""
-        if not isinstance(self._preconditioner, Direct):
-            return self._condensed
-        worth = factorisation.solves_worth(self._preconditioner.factors)
-        return direct.is_worthwhile(self.system, self._factorised * worth)
-
-    @property
-    def _condensed(self) -> bool:
-        return isinstance(self._preconditioner, direct.SchurDirect)
-
-    def _new(self, *, condensing: bool) -> Preconditioner:
-        """A new preconditioner; condensing, one factorisation of the body serves all matrices that differ on Γc."""
-        if condensing:
-            return direct.SchurDirect(self._factored_form, self.settings.pc)
+    def _new(self) -> Preconditioner:
         if self.settings.kind == "mg":
             return Multigrid(self.system, self.levels, self.settings.pc)
         if self.settings.kind == "mixed":
             return MixedMultigrid(self.system, self.levels, self.settings.pc)
-        if self.settings.kind == "lu":
-            return Direct(self._factored_form, self.settings.pc)
-        return Algebraic(self.system, self.settings.pc)
-
-    @property
-    def _factored_form(self) -> FactorForm:
-        """The form in which the matrix is factorised. Collective when first used."""
-        if self._form is None:
-            self._form = form_of(self.system)
-        return self._form
+        if self.settings.kind == "gamg":
+            return Algebraic(self.system, self.settings.pc)
+        self._form = form_of(self.system)
+        return Direct(self._form, self.settings.pc)
 
     def destroy(self) -> None:
         """Free the PETSc objects. Collective."""
-        self._free_preconditioner()
-        if self._form is not None:
-            self._form.free()
-        self._form = None
-
-    def _free_preconditioner(self) -> None:
-        if self._preconditioner is not None:
-            self._preconditioner.free()
-        self._preconditioner = self._held = None
-
-    def select(self, inactive: PETSc.IS) -> None:
-        """Choose the dofs of which reduced vectors consist from now on."""
-        self._runs = list(consecutive_runs(inactive.getIndices() - self.system.load.owner_range[0]))
-        self._in.set(0.0)
-
-    def apply_reduced(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Apply the preconditioner, y = P^-1 x, on the selected dofs. Collective.
-
-        Args:
-            x: a reduced vector.
-            y: where the result is written, reduced too.
-        """
-        self._spread(x)
-        self._in.array[self.system.pins] = 0.0
-        self._preconditioner.pc.apply(self._in, self._out)  # type: ignore[union-attr]
-        self._collect(y)
+        for thing in (self._preconditioner, self._form):
+            if thing is not None:
+                thing.free()
+        self._preconditioner = self._form = self._held = None
 
     def solve_reduced(self, inactive: PETSc.IS, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
         """As :meth:`solve`, on the dofs that are not held. Collective.
@@ -194,22 +145,12 @@ class HeldPreconditioner:
         Returns:
             Iterations, and PETSc's reason for the end.
         """
-        self.select(inactive)
-        self._spread(load)
+        free = inactive.getIndices() - self.system.load.owner_range[0]
+        self._in.set(0.0)
+        self._in.array[free] = load.array_r
         ended = self.solve(self._in, self._out, rtol)
-        self._collect(x)
+        x.array[:] = self._out.array_r[free]
         return ended
-
-    def _spread(self, x: PETSc.Vec) -> None:
-        """Write a reduced vector into the one at full size, in which all others are zero."""
-        whole, part = self._in.array, x.array_r
-        for at, of in self._runs:
-            whole[at] = part[of]
-
-    def _collect(self, y: PETSc.Vec) -> None:
-        whole, part = self._out.array_r, y.array
-        for at, of in self._runs:
-            part[of] = whole[at]
 
     def solve(self, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
         """Solve with the matrix in which unknowns are held. Collective.
@@ -250,14 +191,6 @@ class HeldPreconditioner:
             held = np.union1d(self._wanted, self.system.pins)
             set_up(ksp, self.system.jacobian.matrix, self._preconditioner.pc, held)
         return ksp
-
-
-def consecutive_runs(chosen: Entities) -> Iterator[tuple[slice, slice]]:
-    """Runs of consecutive dofs, in the whole and in the reduced vector: far faster to copy than dof by dof."""
-    breaks = np.flatnonzero(np.diff(chosen) != 1) + 1
-    for run in np.split(np.arange(len(chosen)), breaks) if len(chosen) else []:
-        begin, end = int(run[0]), int(run[-1]) + 1
-        yield slice(int(chosen[begin]), int(chosen[end - 1]) + 1), slice(begin, end)
 
 
 class _Matrix:
@@ -304,3 +237,101 @@ def set_up(ksp: PETSc.KSP, whole: PETSc.Mat, inner: PETSc.PC, held: Entities) ->
     pc.setPythonContext(_Preconditioner(inner, held))
     ksp.setPC(pc)
     ksp.setOperators(matrix)
+
+
+Kind = Literal["lu", "gamg", "mg", "mixed"]
+_GAMG: dict[str, object] = {
+    "pc_type": "gamg",
+    "pc_gamg_threshold": 0.01,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_pc_type": "jacobi",
+    "pc_gamg_coarse_eq_limit": 200,
+}
+_MG: dict[str, object] = {
+    "pc_type": "mg",
+    "mg_levels_ksp_type": "richardson",
+    "mg_levels_ksp_max_it": 1,
+    "mg_levels_ksp_norm_type": "none",
+    "mg_levels_pc_type": "sor",
+    "mg_levels_pc_sor_local_symmetric": None,
+    "mg_coarse_ksp_type": "preonly",
+    "mg_coarse_pc_type": "telescope",
+    "mg_coarse_telescope_ksp_type": "preonly",
+    "mg_coarse_telescope_pc_type": "lu",
+}
+_EXACT = (PETSc.PC.Type.CHOLESKY, PETSc.PC.Type.LU, PETSc.PC.Type.PYTHON)
+"""Types of a direct solver; the last is one of ours, which applies factors."""
+_OF_OTHER_NORM = ("minres", "symmlq")
+"""Methods that end by the norm of the preconditioned residual; PETSc refuses that of the residual itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinearSettings:
+    """How linear systems are solved.
+
+    Attributes:
+        kind: a factorisation (lu), algebraic multigrid (gamg), geometric multigrid (mg), or that with averaged
+            pressures as unknowns (mixed).
+        thresholds: when another kind takes over, and when a preconditioner is made anew.
+        replaceable: whether the system is small enough for a direct solver to take over.
+    """
+
+    kind: Kind
+    thresholds: Thresholds = DEFAULT
+    replaceable: bool = False
+
+    @classmethod
+    def choose(
+        cls,
+        system: System,
+        wanted: Literal["auto", "lu", "gamg"] = "auto",
+        thresholds: Thresholds = DEFAULT,
+        *,
+        levels: bool = False,
+    ) -> LinearSettings:
+        """The solver that suits the number of unknowns, and nearly incompressible bodies.
+
+        Args:
+            system: the system to be solved.
+            wanted: what the user wants.
+            thresholds: up to which size a direct solver is used.
+            levels: whether the system has coarser levels when it is solved.
+        """
+        small = system.dofs <= thresholds.largest_direct[system.problem.scales.dimension]
+        if wanted != "auto":
+            return cls(wanted, thresholds, small)
+        stiff, degree = system.problem.bulk.volumetric_ratio, nodes.degree(system.problem.space)
+        if levels and system.free_motions is None:
+            if stiff <= thresholds.volumetric_ratio:
+                return cls("mg", thresholds, small)
+            if degree > 1:
+                return cls("mixed", thresholds)
+        if stiff > 0.0:
+            return cls("lu", thresholds)
+        return cls("lu" if small else "gamg", thresholds)
+
+    def ksp(self, pc: PETSc.PC) -> dict[str, str]:
+        """Default options of the Krylov method.
+
+        Args:
+            pc: the preconditioner; in the place of a factorisation the user may have chosen another one.
+        """
+        if self.kind == "lu" and pc.getType() in _EXACT:
+            return {"ksp_type": "preonly"}
+        # where a start is already a solution, PETSc's flexible CG (fcg) is freed without having been set up, and fails
+        method = "fgmres" if self.kind == "mixed" else "cg"
+        if PETSc.Options().getString(f"{prefix()}ksp_type", method) in _OF_OTHER_NORM:
+            return {"ksp_type": method}
+        return {"ksp_type": method, "ksp_norm_type": "unpreconditioned"}
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the Krylov method at most."""
+        if self.kind == "mixed":
+            return self.thresholds.replaced_iterations
+        return self.thresholds.replaced_iterations if self.replaceable else self.thresholds.krylov_iterations
+
+    @property
+    def pc(self) -> Mapping[str, object]:
+        """Default options of the preconditioner."""
+        return {"lu": CHOLESKY, "gamg": _GAMG, "mg": _MG, "mixed": _MG}[self.kind]

@@ -16,8 +16,7 @@ from ..problem.problem import Problem
 from ..rigid import LoadFactors, Solvability
 from ..runtime.cost import Timer
 from ..runtime.log import logger, warn
-from ..solvers.context import SolverOptions
-from ..solvers.registry import options_of
+from ..solvers.method import SolverOptions, options_of
 from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import existence
 from ..system.system import System, assemble

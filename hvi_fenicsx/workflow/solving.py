@@ -18,13 +18,12 @@ from ..model import Model
 from ..runtime.cost import Timer
 from ..runtime.log import logger, newton_step, warn
 from ..solvers import frozen_mixity, nested_iteration, obstacle_force
-from ..solvers.context import Progress, RunControl, never
-from ..solvers.method import SolveResult
+from ..solvers.method import Progress, RunControl, SolveResult, never
 from ..solvers.nested_iteration import CoarseStart, LevelSolution
 from ..solvers.obstacle_force import ObstacleBalance
 from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import free_motions
-from ..system.levels import Levels
+from ..system.multigrid import Levels
 from .preparation import Preparation, prepare
 from .solution import Solution
 

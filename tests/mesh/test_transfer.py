@@ -21,7 +21,7 @@ from hvi_fenicsx.mesh.thresholds import DEFAULT as MESH
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.resting_start import contact_dofs
-from hvi_fenicsx.system.linear_settings import LinearSettings
+from hvi_fenicsx.system.held_solver import LinearSettings
 
 DEMOS = Path(__file__).parents[2] / "demos"
 SHAPES: list[tuple[list[float], list[int]]] = [

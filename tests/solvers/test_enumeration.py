@@ -20,7 +20,7 @@ from scenes import DELTA, Table, block, context_of, displacement, energy, far, m
 
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.certify.certificate import Certificate, examine
-from hvi_fenicsx.solvers import registry
+from hvi_fenicsx.solvers import quadratic
 from hvi_fenicsx.workflow import Preparation, Solution
 
 Array = npt.NDArray[np.float64]
@@ -166,7 +166,7 @@ def test_from_the_wrong_branch_the_solver_ends_in_the_list(case: Case) -> None:
 def reached(case: Case, u: Array) -> list[Point]:
     """The points of the list that the solver reaches from a start."""
     ready = prepared(case)
-    method = registry.choose(ready.options, ready.system)(context_of(ready))
+    method = quadratic.choose(ready.options, ready.system)(context_of(ready))
     start = ready.system.load.duplicate()
     start.array[:] = as_function(case, u).x.array
     found = method.solve(start)

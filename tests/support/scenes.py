@@ -10,7 +10,7 @@ import numpy.typing as npt
 from hvi_fenicsx import Solution, read_tables, solve
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
-from hvi_fenicsx.solvers.context import RunControl, SolveContext
+from hvi_fenicsx.solvers.method import RunControl, SolveContext
 from hvi_fenicsx.solvers.nested_iteration import LevelSolution
 from hvi_fenicsx.solvers.thresholds import DEFAULT, Thresholds
 from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds

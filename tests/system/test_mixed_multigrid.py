@@ -14,10 +14,9 @@ from scenes import NESTED, Table, model, two_blocks
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
-from hvi_fenicsx.solvers.context import RunControl
-from hvi_fenicsx.system.held_solver import HeldPreconditioner
-from hvi_fenicsx.system.levels import Levels
-from hvi_fenicsx.system.linear_settings import LinearSettings
+from hvi_fenicsx.solvers.method import RunControl
+from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
+from hvi_fenicsx.system.multigrid import Levels
 from hvi_fenicsx.workflow import Preparation
 
 
