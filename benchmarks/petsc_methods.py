@@ -237,19 +237,24 @@ class _ReducedPC:
 
     def __init__(self, held: HeldPreconditioner, counts: Counts) -> None:
         self._held, self._counts = held, counts
+        self._in, self._out = held.system.load.duplicate(), held.system.load.duplicate()
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Find the inactive rows and prepare for them."""
         rows = np.round(pc.getOperators()[1].getDiagonal().array_r).astype(PETSc.IntType)
-        self._held.select(PETSc.IS().createGeneral(rows, comm=pc.comm))
         start, end = self._held.system.load.owner_range
+        self._rows = rows - start
+        self._in.set(0.0)
         active = np.setdiff1d(np.arange(start, end), rows, assume_unique=True)
         self._held.prepare((active - start).astype(np.int32))
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Apply the preconditioner, y = P^-1 x, on the inactive rows."""
         self._counts.linear += 1  # one for each conjugate gradient step; TAO has the number of the last solve only
-        self._held.apply_reduced(x, y)
+        self._in.array[self._rows] = x.array_r
+        self._in.array[self._held.system.pins] = 0.0
+        self._held.pc.apply(self._in, self._out)
+        y.array[:] = self._out.array_r[self._rows]
 
 
 class BoundedNewton(SmoothMethod):

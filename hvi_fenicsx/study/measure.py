@@ -27,6 +27,7 @@ from ..runtime import log
 from ..runtime.cost import Timer
 from ..runtime.manifest import __version__
 from ..runtime.mpi import largest, on_root, time_over
+from ..runtime.writing import Journal, Record
 from ..solvers.method import never
 from ..workflow import Solution, find_solution, prepare
 from .errors import Fields, ReferenceSolution, stiffness

@@ -112,6 +112,12 @@ class HeldPreconditioner:
         self._preconditioner.prepare(held)
 
     @property
+    def pc(self) -> PETSc.PC:
+        """The preconditioner as it is prepared."""
+        assert self._preconditioner is not None
+        return self._preconditioner.pc
+
+    @property
     def inner_iterations(self) -> int:
         """Iterations so far of the solves that one application of the preconditioner consists of."""
         return self._preconditioner.iterations if isinstance(self._preconditioner, MixedMultigrid) else 0
