@@ -194,18 +194,15 @@ def stand_back() -> None:
             os.sched_setaffinity(0, range(os.cpu_count() or 1))
 
 
-def end(child: subprocess.Popen[str], patience: float) -> None:
-    """End a child that leads a process group: by SIGTERM first, so that it and its own children can clean up.
+def end(child: subprocess.Popen[str]) -> None:
+    """End a child that leads a process group, and its own children with it; none of them may catch SIGTERM for long.
 
     Args:
         child: the process.
-        patience: how long to wait for its end before SIGKILL, s.
     """
-    for number in (signal.SIGTERM, signal.SIGKILL):
-        with contextlib.suppress(OSError):
-            os.killpg(child.pid, number)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            child.communicate(timeout=patience)
+    with contextlib.suppress(OSError):
+        os.killpg(child.pid, signal.SIGTERM)
+    child.communicate()
 
 
 _CREATE_RULESET, _RESTRICT_SELF = 444, 446

@@ -1,25 +1,31 @@
 """How far solutions are from the reference solution: relative errors of the quantities that people ask for.
 
-Every solution is first brought onto the reference's nodes (:mod:`.transfer`), where the energy norm is that of the
-reference's stiffness and integrals over Γc are sums over its lumped areas.
+Every solution is first brought onto the reference's nodes, where the energy norm is that of the reference's stiffness
+and integrals over Γc are sums over its lumped areas: exactly where the meshes are nested. A node takes the field of its
+own body: where two meet, both have cells at it. Where the meshes are not nested (curved boundaries, meshes made anew) a
+node outside of all cells takes its nearest cell's field, continued.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+import basix
 import numpy as np
+from dolfinx import fem, geometry
+from mpi4py import MPI
 from scipy import sparse, spatial
+from scipy.sparse import csgraph
 
-from ..accuracy.quantity_base import ORDERS
+from .. import compat
+from ..mesh import nodes, transfer
 from ..problem import spaces
 from ..report.solution_arrays import ContactPart, SolutionArrays
 from ..runtime.mpi import joined
-from ..typing import Array, Mask
+from ..typing import Array, Integers, Mask
 from ..workflow import Solution
-from .transfer import BodyTransfer, edge_ends, rows_of, surface
 
 NORMS: Mapping[str, tuple[str, str]] = {
     "energy_norm": ("displacement, energy norm", "the energy norm"),
@@ -39,8 +45,7 @@ Errors = Mapping[str, float | None]
 """Relative errors by the keys of :data:`NORMS`; None where there is nothing to measure."""
 JUMP_FACETS = 2
 """So many facets of the coarser mesh about a jump of the law count as near it."""
-_ROUNDING = 1e-12
-"""Relative: no smaller error can be measured."""
+_KINDS = {1: "interval", 2: "triangle", 3: "tetrahedron"}
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ class ReferenceSolution:
 
     def __init__(self, arrays: SolutionArrays, stiffness: sparse.csr_array, joints: Collection[str] = ()) -> None:
         self._arrays, self._stiffness, self._joints = arrays, stiffness, joints
-        self._ends, self._transfers = edge_ends(arrays), dict[bytes, _Transfer]()
+        self._ends, self._transfers = edge_ends(arrays), dict[bytes, tuple[BodyTransfer, dict[str, sparse.csr_array]]]()
         self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[arrays.points.shape[1]]
         parts, d = arrays.parts.values(), arrays.points.shape[1]
         self._weights = np.concatenate([np.empty(0), *(part.weight for part in parts)])
@@ -134,30 +139,22 @@ class ReferenceSolution:
             other: from which it is measured; the reference where it is None.
         """
         true, other, weights = self.own, other or self.own, self._weights
+        friction, pressure = found.friction - other.friction, (found.pressure - other.pressure)[:, None]
+        differences = {"u_t": found.slip - other.slip, "friction": friction, "pressure": pressure}
+        fields = {"u_t": true.slip, "friction": true.friction, "pressure": true.pressure[:, None]}
+        sizes = {f"{name}_{norm}": size for name, v in fields.items() for norm, size in _norms(v, weights).items()}
+        far = {f"{name}_{norm}": size for name, v in differences.items() for norm, size in _norms(v, weights).items()}
+        told = {key: _ratio(far[key], size) for key, size in sizes.items()}
         away = ~self.near_jump(found)
-        friction, normal = found.friction - other.friction, found.pressure - other.pressure
-        slips = _norms(found.slip - other.slip, weights), _norms(true.slip, weights)
-        frictions = _norms(friction, weights), _norms(true.friction, weights)
-        pressures = _norms(normal[:, None], weights), _norms(true.pressure[:, None], weights)
-        largest = _norms(friction[away], weights[away])[2] if away.any() else None
+        largest = _norms(friction[away], weights[away])["max"]
+        told["friction_max"] = _ratio(largest, sizes["friction_max"]) if away.any() else None
+        told["energy_norm"] = _ratio(self.energy(found.u - other.u), self.energy(true.u))
         wrong, closed = weights[found.closed != other.closed].sum(), weights[true.closed].sum()
-        forces = [np.linalg.norm(weights @ force) for force in (normal[:, None] * self._normals, friction)]
-        return {
-            "energy_norm": _ratio(self.energy(found.u - other.u), self.energy(true.u)),
-            "u_t_l2": _ratio(slips[0][1], slips[1][1]),
-            "u_t_max": _ratio(slips[0][2], slips[1][2]),
-            "friction_l1": _ratio(frictions[0][0], frictions[1][0]),
-            "friction_l2": _ratio(frictions[0][1], frictions[1][1]),
-            "friction_max": None if largest is None else _ratio(largest, frictions[1][2]),
-            "pressure_l1": _ratio(pressures[0][0], pressures[1][0]),
-            "pressure_l2": _ratio(pressures[0][1], pressures[1][1]),
-            "contact_set": _ratio(wrong, closed) if self._bounded else None,
-            "resultant": _ratio(float(forces[0]), pressures[1][0]),
-            "friction_force": _ratio(float(forces[1]), frictions[1][0]),
-        }
-
-
-_Transfer = tuple[BodyTransfer, Mapping[str, sparse.csr_array]]
+        told["contact_set"] = _ratio(wrong, closed) if self._bounded else None
+        forces = [float(np.linalg.norm(weights @ force)) for force in (pressure * self._normals, friction)]
+        told["resultant"] = _ratio(forces[0], sizes["pressure_l1"])
+        told["friction_force"] = _ratio(forces[1], sizes["friction_l1"])
+        return {key: told[key] for key in NORMS}
 
 
 def _tractions(part: ContactPart) -> Array:
@@ -185,10 +182,11 @@ def _from_jump(arrays: SolutionArrays, part: ContactPart) -> Array:
     return np.asarray(spatial.KDTree(part.x[facets[passed]].mean(axis=1)).query(part.x)[0])
 
 
-def _norms(vectors: Array, weights: Array) -> tuple[float, float, float]:
+def _norms(vectors: Array, weights: Array) -> dict[str, float]:
     """L1, L2 and the largest length of vectors (m, d)."""
     lengths = np.linalg.norm(vectors, axis=1)
-    return float(weights @ lengths), math.sqrt(float(weights @ lengths**2)), float(np.max(lengths, initial=0.0))
+    l2, largest = math.sqrt(float(weights @ lengths**2)), float(np.max(lengths, initial=0.0))
+    return {"l1": float(weights @ lengths), "l2": l2, "max": largest}
 
 
 def _ratio(error: float, size: float) -> float | None:
@@ -210,36 +208,123 @@ def stiffness(solution: Solution) -> sparse.csr_array | None:
     return None if comm.rank else sparse.csr_array((values, columns, np.append(0, np.cumsum(counts))), (size, size))
 
 
-@dataclass(frozen=True)
-class Certainty:
-    """How well the reference is known in one quantity.
-
-    Attributes:
-        error: the reference's own relative error; None where it is not known.
-        order: in h, measured on the next coarser levels; None where it is not known.
-    """
-
-    error: float | None
-    order: float | None
+def cells_of(arrays: SolutionArrays) -> Integers:
+    """The cells of a solution by their nodes, corners first, (c, nodes)."""
+    return arrays.cells if arrays.degree == 1 else nodes.joined(arrays.cells)
 
 
-def certainty(coarser: Sequence[Errors]) -> Mapping[str, Certainty]:
-    """How well the reference is known, by quantity, from two coarser levels by Richardson's extrapolation.
+def edge_ends(arrays: SolutionArrays) -> Integers:
+    """The vertices whose middle each node is, (n, 2); a vertex is named twice."""
+    cells, d = cells_of(arrays), arrays.points.shape[1]
+    found = np.repeat(np.arange(len(arrays.points))[:, None], 2, axis=1)
+    edges = basix.topology(basix.CellType[_KINDS[d]])[1]
+    for node, ends in zip(cells.T[d + 1 :], edges, strict=False):
+        found[node] = cells[:, list(ends)]
+    return found
 
-    With e' and e'' their errors against it, and errors that fall as C hᵖ, e''/e' = 2ᵖ + 1, and its own is e'/(2ᵖ - 1)
-    (Roache 1998, *Verification and Validation in Computational Science and Engineering*). In the energy norm the
-    differences of nested Galerkin solutions are orthogonal, so the same holds of the squares, with 4ᵖ for 2ᵖ.
+
+def mesh_width(arrays: SolutionArrays) -> float:
+    """The edge of an equilateral cell as large as the largest one, m: it halves where a mesh is refined uniformly."""
+    d = arrays.points.shape[1]
+    corners = arrays.points[cells_of(arrays)[:, : d + 1]]
+    largest = float(np.max(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])), initial=0.0))
+    return float((largest * (2.0 / np.sqrt(3.0) if d == 2 else np.sqrt(2.0))) ** (1.0 / d))
+
+
+class BodyTransfer:
+    """From the nodes of a mesh to those of another one of the same bodies. On this process alone.
 
     Args:
-        coarser: the errors of the next coarser levels against the reference, finest first.
+        source: a solution on the mesh.
+        target: one on the other mesh.
     """
-    return {key: _certainty([e[key] for e in coarser], 2 if key == "energy_norm" else 1) for key in NORMS}
+
+    def __init__(self, source: SolutionArrays, target: SolutionArrays) -> None:
+        self._shape = target.points.shape
+        cells, bodies, wanted = cells_of(source), _bodies(source), _bodies(target)
+        boxes = _boxes(source, bodies)
+        self._pieces: list[tuple[Integers, _Body]] = []
+        for body, box in enumerate(_boxes(target, wanted)):
+            same = np.argmin(np.linalg.norm(boxes - box, axis=1))
+            rows = np.flatnonzero(wanted == body)
+            self._pieces.append((rows, _Body(source.points, cells[bodies[cells[:, 0]] == same], target.points[rows])))
+
+    def __call__(self, values: Array) -> Array:
+        """Vectors at the nodes of the target, from those at the nodes of the source."""
+        found = np.empty(self._shape)
+        for rows, body in self._pieces:
+            found[rows] = body(values)
+        return found
 
 
-def _certainty(errors: Sequence[float | None], power: int) -> Certainty:
-    known = [e**power for e in errors if e is not None]
-    if not known or known[0] <= _ROUNDING**power:
-        return Certainty(_ROUNDING if known else None, None)
-    order = math.log2(known[1] / known[0] - 1.0) / power if len(known) > 1 and known[1] > known[0] else None
-    believed = float(np.clip(ORDERS[0] if order is None else order, *ORDERS))
-    return Certainty(max(_ROUNDING, (known[0] / (2.0 ** (power * believed) - 1.0)) ** (1.0 / power)), order)
+def _bodies(arrays: SolutionArrays) -> Integers:
+    """Numbers of the connected meshes that the nodes belong to, (n,)."""
+    cells = cells_of(arrays)
+    first, size = np.repeat(cells[:, 0], cells.shape[1]), len(arrays.points)
+    graph = sparse.coo_array((np.ones(cells.size, dtype=np.int8), (first, cells.ravel())), shape=(size, size))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _boxes(arrays: SolutionArrays, bodies: Integers) -> Array:
+    """The ends of each body along the axes, m, (bodies, 2d)."""
+    points = (arrays.points[bodies == body] for body in range(bodies.max() + 1))
+    return np.array([np.concatenate([own.min(axis=0), own.max(axis=0)]) for own in points])
+
+
+class _Body:
+    """A body's mesh, on this process alone, and points in it; its functions have the degree of its cells."""
+
+    def __init__(self, vertices: Array, cells: Integers, points: Array) -> None:
+        self._kept, local = np.unique(cells, return_inverse=True)
+        d, degree = vertices.shape[1], 1 if cells.shape[1] == vertices.shape[1] + 1 else 2
+        mesh = compat.simplex_mesh(
+            MPI.COMM_SELF, local.reshape(cells.shape), vertices[self._kept], _KINDS[d], degree=degree
+        )
+        self._points = _in_space(points)
+        self._cells = transfer.containing_cells(mesh, self._points).astype(np.int32)
+        self._field = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, (d,))))
+        self._nodes = self._kept[mesh.geometry.input_global_indices[compat.geometry_dofmap(mesh)]]
+
+    def __call__(self, values: Array) -> Array:
+        """Vectors (m, d) at the points, from those at all nodes of the source."""
+        d = values.shape[1]
+        self._field.x.array.reshape(-1, d)[self._field.function_space.dofmap.list] = values[self._nodes]
+        return np.asarray(self._field.eval(self._points, self._cells)).reshape(-1, d)
+
+
+def rows_of(arrays: SolutionArrays, part: ContactPart) -> Integers:
+    """The row that each node of a solution has in a part, (n,); any number where it has none.
+
+    Args:
+        arrays: the solution.
+        part: of it.
+    """
+    found = np.empty(len(arrays.points), dtype=np.int64)
+    found[part.vertices] = np.arange(len(part.vertices))
+    return found
+
+
+def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.csr_array:
+    """The matrix from a part's rows (n) to points on it (m) of what is linear between neighbouring nodes, as tractions.
+
+    Args:
+        source: the solution.
+        part: of it.
+        points: m, (m, d).
+    """
+    kept, local = np.unique(part.facets, return_inverse=True)
+    d = points.shape[1]
+    line = compat.simplex_mesh(MPI.COMM_SELF, local.reshape(-1, d), source.points[kept], _KINDS[d - 1])
+    tree = geometry.bb_tree(line, d - 1)
+    middles = geometry.create_midpoint_tree(line, d - 1, np.arange(len(part.facets), dtype=np.int32))
+    nearest = geometry.compute_closest_entity(tree, middles, line, _in_space(points))
+    corners = part.facets[line.topology.original_cell_index[nearest]]
+    weights = transfer.clipped(transfer.barycentric_weights(source.points[corners], points))
+    starts = np.arange(0, corners.size + 1, d)
+    return sparse.csr_array(
+        (weights.ravel(), rows_of(source, part)[corners].ravel(), starts), (len(points), len(part.vertices))
+    )
+
+
+def _in_space(points: Array) -> Array:
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))

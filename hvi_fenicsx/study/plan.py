@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,6 +54,14 @@ class Point:
 
     scene: Model
     accuracy: float | None = None
+
+    @property
+    def name(self) -> str:
+        """A digest of its scene and the mesh file's content."""
+        digest = hashlib.sha256(f"{self.accuracy}\n{dump_scene(self.scene)}".encode())
+        for file in self.scene.files():
+            digest.update(file.read_bytes())
+        return digest.hexdigest()[:16]
 
     @property
     def mesh(self) -> str:

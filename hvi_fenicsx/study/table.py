@@ -5,26 +5,66 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
+from ..accuracy.quantity_base import ORDERS
 from ..errors import ExitCode, InputError
 from ..model import SolverTable
 from ..runtime.log import percent
 from ..runtime.manifest import __version__, versions
 from ..schema import unknown
-from .errors import NORMS, Certainty, Errors, certainty
-from .measure import PHASES, Records, name_of
+from .errors import NORMS, Errors
 from .plan import Plan, Point, law_text
 
-Certain = Mapping[str, Certainty]
-"""How well the reference is known, by quantity."""
+PHASES = ("mesh", "assembly", "setup", "solve", "certificate")
+"""What a point costs: compilation is paid once for all, and a study writes no results."""
+
+_LEAST = np.finfo(float).eps
+"""Relative: no smaller error can be measured."""
 RESOLVED = 2
 """An error tells an order of convergence if it is so many times the reference's own."""
 _TARGETS = (0.1, 0.01, 0.001)
 """The relative errors whose cost is named."""
 _HEADLINES = ("energy_norm", "u_t_l2", "friction_l1", "pressure_l1")
+
+
+@dataclass(frozen=True)
+class Certainty:
+    """How well the reference is known in one quantity.
+
+    Attributes:
+        error: the reference's own relative error; None where it is not known.
+        order: in h, measured on the next coarser levels; None where it is not known.
+    """
+
+    error: float | None
+    order: float | None
+
+
+def certainty(coarser: Sequence[Errors]) -> Mapping[str, Certainty]:
+    """How well the reference is known, by quantity, from two coarser levels by Richardson's extrapolation.
+
+    With e' and e'' their errors against it, and errors that fall as C hᵖ, e''/e' = 2ᵖ + 1, and its own is e'/(2ᵖ - 1)
+    (Roache 1998, *Verification and Validation in Computational Science and Engineering*). In the energy norm the
+    differences of nested Galerkin solutions are orthogonal, so the same holds of the squares, with 4ᵖ for 2ᵖ.
+
+    Args:
+        coarser: the errors of the next coarser levels against the reference, finest first.
+    """
+    return {key: _certainty([e[key] for e in coarser], 2 if key == "energy_norm" else 1) for key in NORMS}
+
+
+def _certainty(errors: Sequence[float | None], power: int) -> Certainty:
+    known = [e**power for e in errors if e is not None]
+    if not known or known[0] <= _LEAST**power:
+        return Certainty(_LEAST if known else None, None)
+    order = math.log2(known[1] / known[0] - 1.0) / power if len(known) > 1 and known[1] > known[0] else None
+    believed = float(np.clip(ORDERS[0] if order is None else order, *ORDERS))
+    return Certainty(max(_LEAST, (known[0] / (2.0 ** (power * believed) - 1.0)) ** (1.0 / power)), order)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +171,7 @@ class Study:
     rows: tuple[Row, ...]
     own: Row
     exact: Row
-    certain: Certain
+    certain: Mapping[str, Certainty]
     reference: Row
     coarser: tuple[Errors, ...]
     left_out: tuple[str, ...]
@@ -189,11 +229,6 @@ class Study:
         """What the study says in words that a person can act on."""
         return tuple(_sentences(self))
 
-    @property
-    def uncertainty(self) -> dict[str, float | None]:
-        """How far the reference may be from the truth, relative, by quantity; None where it is not known."""
-        return {name: known.error for name, known in self.certain.items()}
-
     def __repr__(self) -> str:
         return "\n".join(self.sentences)
 
@@ -243,50 +278,43 @@ def _flat(row: Row) -> dict[str, Any]:
     return {**plain, "beyond_reference": " ".join(row.beyond_reference)}
 
 
-def evaluate(plan: Plan, records: Records, ranks: int) -> Study:
+def evaluate(plan: Plan, known: Mapping[str, Mapping[str, Any]], ranks: int) -> Study:
     """The study of points that were measured; rank 0 only.
 
     Args:
         plan: what was run.
-        records: what was found.
+        known: what was found, by the names of the points.
         ranks: that solved the points.
     """
     finest, *coarser = plan.reference
-    known = [records.known[name_of(point)].get("errors") for point in coarser]
-    levels = tuple(errors for errors in known if errors is not None)
+    levels = tuple(errors for point in coarser if (errors := known[point.name].get("errors")) is not None)
     certain = certainty(levels)
-    rows = {name_of(point): _row(point, records, certain) for point in plan.points}
+    rows = {point.name: _row(point, known[point.name], certain) for point in plan.points}
     return Study(
         title=plan.own.scene.title,
         rows=tuple(rows.values()),
-        own=rows[name_of(plan.own)],
-        exact=rows[name_of(plan.exact)],
+        own=rows[plan.own.name],
+        exact=rows[plan.exact.name],
         certain=certain,
-        reference=_row(finest, records, certain),
+        reference=_row(finest, known[finest.name], certain),
         coarser=levels,
         left_out=plan.left_out,
         ranks=ranks,
     )
 
 
-def _row(point: Point, records: Records, certain: Certain) -> Row:
+_OF_SOLVER = ("smoothing", "epsilon_absolute", "method", "linear_solver", "tolerance")
+
+
+def _row(point: Point, known: Mapping[str, Any], certain: Mapping[str, Certainty]) -> Row:
     """A point's setting, and its record."""
-    record: dict[str, Any] = {key: value for key, value in records.known[name_of(point)].items() if key != "limit"}
+    record = {key: value for key, value in known.items() if key != "limit"}
     solver, errors = point.scene.solver, record.get("errors") or {}
     found = [(q, error, certain[q].error) for q, error in errors.items()]
-    h = None if point.accuracy is not None else point.scene.domain.width() or record.get("h")
-    setting = {
-        "mesh": point.mesh,
-        "accuracy": point.accuracy,
-        "degree": point.degree,
-        "h": h,
-        "smoothing": solver.smoothing,
-        "epsilon": (record.get("epsilon") or solver.epsilon) if solver.smoothing else None,
-        "epsilon_absolute": solver.epsilon_absolute,
-        "method": solver.method,
-        "linear_solver": solver.linear_solver,
-        "tolerance": solver.tolerance,
-    }
+    setting: dict[str, Any] = {name: getattr(solver, name) for name in _OF_SOLVER}
+    setting |= {name: getattr(point, name) for name in ("mesh", "accuracy", "degree")}
+    setting["h"] = None if point.accuracy is not None else point.scene.domain.width() or record.get("h")
+    setting["epsilon"] = (record.get("epsilon") or solver.epsilon) if solver.smoothing else None
     beyond = tuple(q for q, error, least in found if error is not None and least is not None and error < least)
     return Row(**{**record, **setting, "beyond_reference": beyond})
 
@@ -325,22 +353,16 @@ def _own(study: Study, quantity: str) -> str:
 
 def _targets(study: Study, quantity: str) -> str:
     """What each accuracy costs, up to the first that is not reached."""
-    best, unsure = study.front(quantity), study.certain[quantity].error or 0.0
-    parts: dict[str, list[str]] = {}
+    best, parts = study.front(quantity), dict[str, list[str]]()
     for target in _TARGETS:
         row = next((r for r in best if (study.claimed(r, quantity) or 0.0) <= target), None)
-        if row is not None:
-            parts.setdefault(f"for {duration(row.seconds)} ({row.text})", []).append(_of_error(target))
-            continue
-        if unsure > target:
-            missed = f"cannot be claimed: the reference itself is uncertain by {_of_error(unsure)}"
-        else:
-            errors = [(e, r) for r in study.rows if (e := r.error(quantity)) is not None]
-            least, at = min(errors, key=lambda pair: pair[0])
-            missed = f"is not reached here: the best is {_of_error(least)} for {duration(at.seconds)} ({at.text})"
-        parts[missed] = [_of_error(target)]
-        break
-    said = (f"{', '.join(targets)} {cost}" for cost, targets in parts.items())
+        cost = "is not reached here" if row is None else f"for {duration(row.seconds)} ({row.text})"
+        parts.setdefault(cost, []).append(_of_error(target))
+        if row is None:
+            at, least = best[-1], _of_error(study.claimed(best[-1], quantity) or 0.0)
+            parts[f"the best that can be claimed is {least} for {duration(at.seconds)} ({at.text})"] = []
+            break
+    said = (f"{', '.join(targets)} {cost}".strip() for cost, targets in parts.items())
     return f"In {NORMS[quantity][1]}: {'; '.join(said)}."
 
 

@@ -16,7 +16,8 @@ from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.problem import spaces
 from hvi_fenicsx.report.solution_arrays import SolutionArrays
 from hvi_fenicsx.results import gathering
-from hvi_fenicsx.study.errors import NORMS, ReferenceSolution, certainty, stiffness
+from hvi_fenicsx.study.errors import NORMS, ReferenceSolution, stiffness
+from hvi_fenicsx.study.table import certainty
 from hvi_fenicsx.workflow import finish
 
 LAW = quadratic_linear(1.0e6)

@@ -11,8 +11,8 @@ from scenes import model, quadratic_linear
 
 from hvi_fenicsx import InputError, Model, read_tables
 from hvi_fenicsx.study import plan
-from hvi_fenicsx.study.errors import NORMS, Certainty
-from hvi_fenicsx.study.table import Row, Study
+from hvi_fenicsx.study.errors import NORMS
+from hvi_fenicsx.study.table import Certainty, Row, Study
 
 LAW = quadratic_linear(1.0e6)
 

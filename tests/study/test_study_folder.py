@@ -18,8 +18,8 @@ from runs import command, hvi, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.errors import ExitCode
+from hvi_fenicsx.study.conduct import Measurement, NoReferenceError
 from hvi_fenicsx.study.errors import NORMS
-from hvi_fenicsx.study.measure import Measurement, NoReferenceError
 
 LAW = quadratic_linear(1e6)
 

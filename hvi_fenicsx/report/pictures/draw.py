@@ -18,8 +18,6 @@ from ..solution_arrays import ReportError
 
 UNFINISHED = ".part.png"
 """How the name of a picture ends that is being written."""
-PATIENCE = 3.0
-"""Seconds for a child to end by itself."""
 COMPLAINT = "pictures: "
 """How the child's message to its caller begins."""
 
@@ -71,7 +69,7 @@ def _child(command: list[str], folder: Path) -> Iterator[subprocess.Popen[str]]:
         yield child
     finally:
         if child.returncode != 0:
-            processes.end(child, PATIENCE)
+            processes.end(child)
             for file in folder.glob(f".*{UNFINISHED}"):
                 file.unlink(missing_ok=True)
 

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import NoReturn
 
 from matplotlib.figure import Figure
 
@@ -129,7 +128,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Draw a result's pictures.")
     parser.add_argument("folder", type=Path, help="a finished result folder")
     folder = parser.parse_args(arguments).folder
-    signal.signal(signal.SIGTERM, _terminated)
     processes.die_with_parent()  # or it would write into the folder of the next run
     processes.stand_back()  # the ranks may still be computing
     try:
@@ -142,11 +140,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(failure, NotWrittenError):
             return writing.hand_over(failure)
     return 1 if failures else 0
-
-
-def _terminated(*_: object) -> NoReturn:
-    """End in good order, so that the X server goes too."""
-    raise SystemExit(128 + signal.SIGTERM)
 
 
 def draw_all(folder: Path) -> list[HviError]:
@@ -192,7 +185,6 @@ def _drawn(batch: Sequence[Drawing]) -> Iterator[HviError]:
 
 def _draw(drawing: Drawing, connection: Connection) -> None:
     """Draw one picture in a process of its own; say what went wrong, if anything did."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     failure: HviError | None = None
     try:
         save(drawing.make(), drawing.path, drawing.caption)
