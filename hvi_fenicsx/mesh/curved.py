@@ -16,12 +16,13 @@ from dolfinx import mesh as dmesh
 from scipy.spatial import KDTree
 
 from .. import compat
-from ..geometry import Curve
-from ..runtime.mpi import total
+from ..errors import InputError
+from ..geometry import ROUNDING, Curve, spot
+from ..runtime.mpi import agree, total
 from ..typing import Array, Entities, Integers
 from . import nodes, transfer
 from .domain import Domain
-from .thresholds import DEFAULT, ROUNDING, MeshThresholds
+from .thresholds import DEFAULT, MeshThresholds
 
 _MORE_SWEEPS = 2
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
@@ -128,6 +129,63 @@ def _jacobians(points: Array) -> Array:
     straight = np.linalg.det(points[:, 1 : points.shape[2] + 1] - points[:, :1])
     signed = np.linalg.det(np.einsum("iqn,cnd->cqid", slopes, points))
     return np.asarray(signed * np.sign(straight)[:, None])
+
+
+_EDGES = {2: [(0, 1)], 3: [(1, 2), (0, 2), (0, 1)]}
+"""The edges of a facet by its corners, in the order of their midpoints, by the number of its corners."""
+
+
+def is_curved(facets: Array) -> bool:
+    """Whether any midpoint is off the middle of its edge.
+
+    Args:
+        facets: by their nodes, corners first, then midpoints in the order of basix, (k, n, d).
+    """
+    off, edge = _offsets(facets)
+    return bool(np.any(np.linalg.norm(off, axis=-1) > ROUNDING * np.linalg.norm(edge, axis=-1)))
+
+
+def _turning_back(facets: Array) -> Integers:
+    """The facets that have a midpoint beyond the middle half of its edge: from there on the curve turns back."""
+    off, edge = _offsets(facets)
+    return np.flatnonzero(np.any(4 * np.abs(np.sum(off * edge, axis=-1)) >= np.sum(edge**2, axis=-1), axis=1))
+
+
+def _offsets(facets: Array) -> tuple[Array, Array]:
+    """Midpoints from the middles of their edges, and the edges as vectors, (k, edges, d)."""
+    corners = {3: 2, 6: 3}[facets.shape[1]]
+    first, last = (facets[:, [pair[i] for pair in _EDGES[corners]]] for i in (0, 1))
+    return facets[:, corners:] - (first + last) / 2, last - first
+
+
+def straightened(
+    mesh: dmesh.Mesh, sides: Mapping[str, Entities], regions: Mapping[str, Entities], place: str
+) -> tuple[dmesh.Mesh, Mapping[str, Entities], Mapping[str, Entities], dict[str, Curve]]:
+    """What makes a domain of a mesh whose cells may be curved: they become straight, curved sides stay. Collective.
+
+    Args:
+        mesh: of first or second order.
+        sides: local facets by name.
+        regions: local cells by name.
+        place: where it comes from, for messages.
+
+    Raises:
+        InputError: a curve turns back within a facet.
+    """
+    if compat.geometry_degree(mesh) == 1:
+        return mesh, sides, regions, {}
+    space, curves = fem.functionspace(mesh, ("Lagrange", 2)), dict[str, Curve]()
+    points = nodes.points(space)[:, : mesh.geometry.dim]
+    for name, facets in sides.items():
+        side = np.concatenate(agree(mesh.comm, points[nodes.facet_nodes(space, facets)]))
+        if len(turning := _turning_back(side)):
+            raise InputError(
+                f"{place}: the side {name!r} has at {spot(side[turning[0]].mean(axis=0))} a midpoint that lies beyond "
+                "the middle half of its edge, where a curve of second order turns back; remesh"
+            )
+        if is_curved(side):
+            curves[name] = CurvedFacets(side)
+    return compat.linear_mesh(mesh), sides, regions, curves
 
 
 _STEPS = 12

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from dolfinx import fem
 from dolfinx import mesh as dmesh
 
 from .. import compat
@@ -14,9 +13,9 @@ from ..errors import InputError
 from ..geometry import spot
 from ..runtime.mpi import agree
 from ..typing import Entities
-from . import cell_checks, nodes
-from .curved import CurvedFacets
+from . import curved
 from .domain import Domain
+from .gmsh_arrays import folded_cells
 
 _SIMPLICES = ("triangle", "tetrahedron")
 
@@ -39,8 +38,7 @@ def domain_of(
         InputError: on all ranks alike, with what is wrong and how to mend it.
     """
     _check_cells(mesh)
-    straight = mesh if compat.geometry_degree(mesh) == 1 else compat.linear_mesh(mesh)
-    _check_folds(straight)
+    _check_folds(mesh)
     d = mesh.topology.dim
     mesh.topology.create_connectivity(d - 1, d)
     if regions and cells is None:
@@ -51,26 +49,7 @@ def domain_of(
         raise InputError(f"body: {next(iter(sides))!r} is a side, but no tags of facets are given: facets=...")
     named_sides = _named(mesh, facets, d - 1, sides)
     _check_outer(mesh, named_sides)
-    curves = {} if straight is mesh else _curves(mesh, named_sides)
-    return Domain.from_mesh(straight, named_sides, _named(mesh, cells, d, regions), curves)
-
-
-def _curves(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> dict[str, CurvedFacets]:
-    """The curves of sides of second order, by name, on all ranks. Collective.
-
-    Raises:
-        InputError: a curve turns back within a facet.
-    """
-    space, found = fem.functionspace(mesh, ("Lagrange", 2)), {}
-    points = nodes.points(space)[:, : mesh.geometry.dim]
-    for name, facets in sides.items():
-        curve = np.concatenate(agree(mesh.comm, points[nodes.facet_nodes(space, facets)]))
-        if len(turning := cell_checks.turning_back(curve)):
-            place = spot(curve[turning[0]].mean(axis=0))
-            raise InputError(f"body: the side {name!r} has at {place} a {cell_checks.TURNING_BACK}")
-        if cell_checks.is_curved(curve):
-            found[name] = CurvedFacets(curve)
-    return found
+    return Domain.from_mesh(*curved.straightened(mesh, named_sides, _named(mesh, cells, d, regions), "body"))
 
 
 def check_tags(**given: Any) -> None:
@@ -120,8 +99,9 @@ def _check_cells(mesh: dmesh.Mesh) -> None:
 
 
 def _check_folds(mesh: dmesh.Mesh) -> None:
-    points, cells = mesh.geometry.x[:, : mesh.geometry.dim], compat.geometry_dofmap(mesh).astype(np.int64)
-    folded = cell_checks.folded_cells(points, cells)
+    d = mesh.geometry.dim
+    points, cells = mesh.geometry.x[:, :d], compat.geometry_dofmap(mesh)[:, : d + 1].astype(np.int64)
+    folded = folded_cells(points, cells)
     middles = [spot(points[cells[k]].mean(axis=0)) for k in folded[:1]]
     found = [middle for rank in agree(mesh.comm, middles) for middle in rank]
     if found:

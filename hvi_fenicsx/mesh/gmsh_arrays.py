@@ -1,10 +1,15 @@
 """What gmsh holds, as arrays, and whether it makes a mesh at all: dolfinx takes that for granted, or crashes.
 
+A mesh is folded where two cells lie on the same side of their common facet, or the cells about a vertex overlap. The
+order in which a file lists the vertices of a cell is no fold. Two bodies that lie on each other are none either.
 Light: gmsh's own process uses it.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -13,108 +18,160 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..geometry import spot
-from ..typing import Array, Entities, Integers
-from . import cell_checks
-from .thresholds import ROUNDING
+from ..geometry import ROUNDING, spot
+from ..typing import Array, Entities, Integers, Mask
 
-_SIMPLEX = {1: 1, 2: 2, 3: 4}
-"""Gmsh's element type of the linear simplex, by dimension."""
-
-
-_LARGEST = 1e12
-"""The largest coordinate, in the file's unit."""
+_SIMPLEX = {1: {1: 1, 2: 2, 3: 4}, 2: {1: 8, 2: 9, 3: 11}}
+"""Gmsh's element type of the simplex, by order and dimension."""
+_BASIX = {3: [0, 1, 2], 6: [0, 1, 2, 4, 5, 3], 10: [0, 1, 2, 3, 8, 9, 5, 7, 6, 4]}
+"""Where basix has the nodes of an edge, a triangle and a tetrahedron of order 2, by their number."""
 
 
-def check(gmsh: Any, path: Path, dimension: int) -> None:
-    """Refuse a mesh that dolfinx cannot take. Rank 0 only.
+@dataclass(frozen=True)
+class MeshArrays:
+    """A mesh of simplices with the tags of its physical groups.
+
+    Attributes:
+        points: coordinates of the nodes, (n, 3).
+        cells: nodes of the cells, counted from 0, corners first, then midpoints in the order of basix, (c, nodes).
+        cell_tags: physical group of each cell, (c,).
+        facets: nodes of the facets in physical groups, likewise, (f, nodes).
+        facet_tags: physical group of each facet, (f,).
+    """
+
+    points: Array
+    cells: Integers
+    cell_tags: Entities
+    facets: Integers
+    facet_tags: Entities
+
+
+@contextmanager
+def session() -> Iterator[Any]:
+    """The gmsh module without the user's settings and its own messages; it is finalised in the end."""
+    import gmsh
+
+    gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    try:
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+def close_gaps(gmsh: Any) -> None:
+    """Number the nodes without gaps."""
+    tags = gmsh.model.mesh.getNodes()[0]
+    if len(tags) and np.max(tags) != len(tags):
+        gmsh.model.mesh.renumberNodes()
+
+
+def extract(gmsh: Any, dimension: int) -> MeshArrays:
+    """The mesh that is open in gmsh; its nodes are numbered without gaps.
 
     Args:
-        gmsh: the module, the file being open in it.
+        gmsh: the module.
+        dimension: of the cells.
+    """
+    return MeshArrays(points(gmsh), *_grouped(gmsh, dimension), *_grouped(gmsh, dimension - 1))
+
+
+def points(gmsh: Any) -> Array:
+    """The nodes by their tags, (n, 3)."""
+    tags, flat, _ = gmsh.model.mesh.getNodes()
+    return np.asarray(flat.reshape(-1, 3)[np.argsort(tags)])
+
+
+def _grouped(gmsh: Any, dimension: int) -> tuple[Integers, Entities]:
+    """The nodes of the simplices in physical groups, (n, nodes), and their groups, (n,)."""
+    rows, tags = [], []
+    for _, group in gmsh.model.getPhysicalGroups(dimension):
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
+            for kind, _, found in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
+                count = gmsh.model.mesh.getElementProperties(kind)[3]
+                rows.append(np.asarray(found, dtype=np.int64).reshape(-1, count) - 1)
+                tags.append(np.full(len(rows[-1]), group, dtype=np.int32))
+    nodes = np.concatenate(rows) if rows else np.empty((0, dimension + 1), dtype=np.int64)
+    order = _BASIX[nodes.shape[1]] if nodes.shape[1] > dimension + 1 else slice(None)
+    return nodes[:, order], np.concatenate([np.empty(0, np.int32), *tags])
+
+
+def check(gmsh: Any, path: Path, dimension: int) -> MeshArrays:
+    """The mesh that is open in gmsh, if dolfinx can take it.
+
+    Args:
+        gmsh: the module.
         path: of the file, for messages.
         dimension: of the cells, 2 or 3.
 
     Raises:
         InputError: with the node or element tags of the first fault.
     """
-    _check_cells(gmsh, path, dimension)
-    _check_points(gmsh, path, dimension)
-    _check_quality(gmsh, path, dimension)
-    _check_connections(gmsh, path, dimension)
-    _check_folds(gmsh, path, dimension)
+    file = f"mesh file {path}:"
+    _check_cells(gmsh, file, dimension)
+    found = extract(gmsh, dimension)
+    _check_points(gmsh, file, found, dimension)
+    _check_connections(file, found, dimension)
+    folded = folded_cells(found.points[:, :dimension], found.cells[:, : dimension + 1])
+    if len(folded):
+        nodes = found.cells[folded[0], : dimension + 1]
+        where = spot(found.points[nodes].mean(axis=0)[:dimension])
+        text = f"the mesh is folded at {where}: the cell of nodes {', '.join(map(str, nodes + 1))} lies over another"
+        raise InputError(f"{file} {text} one; remesh")
+    return found
 
 
-def _check_cells(gmsh: Any, path: Path, dimension: int) -> None:
-    """Refuse cells of another dimension, or that are no linear simplices."""
+def _check_cells(gmsh: Any, file: str, dimension: int) -> None:
+    """Refuse cells of another dimension, or that are no simplices of order 1 or 2."""
     found = gmsh.model.getDimension()
     if found < 0:
-        raise InputError(f"mesh file {path}: it holds neither a mesh nor a geometry; give a file that gmsh has saved")
+        raise InputError(f"{file} it holds neither a mesh nor a geometry; give a file that gmsh has saved")
     if found != dimension:
-        raise InputError(f"mesh file {path}: its cells have dimension {found}, the material's model wants {dimension}")
+        raise InputError(f"{file} its cells have dimension {found}, the material's model wants {dimension}")
     if not gmsh.model.getPhysicalGroups(dimension):
         kind, command = ("surface", "Physical Surface") if dimension == 2 else ("volume", "Physical Volume")
         raise InputError(
-            f"mesh file {path}: no physical group holds cells (dimension {dimension}), so gmsh leaves them out; put "
+            f"{file} no physical group holds cells (dimension {dimension}), so gmsh leaves them out; put "
             f'every {kind} into one: {command}("body") = {{...}};'
         )
     cells, sides = (set(gmsh.model.mesh.getElements(d)[0]) for d in (dimension, dimension - 1))
-    if cells != {_SIMPLEX[dimension]} or not sides <= {_SIMPLEX[dimension - 1]}:
+    if not any(cells == {kinds[dimension]} and sides <= {kinds[dimension - 1]} for kinds in _SIMPLEX.values()):
         shape = "triangles" if dimension == 2 else "tetrahedra"
         orders = [gmsh.model.mesh.getElementProperties(kind)[2] for kind in cells | sides]
         way = "with -order 2" if max(orders) > 2 else "without recombination"
-        raise InputError(f"mesh file {path}: linear {shape} only, or those of order 2; remesh {way}")
+        raise InputError(f"{file} linear {shape} only, or those of order 2; remesh {way}")
 
 
-def _check_points(gmsh: Any, path: Path, dimension: int) -> None:
-    """Refuse coordinates that are not finite, too large, or not in the plane."""
-    points = np.asarray(gmsh.model.mesh.getNodes()[1]).reshape(-1, 3)
+def _check_points(gmsh: Any, file: str, found: MeshArrays, dimension: int) -> None:
+    """Refuse coordinates that are not finite, too far away, or not in the plane, and cells without volume."""
+    points = found.points
     if not np.all(np.isfinite(points)):
-        raise InputError(f"mesh file {path}: a node's coordinates are not finite numbers")
-    if np.max(np.abs(points)) > _LARGEST:
-        raise InputError(f"mesh file {path}: a node's coordinate is beyond ±{_LARGEST:g}; remesh near the origin")
+        raise InputError(f"{file} a node's coordinates are not finite numbers")
+    if np.ptp(points, axis=0).max() < ROUNDING * np.abs(points).max():
+        raise InputError(f"{file} it is too far away from the origin for its size; remesh near the origin")
     if dimension == 2 and np.ptp(points[:, 2]) > ROUNDING * np.ptp(points[:, :2]):
-        raise InputError(f"mesh file {path}: a 2D mesh must lie in a plane z = constant")
-
-
-def _check_quality(gmsh: Any, path: Path, dimension: int) -> None:
-    """Refuse cells without volume."""
+        raise InputError(f"{file} a 2D mesh must lie in a plane z = constant")
     tags = gmsh.model.mesh.getElements(dimension)[1][0]
     quality = np.abs(gmsh.model.mesh.getElementQualities(tags, "gamma"))
     if not np.all(quality > ROUNDING):
-        raise InputError(f"mesh file {path}: cell {tags[int(np.argmin(quality))]} has no volume; remesh")
+        raise InputError(f"{file} cell {tags[int(np.argmin(quality))]} has no volume; remesh")
 
 
-def _check_connections(gmsh: Any, path: Path, dimension: int) -> None:
+def _check_connections(file: str, found: MeshArrays, dimension: int) -> None:
     """Refuse lost nodes, elements listed twice, facets of more than two cells, sides that lie on no cell."""
-    cells, sides = (_elements(gmsh, d) for d in (dimension, dimension - 1))
+    lost = np.concatenate([found.cells.ravel(), found.facets.ravel()]) >= len(found.points)
+    if np.any(lost):
+        raise InputError(f"{file} a node of an element is not there; remesh")
+    cells, sides = (np.sort(rows[:, : dimension + 1 - i] + 1) for i, rows in enumerate((found.cells, found.facets)))
     facets = np.concatenate([cells[:, list(c)] for c in combinations(range(dimension + 1), dimension)])
-    lost = np.setdiff1d(np.concatenate([cells.ravel(), sides.ravel()]), gmsh.model.mesh.getNodes()[0])
-    if len(lost):
-        raise InputError(f"mesh file {path}: node {lost[0]} of an element is not there; remesh")
     for rows in (cells, sides):
-        _refuse_more_than(1, rows, f"mesh file {path}: the element of nodes", "is listed twice, or in two groups")
-    _refuse_more_than(2, facets, f"mesh file {path}: the facet of nodes", "has more than two cells")
+        _refuse_more_than(1, rows, f"{file} the element of nodes", "is listed twice, or in two groups")
+    _refuse_more_than(2, facets, f"{file} the facet of nodes", "has more than two cells")
     distinct, _ = _counted(facets)
     together, counts = _counted(np.concatenate([distinct, distinct, sides]))
     if np.any(counts == 1):
         first = ", ".join(map(str, together[np.argmax(counts == 1)]))
-        raise InputError(f"mesh file {path}: the boundary element of nodes {first} lies on no cell; remesh")
-
-
-def _check_folds(gmsh: Any, path: Path, dimension: int) -> None:
-    """Refuse cells that lie over each other."""
-    found = extract(gmsh, dimension)
-    folded = cell_checks.folded_cells(found.points[:, :dimension], found.cells)
-    if len(folded):
-        nodes = found.cells[folded[0]]
-        where = spot(found.points[nodes].mean(axis=0)[:dimension])
-        text = f"the mesh is folded at {where}: the cell of nodes {', '.join(map(str, nodes + 1))} lies over another"
-        raise InputError(f"mesh file {path}: {text} one; remesh")
-
-
-def _elements(gmsh: Any, dimension: int) -> Integers:
-    """Node tags of the simplices in groups, shape (n, dimension + 1), sorted in each row."""
-    return np.sort(grouped(gmsh, dimension)[0] + 1, axis=1)
+        raise InputError(f"{file} the boundary element of nodes {first} lies on no cell; remesh")
 
 
 def _refuse_more_than(most: int, rows: Integers, what: str, fault: str) -> None:
@@ -131,90 +188,52 @@ def _counted(rows: Integers) -> tuple[Integers, Integers]:
     return ordered[first], np.diff(np.append(first, len(rows)))
 
 
-@dataclass(frozen=True)
-class MeshArrays:
-    """A mesh of simplices with the tags of its physical groups.
-
-    Attributes:
-        points: coordinates of the nodes, (n, 3).
-        cells: nodes of the cells, counted from 0, (c, d+1).
-        cell_tags: physical group of each cell, (c,).
-        facets: nodes of the facets in physical groups, (f, d).
-        facet_tags: physical group of each facet, (f,).
-        curved: the nodes of facets of second order, corners first, then midpoints of edges in the order of basix; of
-            groups some of whose facets are curved, (k, n, 3).
-        curved_tags: physical group of each of these, (k,).
-    """
-
-    points: Array
-    cells: Integers
-    cell_tags: Entities
-    facets: Integers
-    facet_tags: Entities
-    curved: Array
-    curved_tags: Entities
-
-    @classmethod
-    def empty(cls, dimension: int) -> MeshArrays:
-        """What the ranks have that gmsh does not run on."""
-        return cls(np.empty((0, 3)), *_joined([], dimension), *_joined([], dimension - 1), *no_curves(dimension))
-
-
-def start(gmsh: Any) -> None:
-    """Start gmsh without the user's settings, and without its own messages."""
-    gmsh.initialize(["-noenv"], readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-
-
-def close_gaps(gmsh: Any) -> None:
-    """Number the nodes without gaps."""
-    tags = gmsh.model.mesh.getNodes()[0]
-    if len(tags) and np.max(tags) != len(tags):
-        gmsh.model.mesh.renumberNodes()
-
-
-def no_curves(dimension: int) -> tuple[Array, Entities]:
-    """The curved facets and their groups of a mesh that has none.
+def folded_cells(points: Array, cells: Integers) -> Integers:
+    """The cells at a fold, one or two of each; empty where the mesh has none.
 
     Args:
-        dimension: of the cells.
+        points: the vertices, (n, d).
+        cells: the vertices of each simplex, (c, d+1).
     """
-    return np.empty((0, {2: 3, 3: 6}[dimension], 3)), np.empty(0, dtype=np.int32)
+    return np.union1d(_over_facets(points, cells), _around_vertices(points, cells))
 
 
-def extract(gmsh: Any, dimension: int, curves: tuple[Array, Entities] | None = None) -> MeshArrays:
-    """The mesh that is open in gmsh; its nodes are numbered without gaps.
-
-    Args:
-        gmsh: the module.
-        dimension: of the cells.
-        curves: curved facets and their groups, if there are any.
-    """
-    tags, points, _ = gmsh.model.mesh.getNodes()
-    ordered = points.reshape(-1, 3)[np.argsort(tags)]
-    groups = *grouped(gmsh, dimension), *grouped(gmsh, dimension - 1)
-    return MeshArrays(ordered, *groups, *(curves or no_curves(dimension)))
+def _over_facets(points: Array, cells: Integers) -> Integers:
+    """The pairs of cells that lie on the same side of their common facet."""
+    corners = range(cells.shape[1])
+    facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in corners]), axis=1)
+    opposite = np.concatenate([cells[:, i] for i in corners])
+    edges = points[np.column_stack([facets[:, 1:], opposite])] - points[facets[:, :1]]
+    side = np.sign(_volumes(edges))
+    order = np.lexsort(facets.T)
+    same = np.all(facets[order[1:]] == facets[order[:-1]], axis=1) & (side[order[1:]] == side[order[:-1]])
+    return np.concatenate([order[1:][same], order[:-1][same]]) % len(cells)
 
 
-def grouped(gmsh: Any, dimension: int) -> tuple[Integers, Entities]:
-    """The simplices in physical groups.
-
-    Args:
-        gmsh: the module.
-        dimension: of the simplices.
-
-    Returns:
-        Their nodes, counted from 0, shape (n, dimension + 1), and their groups, shape (n,).
-    """
-    found: list[tuple[Integers, int]] = []
-    for _, group in gmsh.model.getPhysicalGroups(dimension):
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
-            for nodes in gmsh.model.mesh.getElements(dimension, entity)[2]:
-                found.append((np.asarray(nodes, dtype=np.int64).reshape(-1, dimension + 1) - 1, group))
-    return _joined(found, dimension)
+def _around_vertices(points: Array, cells: Integers) -> Integers:
+    """A cell of each vertex about which the cells fill more than the full angle."""
+    angles = np.column_stack([_angles(points, np.roll(cells, -i, axis=1)) for i in range(cells.shape[1])])
+    total = np.bincount(cells.ravel(), weights=angles.ravel(), minlength=len(points))
+    full = 2.0 * math.pi * (cells.shape[1] - 2)
+    over: Mask = total > full * (1.0 + ROUNDING)
+    return np.flatnonzero(np.any(over[cells], axis=1))
 
 
-def _joined(found: list[tuple[Integers, int]], dimension: int) -> tuple[Integers, Entities]:
-    nodes = [np.empty((0, dimension + 1), dtype=np.int64), *(rows for rows, _ in found)]
-    tags = [np.empty(0, dtype=np.int32), *(np.full(len(rows), group, dtype=np.int32) for rows, group in found)]
-    return np.concatenate(nodes), np.concatenate(tags)
+def _volumes(edges: Array) -> Array:
+    """The determinants of (k, d, d): much faster than NumPy's for so small ones."""
+    if edges.shape[1] == 2:
+        return edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    return np.einsum("ki,ki->k", np.cross(edges[:, 0], edges[:, 1]), edges[:, 2])
+
+
+def _angles(points: Array, cells: Integers) -> Array:
+    """The angle of each triangle, the solid angle of each tetrahedron at its first vertex, (c,)."""
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    edges /= np.linalg.norm(edges, axis=2, keepdims=True)
+    volume = np.abs(_volumes(edges))
+    first, second = edges[:, 0], edges[:, 1]
+    if edges.shape[1] == 2:
+        return np.arctan2(volume, np.sum(first * second, axis=1))
+    third = edges[:, 2]
+    cosines = (np.sum(a * b, axis=1) for a, b in ((first, second), (second, third), (third, first)))
+    return 2.0 * np.arctan2(volume, 1.0 + sum(cosines))

@@ -6,8 +6,7 @@ import io
 import json
 import signal
 import subprocess
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +21,9 @@ from ..runtime import cost, processes
 from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
 from ..typing import Entities
-from .curved import CurvedFacets
+from . import curved, gmsh_process
 from .domain import Domain, check_affordable
-from .gmsh_arrays import MeshArrays, extract, start
-from .gmsh_reader import Request
+from .gmsh_arrays import MeshArrays, extract, session
 from .thresholds import DEFAULT, MeshThresholds
 
 _SCRIPTS = (".geo", ".geo_unrolled")
@@ -43,7 +41,7 @@ def read(
         path: the file.
         dimension: of the cells, 2 or 3.
         scale: m per unit of the file's coordinates.
-        thresholds: how long gmsh may take, and how much memory.
+        thresholds: how long gmsh may take.
 
     Raises:
         InputError: on all ranks alike: not readable, no mesh nor harmless script, no named groups, wrong dimension, no
@@ -51,20 +49,11 @@ def read(
         Interrupted: on all ranks alike: a signal came.
     """
     found: list[MeshArrays] = []
-    names, nodes = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds))
-    check_affordable(comm, dimension * nodes, dimension, "domain.file", "mesh the body coarser")
-    arrays = found.pop() if found else None
-    curves = on_root(comm, lambda: {} if arrays is None else _curves(arrays, names[dimension - 1], scale, dimension))
-    mesh, sides, regions = distribute(comm, arrays, dimension, names)
+    names, vertices = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds))
+    check_affordable(comm, dimension * vertices, dimension, "domain.file", "mesh the body coarser")
+    mesh, sides, regions = distribute(comm, found, dimension, names)
     mesh.geometry.x[:] *= scale
-    return Domain.from_mesh(mesh, sides, regions, curves)
-
-
-def _curves(found: MeshArrays, names: Mapping[str, int], scale: float, dimension: int) -> dict[str, CurvedFacets]:
-    """The curves of sides of second order, by name, m. Rank 0 only."""
-    points = scale * found.curved[:, :, :dimension]
-    curved = {name: points[found.curved_tags == tag] for name, tag in names.items()}
-    return {name: CurvedFacets(facets) for name, facets in curved.items() if len(facets)}
+    return Domain.from_mesh(*curved.straightened(mesh, sides, regions, f"mesh file {path}"))
 
 
 def _read(
@@ -77,22 +66,18 @@ def _read(
         dimension: of the cells.
         scale: m per unit of the file's coordinates.
         found: the mesh is added here.
-        thresholds: how long gmsh may take, and how much memory.
+        thresholds: how long gmsh may take.
 
     Returns:
-        The physical groups by dimension and name, and the number of nodes.
+        The physical groups by dimension and name, and the number of vertices.
     """
-    request = Request(
-        path=str(path.absolute()),
-        is_script=_is_script(path),
-        dimension=dimension,
-        memory=thresholds.gmsh_share * cost.free_memory(),
-    )
+    kind = "script" if _is_script(path) else "mesh"
+    words = [str(path.absolute()), kind, str(dimension), str(cost.free_memory())]
     try:
-        done = processes.run("hvi_fenicsx.mesh.gmsh_reader", [request.dumps()], thresholds.gmsh_file_seconds)
+        done = processes.run(gmsh_process.__name__, words, thresholds.gmsh_seconds)
     except subprocess.TimeoutExpired:
         text = (
-            f"gmsh has not done with it after {thresholds.gmsh_file_seconds:g} s; look for an endless loop, or give "
+            f"gmsh has not done with it after {thresholds.gmsh_seconds:g} s; look for an endless loop, or give "
             "the .msh that gmsh saves"
         )
         raise InputError(f"mesh file {path}: {text}") from None
@@ -103,17 +88,12 @@ def _read(
             raise InputError(str(arrays["fault"]))
         mesh = MeshArrays(**{name: arrays[name] for name in MeshArrays.__annotations__})
         names = {int(d): named for d, named in json.loads(str(arrays["names"])).items()}
-    _check_length(mesh, scale)
-    found.append(mesh)
-    return names, len(mesh.points)
-
-
-def _check_length(mesh: MeshArrays, scale: float) -> None:
-    """Refuse a body that is longer or shorter than lengths may be."""
     length = float(np.max(np.ptp(mesh.points, axis=0))) * scale
     if not SHORTEST <= length <= LONGEST:
         allowed = f"{SHORTEST:g} to {LONGEST:g} m; it is the length in m of one unit of the file"
         raise InputError(f"domain.scale: makes the body {length:.1e} m long; allowed is {allowed}")
+    found.append(mesh)
+    return names, len(np.unique(mesh.cells[:, : dimension + 1]))
 
 
 def _is_script(path: Path) -> bool:
@@ -143,38 +123,27 @@ def _end(done: subprocess.CompletedProcess[bytes]) -> str:
     return f"gmsh cannot read it: {last[:200]}"
 
 
-@contextmanager
-def session(comm: MPI.Comm) -> Iterator[Any]:
-    """The gmsh module, started on rank 0 only (None elsewhere) and always finalised."""
-    if comm.rank != 0:
-        yield None
-        return
-    import gmsh
-
-    start(gmsh)
-    try:
-        yield gmsh
-    finally:
-        gmsh.finalize()
-
-
 def distribute(
-    comm: MPI.Comm, found: MeshArrays | None, dimension: int, names: Mapping[int, Mapping[str, int]]
+    comm: MPI.Comm, given: list[MeshArrays], dimension: int, names: Mapping[int, Mapping[str, int]]
 ) -> tuple[dmesh.Mesh, dict[str, Entities], dict[str, Entities]]:
     """A mesh that rank 0 has, shared among the ranks. Collective.
 
     Args:
         comm: the ranks.
-        found: the mesh; None on the other ranks.
+        given: the mesh, which is taken out; nothing on the other ranks.
         dimension: of the cells.
         names: physical groups of facets and of cells with their tags, by dimension; on all ranks.
 
     Returns:
         Mesh, sides and regions (local facets and cells by name).
     """
-    found = found or MeshArrays.empty(dimension)
+    own = given.pop() if given else None
+    found = own or MeshArrays(*comm.bcast(None))
+    if own is not None:
+        comm.bcast([array[:0] for array in vars(own).values()])
+    degree = 1 if found.cells.shape[1] == dimension + 1 else 2
     kind = "triangle" if dimension == 2 else "tetrahedron"
-    mesh = compat.simplex_mesh(comm, found.cells, found.points[:, :dimension], kind, spread=True)
+    mesh = compat.simplex_mesh(comm, found.cells, found.points[:, :dimension], kind, spread=True, degree=degree)
     cells = np.arange(mesh.topology.index_map(dimension).size_local, dtype=np.int32)
     tags = comm.bcast(found.cell_tags)[mesh.topology.original_cell_index[cells]]
     local, marks = compat.local_entities(mesh, dimension - 1, found.facets, found.facet_tags)
@@ -204,16 +173,30 @@ def build(comm: MPI.Comm, outline: Outline, size: float) -> Domain:
     Raises:
         InputError: on all ranks alike, when gmsh cannot mesh the shape.
     """
-    unit = outline.extent / _EXTENT
-    with session(comm) as gmsh:
-        names = on_root(comm, lambda: _meshed(gmsh, outline.in_units(unit, _DIGITS), round(size / unit, _DIGITS)))
-        mesh, sides, _ = distribute(comm, gmsh and extract(gmsh, 2), 2, names)
+    unit, found = outline.extent / _EXTENT, list[MeshArrays]()
+    names = on_root(comm, lambda: _meshed(outline.in_units(unit, _DIGITS), round(size / unit, _DIGITS), found))
+    mesh, sides, _ = distribute(comm, found, 2, names)
     mesh.geometry.x[:] *= unit
     return Domain.from_mesh(mesh, sides, curves=outline.arcs(), one_piece=True)
 
 
-def _meshed(gmsh: Any, outline: Outline, size: float) -> dict[int, dict[str, int]]:
-    """Mesh the outline in gmsh; its physical groups by dimension and name. Rank 0 only."""
+def _meshed(outline: Outline, size: float, found: list[MeshArrays]) -> dict[int, dict[str, int]]:
+    """Mesh the outline in gmsh, and add the mesh; its physical groups by dimension and name. Rank 0 only."""
+    with session() as gmsh:
+        names = _drawn(gmsh, outline, size)
+        # Along an edge and inward the size is interpolated between the corners, so a fine corner stays local.
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
+        try:
+            gmsh.model.mesh.generate(2)
+        except Exception as error:
+            # gmsh raises bare Exceptions, whatever went wrong
+            raise InputError(f"domain: gmsh cannot mesh the shape: {error}; change mesh_size") from None
+        found.append(extract(gmsh, 2))
+    return names
+
+
+def _drawn(gmsh: Any, outline: Outline, size: float) -> dict[int, dict[str, int]]:
+    """Draw the outline in gmsh; its physical groups by dimension and name."""
     geo = gmsh.model.geo
     corners = [geo.addPoint(x, y, 0.0, h) for (x, y), h in zip(outline.points, outline.sizes, strict=True)]
     centres = {c: geo.addPoint(*c, 0.0, size) for _, c in outline.sides if c is not None}
@@ -227,15 +210,4 @@ def _meshed(gmsh: Any, outline: Outline, size: float) -> dict[int, dict[str, int
     geo.synchronize()
     groups = {name: gmsh.model.addPhysicalGroup(1, found, name=name) for name, found in edges.items()}
     body = gmsh.model.addPhysicalGroup(2, [surface], name=_BODY)
-    _generate(gmsh)
     return {1: groups, 2: {_BODY: body}}
-
-
-def _generate(gmsh: Any) -> None:
-    # Along an edge and inward the size is interpolated between the corners, so a fine corner stays local.
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
-    try:
-        gmsh.model.mesh.generate(2)
-    except Exception as error:
-        # gmsh raises bare Exceptions, whatever went wrong
-        raise InputError(f"domain: gmsh cannot mesh the shape: {error}; change mesh_size") from None

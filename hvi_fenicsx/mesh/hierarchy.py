@@ -1,9 +1,8 @@
 """A mesh hierarchy for a mesh that has none: coarser meshes of the same body, made by gmsh.
 
-In the plane gmsh makes one within a thinned outline (:mod:`.coarsening_2d`); in space it meshes the body within its
-surface anew (:mod:`.coarsening_3d`). Only that coarsest mesh is made by gmsh; the meshes between are its refinements,
-so the only step that is not nested is the last, onto the mesh itself. These meshes give a start value and a
-preconditioner; solutions are those of the mesh itself.
+Only the coarsest mesh is made by gmsh (:mod:`.coarsening`); the meshes between are its refinements, so the only step
+that is not nested is the last, onto the mesh itself. These meshes give a start value and a preconditioner; solutions
+are those of the mesh itself.
 
 A mesh in several pieces, such as a joint in one file, has the hierarchy of each of them.
 """
@@ -22,8 +21,9 @@ from mpi4py import MPI
 from .. import compat
 from ..runtime.mpi import agree, total
 from ..typing import Entities, Integers, Mask
-from . import coarsening_2d, coarsening_3d, refinement
 from . import facets as cell_facets
+from . import refinement
+from .coarsening import coarsen
 from .domain import Domain
 from .joined import PlacedBody, coarsening
 from .thresholds import DEFAULT, MeshThresholds
@@ -44,7 +44,6 @@ def with_hierarchy(domain: Domain, thresholds: MeshThresholds = DEFAULT) -> Doma
         return _in_pieces(domain, found, thresholds)
     domain = replace(domain, one_piece=True)  # known from now on
     factor = 2.0 ** max(1, round(np.log2(unknowns / thresholds.coarsest) / d))
-    coarsen = coarsening_2d.coarsen if d == 2 else coarsening_3d.coarsen
     coarsest = coarsen(domain, factor, thresholds)
     if coarsest is None:
         return domain

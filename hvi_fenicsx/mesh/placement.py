@@ -12,11 +12,10 @@ from scipy.spatial import cKDTree
 
 from .. import compat
 from ..errors import InputError
-from ..geometry import spot
+from ..geometry import ROUNDING, spot
 from ..runtime.mpi import agree
 from ..typing import Array
 from .joined import PlacedBody
-from .thresholds import ROUNDING
 from .transfer import barycentric_weights
 
 _WITHIN = 0.15

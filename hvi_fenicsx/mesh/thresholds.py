@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-ROUNDING = 1e-9
-"""Lengths so small beside the size of a cell, a facet or a body are rounding, and so are barycentric weights."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class MeshThresholds:
@@ -20,18 +17,14 @@ class MeshThresholds:
         bisected_edges: length of the edges of a marked tetrahedron that are bisected, relative to its longest one. All
             six edges would make a step of 4 to 5 times the unknowns; the longest and, in a sixth of a cube, the
             diagonals of its faces make it about 2.
-        hierarchy_from: unknowns of a mesh file from which coarser meshes pay; with fewer, one factorisation takes less
-            time than gmsh.
+        hierarchy_from: unknowns of a mesh file from which coarser meshes pay: with fewer, one factorisation takes less
+            time than gmsh. Of a larger one, so many cells tell the sizes, regions and ranks of all.
         coarsest: unknowns of the coarsest mesh of a mesh file, about.
         outline_turn: angle (radian) by which an outline turns at a vertex that is kept in any case, and by which it
             turns at most between two vertices that are kept: a coarse chord must stay near its curve. Twice as
             much is an edge of a surface.
-        sampled_cells: cells, about, by which sizes, regions and ranks of a body in space are known.
         remeshed_size: part by which a coarser mesh's volume, or the area of a side, may differ.
-        gmsh_file_seconds: seconds that gmsh has to read a mesh file, and to mesh a script.
-        gmsh_share: part of the memory that nothing uses which gmsh may take for a file.
-        gmsh_seconds: seconds that gmsh has to remesh a body in space: it takes some 1e-4 for each triangle of the
-            surface.
+        gmsh_seconds: seconds that gmsh has to read a mesh file, to mesh a script, and to remesh a body in space.
         least_jacobian: part of its straight size to which a curved cell may shrink anywhere.
     """
 
@@ -42,11 +35,8 @@ class MeshThresholds:
     hierarchy_from: int = 20_000
     coarsest: int = 2_500
     outline_turn: float = math.radians(20.0)
-    sampled_cells: int = 20_000
     remeshed_size: float = 0.25
-    gmsh_file_seconds: float = 600.0
-    gmsh_share: float = 0.8
-    gmsh_seconds: float = 60.0
+    gmsh_seconds: float = 300.0
     least_jacobian: float = 0.2
 
 

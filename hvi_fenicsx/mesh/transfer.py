@@ -18,10 +18,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import compat
+from ..geometry import ROUNDING
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from . import nodes
-from .thresholds import ROUNDING
 
 Numbers = npt.NDArray[np.integer]
 Halves = npt.NDArray[np.int8]

@@ -10,7 +10,8 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..geometry import spot
-from ..mesh import cell_checks, nodes
+from ..mesh import curved as curved_cells
+from ..mesh import nodes
 from ..mesh.boundary_part import InterfaceSides
 from ..mesh.facets import cell_facets
 from ..runtime.mpi import agree
@@ -112,7 +113,7 @@ def pair(context: DomainForms, name: str, sides: InterfaceSides) -> Pair:
         if not len(facets.nodes):
             raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
         found.append(facets)
-    curved = is_curved(context.space) and any(cell_checks.is_curved(facets.points) for facets in found)
+    curved = is_curved(context.space) and any(curved_cells.is_curved(facets.points) for facets in found)
     return Pair(name=name, sides=sides, first=found[0], second=found[1], curved=curved)
 
 

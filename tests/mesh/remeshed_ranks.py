@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
+from hvi_fenicsx.mesh import coarsening, gmsh_file
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 
@@ -21,9 +21,9 @@ def main() -> None:
     coarser = body.coarser()
     assert coarser is not None
     coarse = coarser[0]
-    centres = [coarsening_3d.owned_corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
+    centres = [coarsening.owned_corners(b.mesh).reshape(-1, 3).mean(axis=0) for b in (body, coarse)]
     cells = coarse.mesh.topology.index_map(3)
-    before, after = coarsening_3d.measures(body), coarsening_3d.measures(coarse)
+    before, after = coarsening.measures(body), coarsening.measures(coarse)
     printed = (
         cells.size_local / cells.size_global,
         float(np.linalg.norm(centres[0] - centres[1])) / body.length,

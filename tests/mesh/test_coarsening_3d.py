@@ -19,7 +19,7 @@ from mpi4py import MPI
 from runs import LONG_RANKS
 
 from hvi_fenicsx import read_tables, workflow
-from hvi_fenicsx.mesh import coarsening_3d, gmsh_file
+from hvi_fenicsx.mesh import coarsening, gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
@@ -60,7 +60,7 @@ def with_coarser(file: Path) -> tuple[Domain, Domain]:
 
 def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
     body, coarse = with_coarser(bored)
-    fine, found = coarsening_3d.measures(body), coarsening_3d.measures(coarse)
+    fine, found = coarsening.measures(body), coarsening.measures(coarse)
     assert found == pytest.approx(fine, rel=0.1)
     flat = {name: size for name, size in fine.items() if name[1] in ("left", "right", "bottom", "top")}
     assert {name: found[name] for name in flat} == pytest.approx(flat, rel=1e-9)
@@ -97,5 +97,5 @@ def test_the_coarse_mesh_is_the_same_on_several_ranks_shared_like_the_fine_one(r
     assert np.all(printed[:, 1] < 0.2), "distance of the parts' centres over the body"
     assert np.all(printed[:, 2] < 0.1), "of a side's area"
     coarse = with_coarser(bored)[1]
-    alone = [coarse.mesh.topology.index_map(3).size_global, *coarsening_3d.measures(coarse).values()]
+    alone = [coarse.mesh.topology.index_map(3).size_global, *coarsening.measures(coarse).values()]
     np.testing.assert_allclose(printed[:, 3:], [alone] * ranks, rtol=1e-12)

@@ -13,7 +13,7 @@ from runs import hvi, write_scene
 from scenes import model
 
 from hvi_fenicsx import Body, InputError, compat
-from hvi_fenicsx.mesh.cell_checks import folded_cells
+from hvi_fenicsx.mesh.gmsh_arrays import folded_cells
 from hvi_fenicsx.typing import Array, Integers
 
 

@@ -22,7 +22,6 @@ from hvi_fenicsx import InputError
 from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
-from hvi_fenicsx.mesh.gmsh_reader import Request
 from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.runtime import cost, processes
 from hvi_fenicsx.runtime.mpi import raise_second
@@ -42,7 +41,7 @@ def written(path: Path, text: str) -> Path:
 
 
 def read(path: Path, seconds: float = 60.0) -> Domain:
-    return gmsh_file.read(MPI.COMM_WORLD, path, 2, thresholds=Thresholds(gmsh_file_seconds=seconds))
+    return gmsh_file.read(MPI.COMM_WORLD, path, 2, thresholds=Thresholds(gmsh_seconds=seconds))
 
 
 def test_a_script_under_the_name_of_a_mesh_is_refused(tmp_path: Path) -> None:
@@ -86,13 +85,13 @@ def test_a_script_can_do_no_harm(commands: str, tmp_path: Path) -> None:
 
 def test_a_script_is_not_opened_where_the_system_cannot_confine_it(tmp_path: Path) -> None:
     file = written(tmp_path / "m.geo", TRIANGLE)
-    request = Request(path=str(file), is_script=True, dimension=2, memory=4e3)
+    words = [str(file), "script", "2", "4e3"]
     code = (
-        "from hvi_fenicsx.mesh import gmsh_reader\n"
-        "gmsh_reader.processes.confine = lambda memory: False\n"
-        "gmsh_reader.main()"
+        "from hvi_fenicsx.mesh import gmsh_process\n"
+        "gmsh_process.processes.confine = lambda memory: False\n"
+        "gmsh_process.main()"
     )
-    done = subprocess.run([sys.executable, "-c", code, request.dumps()], capture_output=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, check=True)
     with np.load(io.BytesIO(done.stdout)) as found:
         assert "this system cannot forbid it" in str(found["fault"])
 
@@ -117,12 +116,12 @@ def test_a_script_that_ends_gmsh_or_never_ends_is_refused(command: str, tmp_path
 
 
 @pytest.mark.long
-def test_a_script_that_fills_the_memory_is_refused(tmp_path: Path) -> None:
-    """The machine's other programs lose nothing: gmsh gets a share of what is free, here 1.5 GB."""
-    thresholds = Thresholds(gmsh_share=1500 / cost.free_memory())
+def test_a_script_that_fills_the_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The machine's other programs lose nothing: gmsh gets what is free, here 1.5 GB."""
+    monkeypatch.setattr(cost, "free_memory", lambda: 1500.0)
     script = written(tmp_path / "m.geo", "a[] = {0:1000000000};\n" + TRIANGLE)
     with pytest.raises(InputError, match=r"wants more than the 1\.5 GB that it may use"):
-        gmsh_file.read(MPI.COMM_WORLD, script, 2, thresholds=thresholds)
+        gmsh_file.read(MPI.COMM_WORLD, script, 2)
 
 
 def signalled_while_meshing(temporary: Path) -> None:

@@ -1,4 +1,4 @@
-"""A coarser mesh of a body in space, made by gmsh (:mod:`.gmsh_worker`).
+"""A coarser mesh of a body, made by gmsh (:mod:`.gmsh_process`) within its surface, of which the plane one is thinned.
 
 Its facets and cells take the side and the region of the nearest facet or cell of the fine mesh. It serves as a start
 value and a preconditioner only: where two sides meet in the middle of a flat face, or two regions inside of the body,
@@ -7,20 +7,25 @@ their border is right to the width of a cell.
 
 from __future__ import annotations
 
+import io
+import math
 import os
 import subprocess
 import tempfile
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import shapely
 from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..runtime import processes
 from ..runtime.mpi import agree, on_root, total
 from ..typing import Array, Entities, Integers, Mask
-from . import refinement
+from . import facets as cell_facets
+from . import gmsh_process, refinement
 from .domain import Domain
 from .thresholds import DEFAULT, MeshThresholds
 
@@ -30,8 +35,8 @@ class _CellSample:
     """Some of all ranks' cells.
 
     Attributes:
-        midpoints: m, (k, 3).
-        sizes: edge of a regular tetrahedron of the same volume, m, (k,).
+        midpoints: m, (k, d).
+        sizes: edge of a regular simplex of the same volume, m, (k,).
         ranks: where each cell is, (k,).
         within: whether the cell is in each region, (k, regions).
     """
@@ -44,12 +49,12 @@ class _CellSample:
 
 @dataclass(frozen=True)
 class _Surface:
-    """All triangles of the body's surface.
+    """All facets of the body's surface.
 
     Attributes:
-        nodes: numbers of the nodes in the mesh file, (t, 3).
-        corners: m, (t, 3, 3).
-        on: whether the triangle is on each side, (t, sides).
+        nodes: numbers of the nodes in the mesh file, (f, d).
+        corners: m, (f, d, d).
+        on: whether the facet is on each side, (f, sides).
     """
 
     nodes: Integers
@@ -68,30 +73,33 @@ def coarsen(domain: Domain, factor: float, thresholds: MeshThresholds = DEFAULT)
     Returns:
         None where gmsh fails, or where volume or areas differ too much.
     """
-    comm = domain.mesh.comm
+    comm, d = domain.mesh.comm, domain.dimension
     cells, surface = _sample(domain, thresholds), _surface(domain)
-    remeshed = on_root(comm, lambda: _remeshed(surface, cells, factor, thresholds)) if surface else None
-    if surface is None or remeshed is None:
+    if surface is None:
         return None
-    points, corners = remeshed
+    found = on_root(comm, lambda: (_in_plane if d == 2 else _in_space)(surface, cells, factor, thresholds))
+    if found is None:
+        return None
+    points, corners = found
     mine = corners[cells.ranks[_nearest(cells.midpoints, points[corners].mean(axis=1))] == comm.rank]
-    mesh = compat.simplex_mesh(comm, mine, points if comm.rank == 0 else points[:0], "tetrahedron")
+    mesh = compat.simplex_mesh(comm, mine, points[: len(points) * (comm.rank == 0)], domain.mesh.topology.cell_name())
     sides, regions = _sides(domain, mesh, surface), _regions(domain, mesh, cells)
-    found = replace(domain, mesh=mesh, sides=sides, regions=regions, shared=None)
-    return found if _similar(domain, found, thresholds.remeshed_size) else None
+    coarse = replace(domain, mesh=mesh, sides=sides, regions=regions, shared=None)
+    return coarse if _similar(domain, coarse, thresholds.remeshed_size) else None
 
 
 def _sample(domain: Domain, thresholds: MeshThresholds) -> _CellSample:
     """The same cells in the same order for any number of ranks. Collective."""
-    comm, topology = domain.mesh.comm, domain.mesh.topology
-    every = max(1, topology.index_map(3).size_global // thresholds.sampled_cells)
+    comm, topology, d = domain.mesh.comm, domain.mesh.topology, domain.dimension
+    every = max(1, topology.index_map(d).size_global // thresholds.hierarchy_from)
     numbers = np.asarray(topology.original_cell_index, dtype=np.int64)
     chosen = np.flatnonzero(numbers % every == 0)
     corners = owned_corners(domain.mesh)[chosen]
     within = np.zeros((len(numbers), len(domain.regions)), dtype=bool)
     for i, name in enumerate(sorted(domain.regions)):
         within[domain.regions[name], i] = True
-    sizes, ranks = np.cbrt(6 * np.sqrt(2) * _volumes(corners)), np.full(len(chosen), comm.rank)
+    regular = math.sqrt(d + 1) / (math.factorial(d) * 2 ** (d / 2))  # volume of a simplex whose edges are 1
+    sizes, ranks = (_volumes(corners) / regular) ** (1 / d), np.full(len(chosen), comm.rank)
     parts = agree(comm, (numbers[chosen], corners.mean(axis=1), sizes, ranks, within[chosen]))
     order, *found = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return _CellSample(*(array[np.argsort(order)] for array in found))
@@ -99,15 +107,15 @@ def _sample(domain: Domain, thresholds: MeshThresholds) -> _CellSample:
 
 def _surface(domain: Domain) -> _Surface | None:
     """The body's surface; None where a side lies inside of the body. Collective."""
-    mesh, owned = domain.mesh, domain.mesh.topology.index_map(2).size_local
-    facets = _exterior(mesh)
-    on: Mask = np.zeros((owned + mesh.topology.index_map(2).num_ghosts, len(domain.sides)), dtype=np.bool_)
+    mesh, d = domain.mesh, domain.dimension
+    facets, owned = _exterior(mesh), mesh.topology.index_map(d - 1)
+    on: Mask = np.zeros((owned.size_local + owned.num_ghosts, len(domain.sides)), dtype=np.bool_)
     for i, name in enumerate(sorted(domain.sides)):
         on[domain.sides[name], i] = True
-    inside = np.setdiff1d(np.flatnonzero(on[:owned].any(axis=1)), facets)
+    inside = np.setdiff1d(np.flatnonzero(on[: owned.size_local].any(axis=1)), facets)
     nodes = _outward(mesh, facets)
     numbers = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[nodes]
-    parts = agree(mesh.comm, (len(inside), numbers, mesh.geometry.x[nodes], on[facets]))
+    parts = agree(mesh.comm, (len(inside), numbers, mesh.geometry.x[nodes][:, :, :d], on[facets]))
     if any(part[0] for part in parts):
         return None
     found = [np.concatenate([part[i] for part in parts]) for i in (1, 2, 3)]
@@ -116,15 +124,19 @@ def _surface(domain: Domain) -> _Surface | None:
 
 
 def _exterior(mesh: dmesh.Mesh) -> Entities:
-    mesh.topology.create_connectivity(2, 3)
+    d = mesh.topology.dim
+    mesh.topology.create_connectivity(d - 1, d)
     return np.asarray(dmesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
 
 
 def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
-    """The (local) nodes of facets, counterclockwise as seen from outside, from the file's first on, (f, 3)."""
+    """The (local) nodes of facets; of triangles counterclockwise as seen from outside, from the file's first on."""
+    d = mesh.topology.dim
     if not len(facets):
-        return np.empty((0, 3), dtype=np.int32)  # dolfinx divides by their number
-    nodes = np.asarray(dmesh.entities_to_geometry(mesh, 2, facets), dtype=np.int32)
+        return np.empty((0, d), dtype=np.int32)  # dolfinx divides by their number
+    nodes = np.asarray(dmesh.entities_to_geometry(mesh, d - 1, facets), dtype=np.int32)
+    if d == 2:
+        return nodes
     links = mesh.topology.connectivity(2, 3)
     middle = mesh.geometry.x[compat.geometry_dofmap(mesh)[links.array[links.offsets[facets]]]].mean(axis=1)
     a, b, c = mesh.geometry.x[nodes].transpose(1, 0, 2)
@@ -134,39 +146,73 @@ def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     return np.take_along_axis(nodes, (first[:, None] + np.arange(3)) % 3, axis=1)
 
 
-def _remeshed(
+def _in_plane(
     surface: _Surface, cells: _CellSample, factor: float, thresholds: MeshThresholds
 ) -> tuple[Array, Integers] | None:
-    """Vertices (n, 3) and cells (c, 4), or None where gmsh fails, or takes too long. On rank 0."""
+    """Vertices (n, 2) and triangles (c, 3) within the thinned outline, each of whose edges is one of a triangle.
+
+    None where the outline touches itself: gmsh would work on crossing edges for ever. On rank 0.
+    """
+    body = shapely.build_area(shapely.MultiLineString(list(surface.corners)))
+    if body.geom_type != "Polygon":
+        return None
+    unit = float(np.ptp(surface.corners, axis=(0, 1)).max())
+    rings = [shapely.get_coordinates(ring) / unit for ring in (body.exterior, *body.interiors)]
+    thinned = [_thinned(ring, factor, thresholds.outline_turn) for ring in rings]
+    if not shapely.Polygon(thinned[0], thinned[1:]).is_valid:
+        return None
+    try:
+        points, corners = gmsh_process.within(thinned)
+    except Exception:
+        # gmsh raises bare Exceptions, whatever it is that it cannot mesh
+        return None
+    return points[:, :2] * unit, corners
+
+
+def _thinned(ring: Array, factor: float, most: float) -> Array:
+    """A ring (n, 2), its first vertex last again, with fewer vertices: at equal distances from corner to corner.
+
+    Args:
+        ring: of vertices.
+        factor: about how many edges become one.
+        most: by how much (radian) a corner turns at least, and one edge to the next, about, between corners.
+    """
+    (ax, ay), (bx, by) = np.roll(edges := np.diff(ring, axis=0), 1, axis=0).T, edges.T
+    turns = np.abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+    first = int(np.argmax(turns))
+    ring, turns = np.roll(ring[:-1], -first, axis=0), np.roll(turns, -first)
+    corners = np.unique([0, *np.flatnonzero(turns > most), len(ring)])
+    kept = []
+    for start, end in pairwise(corners):
+        pieces = max(round((end - start) / factor), math.ceil(turns[start + 1 : end].sum() / most), 1)
+        kept.append(np.unique(np.rint(np.linspace(start, end, pieces + 1)[:-1]).astype(int)))
+    found = ring[np.concatenate(kept)]
+    return np.vstack([found, found[:1]])
+
+
+def _in_space(
+    surface: _Surface, cells: _CellSample, factor: float, thresholds: MeshThresholds
+) -> tuple[Array, Integers] | None:
+    """Vertices (n, 3) and cells (c, 4), or None where gmsh fails, or takes too long. On rank 0.
+
+    It works in a process of its own: for a surface that it cannot parametrise it may take any time, or end its process.
+    """
     _, first, inverse = np.unique(surface.nodes, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1, 3)
     if not _one_shell(triangles):
         return None
-    try:
-        points = surface.corners.reshape(-1, 3)[first]
-        return _run_gmsh(points, triangles, cells.midpoints, factor * cells.sizes, thresholds.gmsh_seconds)
-    except (subprocess.SubprocessError, OSError):
-        return None
-
-
-def _run_gmsh(
-    points: Array, triangles: Integers, places: Array, sizes: Array, timeout: float
-) -> tuple[Array, Integers]:
-    """The mesh that :mod:`.gmsh_worker` makes, in a process of its own, within a time limit (s).
-
-    Raises:
-        SubprocessError: it failed, or took too long.
-        OSError: there is no room for the files that it reads and writes.
-    """
     with tempfile.TemporaryDirectory() as folder:
-        source, target = Path(folder, "given.npz"), Path(folder, "made.npz")
-        np.savez(source, points=points, triangles=triangles, places=places, sizes=sizes)
-        command = [*processes.PYTHON, "-m", "hvi_fenicsx.mesh.gmsh_worker", os.fspath(source), os.fspath(target)]
-        subprocess.run(
-            command, env=processes.environment(), cwd=folder, capture_output=True, check=True, timeout=timeout
-        )
-        with np.load(target) as made:
-            return made["points"], made["cells"]
+        source = Path(folder, "surface.npz")
+        wanted = {"places": cells.midpoints, "sizes": factor * cells.sizes, "turn": 2.0 * thresholds.outline_turn}
+        np.savez(source, points=surface.corners.reshape(-1, 3)[first], triangles=triangles, **wanted)
+        try:
+            done = processes.run(gmsh_process.__name__, [os.fspath(source)], thresholds.gmsh_seconds)
+        except subprocess.TimeoutExpired:
+            return None
+    if done.returncode or not done.stdout:
+        return None
+    with np.load(io.BytesIO(done.stdout)) as made:
+        return made["points"], made["cells"]
 
 
 def _one_shell(triangles: Integers) -> bool:
@@ -182,7 +228,7 @@ def _one_shell(triangles: Integers) -> bool:
 
 def _sides(domain: Domain, mesh: dmesh.Mesh, surface: _Surface) -> dict[str, Entities]:
     facets = _exterior(mesh)
-    middles = dmesh.compute_midpoints(mesh, 2, facets) if len(facets) else np.empty((0, 3))
+    middles = cell_facets.corners(mesh, facets).mean(axis=1)
     on = surface.on[_nearest(surface.corners.mean(axis=1), middles)]
     return {name: facets[on[:, i]] for i, name in enumerate(sorted(domain.sides))}
 
@@ -199,17 +245,14 @@ def _similar(fine: Domain, coarse: Domain, difference: float) -> bool:
 
 
 def measures(domain: Domain) -> dict[tuple[str, str], float]:
-    """Volume of the body (m³), areas of the sides (m²) and volumes of the regions, by kind and name. Collective."""
-    comm, x = domain.mesh.comm, domain.mesh.geometry.x
+    """Volume of the body (m^d), areas of the sides and volumes of the regions, by kind and name. Collective."""
     volumes = _volumes(owned_corners(domain.mesh))
     sizes = {("body", ""): float(volumes.sum())}
     for name, facets in sorted(domain.sides.items()):
-        corners = x[_outward(domain.mesh, facets)]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        sizes["side", name] = float(np.linalg.norm(cross, axis=1).sum() / 2)
+        sizes["side", name] = float(cell_facets.areas(cell_facets.corners(domain.mesh, facets)).sum())
     for name, cells in sorted(domain.regions.items()):
         sizes["region", name] = float(volumes[cells].sum())
-    return {name: total(comm, size) for name, size in sizes.items()}
+    return {name: total(domain.mesh.comm, size) for name, size in sizes.items()}
 
 
 def _nearest(places: Array, points: Array) -> Integers:
@@ -220,10 +263,11 @@ def _nearest(places: Array, points: Array) -> Integers:
 
 
 def owned_corners(mesh: dmesh.Mesh) -> Array:
-    """Vertices of the tetrahedra that this rank owns, m, (c, 4, 3)."""
-    return refinement.cell_corners(mesh)[: mesh.topology.index_map(3).size_local]
+    """Vertices of the cells that this rank owns, m, (c, d+1, d)."""
+    return refinement.cell_corners(mesh)[: mesh.topology.index_map(mesh.topology.dim).size_local]
 
 
 def _volumes(corners: Array) -> Array:
-    """Volumes of tetrahedra, m³."""
-    return np.asarray(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6)
+    """Volumes of cells, m^d."""
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.abs(np.linalg.det(edges)) / math.factorial(edges.shape[1]))
