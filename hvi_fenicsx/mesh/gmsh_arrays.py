@@ -143,12 +143,10 @@ def _check_cells(gmsh: Any, file: str, dimension: int) -> None:
 
 
 def _check_points(gmsh: Any, file: str, found: MeshArrays, dimension: int) -> None:
-    """Refuse coordinates that are not finite, too far away, or not in the plane, and cells without volume."""
+    """Refuse coordinates that are not finite, or not in the plane, and cells without volume."""
     points = found.points
     if not np.all(np.isfinite(points)):
         raise InputError(f"{file} a node's coordinates are not finite numbers")
-    if np.ptp(points, axis=0).max() < ROUNDING * np.abs(points).max():
-        raise InputError(f"{file} it is too far away from the origin for its size; remesh near the origin")
     if dimension == 2 and np.ptp(points[:, 2]) > ROUNDING * np.ptp(points[:, :2]):
         raise InputError(f"{file} a 2D mesh must lie in a plane z = constant")
     tags = gmsh.model.mesh.getElements(dimension)[1][0]

@@ -224,7 +224,7 @@ BROKEN = {
     "no mesh at all": (lambda _: "Hello, this is a letter.\n", "mesh file"),
     "nothing": (lambda _: "", "mesh file"),
     "an empty group": (lambda text: text.replace('1 1 "left"', '1 9 "left"'), "left"),
-    "a coordinate out of this world": (lambda text: text.replace("\n1 1 0\n", "\n1 1e200 0\n"), "beyond"),
+    "a coordinate out of this world": (lambda text: text.replace("\n1 1 0\n", "\n1 1e200 0\n"), "has no volume"),
     "a coordinate that is none": (lambda text: text.replace("\n1 1 0\n", "\n1 nan 0\n"), "mesh file"),
 }
 
