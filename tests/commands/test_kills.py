@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 from kills import WAYS, end, started
+from mpi4py import MPI
 from runs import command, contact, hvi, process, summary, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx.results.output_folder import OutputFolder
+from hvi_fenicsx.results import ResultFolder
 from hvi_fenicsx.runtime import manifest
 
 pytestmark = pytest.mark.long
@@ -68,7 +69,7 @@ def killed(chance: random.Random, span: float, file: Path, out: Path) -> None:
 def assert_whole(out: Path) -> None:
     """Every file is there and speaks of one scene, after a kill between the moves once the rest is moved."""
     if not (out / "summary.json").exists():
-        OutputFolder(out, "result").close()
+        ResultFolder(MPI.COMM_SELF, out, "replace").discard()
     found = manifest.read(out)
     assert found is not None
     assert found.damaged(out) is None

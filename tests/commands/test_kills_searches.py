@@ -13,10 +13,11 @@ from typing import Any
 
 import pytest
 from kills import WAYS, end, started
+from mpi4py import MPI
 from runs import command, hvi, summary, write_scene
 from scenes import model, quadratic_linear, two_blocks
 
-from hvi_fenicsx.results.output_folder import OutputFolder
+from hvi_fenicsx.results import ResultFolder
 from hvi_fenicsx.runtime import manifest
 
 pytestmark = pytest.mark.long
@@ -62,7 +63,7 @@ def killed(words: list[object], chance: random.Random, span: float) -> None:
 
 def assert_sound(out: Path) -> None:
     """Every file that the manifest lists is as it was written; the summary is there, or the run is unfinished."""
-    OutputFolder(out, "result").close()  # goes on where a kill between the moves left the folder
+    ResultFolder(MPI.COMM_SELF, out, "replace").discard()  # goes on where a kill between the moves left the folder
     found = manifest.read(out)
     if found is None:
         assert list(out.iterdir()) == []

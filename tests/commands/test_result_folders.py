@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 from damage import grid, msh
+from mpi4py import MPI
 from runs import command, hvi, summary, write_scene
 from scenes import model, quadratic_linear
 
-from hvi_fenicsx.results.output_folder import OutputFolder
+from hvi_fenicsx.results import ResultFolder
 
 TABLE = model(2, friction=quadratic_linear(1e3))
 
@@ -93,13 +94,12 @@ def test_a_damaged_result_is_not_finished(name: str, text: str | None, copy: Pat
 
 
 def test_a_run_into_a_folder_that_is_being_written_is_refused_at_once(scene: Path, tmp_path: Path) -> None:
-    first = OutputFolder(tmp_path / "r", "result")
-    first.stage()
+    first = ResultFolder(MPI.COMM_SELF, tmp_path / "r")
     for way in ([], ["--force"], ["--resume"]):
         done = run(scene, tmp_path / "r", *way)
         assert done.returncode == 2
         assert "another run writes into it just now" in done.stderr
-    first.close()
+    first.discard()
     assert run(scene, tmp_path / "r").returncode == 0
     assert names(tmp_path) == ["r", "square.toml"]
 

@@ -11,38 +11,37 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mpi4py import MPI
 
 from hvi_fenicsx import InputError
 from hvi_fenicsx.results import output_folder
-from hvi_fenicsx.results.output_folder import OutputFolder
+from hvi_fenicsx.results.output_folder import ResultFolder
 from hvi_fenicsx.runtime import manifest
 
 
 def written(out: Path, existing: output_folder.Existing = "replace", **files: str) -> tuple[str, ...]:
     """A result of these files, by their names before the ending; what became of the files of others."""
-    folder = OutputFolder(out, "result")
+    folder = ResultFolder(MPI.COMM_SELF, out, existing)
     try:
-        folder.check(existing)
-        work = folder.stage()
+        work = folder.work
         for name, text in files.items():
             (work / f"{name}.json").write_text(text)
-        return folder.move_in({})
+        return folder._moved_in({})
     finally:
-        folder.close()
+        folder.discard()
 
 
 def nested(out: Path, text: str, *names: str) -> tuple[str, ...]:
     """A result with results in it, as a search for equilibria makes them."""
-    folder = OutputFolder(out, "result")
+    folder = ResultFolder(MPI.COMM_SELF, out, "replace")
     try:
-        folder.check("replace")
-        work = folder.stage()
+        work = folder.work
         (work / "summary.json").write_text(text)
         for name in names:
             written(work / name, summary=text)
-        return folder.move_in({})
+        return folder._moved_in({})
     finally:
-        folder.close()
+        folder.discard()
 
 
 def names(folder: Path) -> list[str]:
@@ -76,14 +75,13 @@ def test_only_what_the_manifest_lists_makes_room(tmp_path: Path) -> None:
 def test_files_put_there_meanwhile_are_kept_and_one_with_a_name_of_ours_gets_another(tmp_path: Path) -> None:
     out = tmp_path / "r"
     out.mkdir()
-    folder = OutputFolder(out, "result")
-    folder.check("refuse")
-    (folder.stage() / "summary.json").write_text("ours")
+    folder = ResultFolder(MPI.COMM_SELF, out)
+    (folder.work / "summary.json").write_text("ours")
     (out / "notes.txt").write_text("mine")
     (out / "summary.json").write_text("mine")
     (out / "summary.json.kept").write_text("mine too")
-    kept = folder.move_in({})
-    folder.close()
+    kept = folder._moved_in({})
+    folder.discard()
     assert names(out) == ["manifest.json", "notes.txt", "summary.json", "summary.json.kept", "summary.json.kept-2"]
     assert (out / "summary.json").read_text() == "ours"
     assert (out / "summary.json.kept-2").read_text() == "mine"
@@ -114,12 +112,11 @@ def test_a_manifest_of_others_or_one_that_points_outside_is_none(text: str, tmp_
 
 
 def test_the_second_writer_is_refused_at_once_and_the_lock_goes_with_the_first(tmp_path: Path) -> None:
-    first = OutputFolder(tmp_path / "deep" / "r", "result")
-    first.stage()
+    first = ResultFolder(MPI.COMM_SELF, tmp_path / "deep" / "r")
     with pytest.raises(InputError, match=f"process {os.getpid()} on"):
-        OutputFolder(tmp_path / "deep" / "r", "result")
-    OutputFolder(tmp_path / "deep" / "other", "result").close()
-    first.close()
+        ResultFolder(MPI.COMM_SELF, tmp_path / "deep" / "r")
+    ResultFolder(MPI.COMM_SELF, tmp_path / "deep" / "other").discard()
+    first.discard()
     assert names(tmp_path) == []
     written(tmp_path / "r", summary="1")
 
@@ -139,7 +136,7 @@ def killed_at(
     out: Path,
     patch: pytest.MonkeyPatch,
     fill: Callable[[Path], None] = filled,
-    finish: Callable[[OutputFolder], object] = lambda folder: folder.move_in({}),
+    finish: Callable[[ResultFolder], object] = lambda folder: folder._moved_in({}),
 ) -> bool:
     """Replace a result, killed at a system call that changes files, counted from 0; whether there were so many.
 
@@ -151,9 +148,8 @@ def killed_at(
         finish: what is done with them, in which the process is killed, or when the folder is closed.
     """
     calls = itertools.count()
-    folder = OutputFolder(out, "result")
-    folder.check("replace")
-    fill(folder.stage())
+    folder = ResultFolder(MPI.COMM_SELF, out, "replace")
+    fill(folder.work)
 
     def counted(real: Any) -> Any:
         def call(*arguments: Any, **keys: Any) -> Any:
@@ -168,11 +164,12 @@ def killed_at(
             patched.setattr(os, name, counted(getattr(os, name)))
         try:
             finish(folder)
-            folder.close()
+            folder.discard()
         except Killed:
             pass
         else:
             return False
+    assert folder._lock is not None
     folder._lock.release(keep=True)  # as the kernel does
     return True
 
@@ -230,7 +227,7 @@ def test_killed_at_any_call_results_within_a_result_are_those_of_one(
 
     seen = []
     for out in killed_everywhere(tmp_path, monkeypatch, lambda out: nested(out, "1", "one", "two"), fill=fill):
-        OutputFolder(out, "result").close()
+        ResultFolder(MPI.COMM_SELF, out, "replace").discard()
         now = (out / "summary.json").read_text()
         inside = ["one", "two"] if now == "1" else ["one", "three"]
         assert names(out) == sorted([*inside, "manifest.json", "summary.json"])
