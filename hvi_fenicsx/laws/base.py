@@ -2,35 +2,52 @@
 
 A law is a locally Lipschitz function j: R → R of one displacement (a slip u_t, in 3D its length, or an
 opening), an energy per area in N/m. Its derivative is the traction in N/m². Every law is given by its split
-j = H - G into two convex functions (D.C., "difference of convex"); tractions, kinks and pieces follow from it
-(:mod:`.split_law`), and what is needed of all displacements together.
+j = H - G into two convex functions (D.C., "difference of convex"); tractions, kinks and pieces follow from it,
+and what is needed of all displacements together.
 Any consistent system of units will do; `scaled` changes it.
 """
 
 from __future__ import annotations
 
 import inspect
-from abc import abstractmethod
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
+import numpy as np
 from typing_extensions import override
 
 from ..class_registry import enter
 from ..errors import InputError
 from ..typing import Array, Integers
-from .convex_parts import ConvexPart, Directional, ScaledPart, SplitLaw, quotient
-from .parameter_checks import require_positive
-from .traction_bounds import Extremes, extremes
+from .convex_parts import ConvexPart, Directional, ScaledPart, quotient
 from .traction_graph import TractionGraph
 
+
+@dataclass(frozen=True, kw_only=True)
+class LawThresholds:
+    """Limits of laws, and of the search for extreme tractions.
+
+    Attributes:
+        resolution: relative sharpness of the bounds, and the least displacement sampled, over the law's length scale;
+            its inverse, squared, is the largest one, over the largest of 1, the length scale and the kinks.
+        samples: displacements of the first grid, in geometric progression; bisection goes on up to the square of it.
+        most_drops: drops of a sawtooth: each is a piece of the law, which is looked at at every vertex.
+    """
+
+    resolution: float = 1e-6
+    samples: int = 400
+    most_drops: int = 1_000
+
+
+DEFAULT = LawThresholds()
 Powers = Mapping[str, tuple[int, int]]
 _REGISTRY: dict[str, type] = {}
 
 
-class Superpotential(SplitLaw):
+class Superpotential(ABC):
     """A law j: R → R. To write your own, see docs/laws.md: usually a simpler base class is enough.
 
     A subclass with a `name` is registered under it (unless declared with `register=False`) and can then be
@@ -53,14 +70,34 @@ class Superpotential(SplitLaw):
         """How messages name it."""
         return f"law {self.name!r}"
 
+    @property
+    @abstractmethod
+    def convex(self) -> ConvexPart:
+        """H of the split j = H - G: the rising parts and upward jumps of the traction."""
+
+    @property
+    @abstractmethod
+    def concave(self) -> ConvexPart:
+        """G of the split j = H - G, convex as well: the falling parts and downward jumps of the traction."""
+
     @abstractmethod
     def value(self, x: Array) -> Array:
         """The energy j at displacements x (m,), N/m, with j(0) = 0 (smoothed laws: to within their bound)."""
 
     @property
     @abstractmethod
+    def growth(self) -> Directional:
+        """j^∞(±1) = lim j(±t)/t for t → ∞, in N/m²: the residual resistance."""
+
+    @property
+    @abstractmethod
     def energy_scale(self) -> float:
         """A typical energy per area, N/m: roughly, the area under the law's graph up to the first kink."""
+
+    @property
+    @abstractmethod
+    def length_scale(self) -> float:
+        """A displacement typical of the law, m: where its first kink off zero lies."""
 
     @property
     @abstractmethod
@@ -77,6 +114,19 @@ class Superpotential(SplitLaw):
         """Whether the traction is proportional to the displacement, so that j adds nothing nonsmooth."""
         return False
 
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether j is convex: the derivative of G, which never falls, is the same at both ends of the line."""
+        far = np.sqrt(np.finfo(np.float64).max)
+        with np.errstate(all="ignore"):
+            low, high = self.concave.right(np.array([-far, far]))
+        return bool(low == high)
+
+    @property
+    def steepest_fall(self) -> float:
+        """A bound from above of -j'', N/m³: 0 where j is convex, inf where the traction drops or no bound is known."""
+        return 0.0 if self.is_convex else np.inf
+
     @property
     def traction_scale(self) -> float:
         """energy_scale / length_scale, N/m²."""
@@ -88,12 +138,17 @@ class Superpotential(SplitLaw):
 
         Unless a law overrides it, a bound from above, sharp to a relative 1e-6. So is c4.
         """
-        return Directional(self._extremes.peak_minus, self._extremes.peak_plus)
+        return self._extremes[0]
 
     @property
     def c4(self) -> float:
         """Growth condition (ii) of Ovcharova and Gwinner, section 4: -η x ≤ c4 |x| for η ∈ ∂j(x)."""
-        return self._extremes.c4
+        return self._extremes[1]
+
+    @cached_property
+    def _extremes(self) -> tuple[Directional, float]:
+        """The largest resistance and c4."""
+        return extremes(self)
 
     def scaled(self, length: float, traction: float) -> Superpotential:
         """The same law in other units: j(length x) / (length traction).
@@ -104,9 +159,85 @@ class Superpotential(SplitLaw):
         """
         return ScaledLaw(self, length, traction)
 
+    def left(self, x: Array) -> Array:
+        """Left derivative of j at x (m,), N/m²."""
+        return self.convex.left(x) - self.concave.left(x)
+
+    def right(self, x: Array) -> Array:
+        """Right derivative of j at x (m,), N/m²."""
+        return self.convex.right(x) - self.concave.right(x)
+
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        """Right derivative of j at x (m,), N/m², and j'' off the kinks, N/m³.
+
+        Args:
+            x: displacements, (m,), m.
+        """
+        (rises, steeper), (falls, steep) = (part.derivatives(x) for part in (self.convex, self.concave))
+        return rises - falls, steeper - steep
+
     @cached_property
-    def _extremes(self) -> Extremes:
-        return extremes(self)
+    def kinks(self) -> Array:
+        """Positions (k,), ascending, of all kinks of j."""
+        return np.union1d(self.convex.kinks, self.concave.kinks)
+
+    @property
+    def breaks(self) -> Array:
+        """Positions (k,), ascending, 0 among them, between which the traction is smooth."""
+        return np.union1d(self.kinks, np.zeros(1))
+
+    def interval(self, x: Array, atol: float | Array = 0.0) -> tuple[Array, Array]:
+        """Clarke's subdifferential [lo, hi] of j, N/m², each (m,).
+
+        Args:
+            x: displacements (m,), m.
+            atol: a length, or one for each displacement, m: the hull is taken with the intervals of every kink within
+                it, so that a displacement which means a kink but misses it by rounding is given the kink's whole
+                interval.
+        """
+        lo, hi = self._clarke(x)
+        for kink in self._kinks_within(x, atol):
+            near = np.abs(x - kink) <= atol
+            low, high = self._clarke(np.array([kink]))
+            lo = np.where(near, np.minimum(lo, low[0]), lo)
+            hi = np.where(near, np.maximum(hi, high[0]), hi)
+        return lo, hi
+
+    def distance(self, x: Array, traction: Array, atol: float | Array = 0.0) -> Array:
+        """Distance (m,) of a traction from ∂j(x), N/m²; zero if the law allows it.
+
+        Args:
+            x: displacements (m,), m.
+            traction: (m,), N/m².
+            atol: see `interval`.
+        """
+        lo, hi = self.interval(x, atol)
+        return np.asarray(np.maximum(np.maximum(lo - traction, traction - hi), 0.0))
+
+    def piece(self, x: Array) -> Integers:
+        """Index (m,) of the law's piece that x lies on, counted from 0 by |x|; this default knows one."""
+        return np.zeros(np.shape(x), dtype=np.int64)
+
+    def branch(self, x: Array, atol: float | Array = 0.0) -> Integers:
+        """Index (m,) of the active piece, counted from 0 by |x|; -1 on a kink.
+
+        Args:
+            x: displacements (m,), m.
+            atol: the distance from a kink, or one for each displacement, m, that counts as being on it.
+        """
+        result = self.piece(x)
+        for kink in self._kinks_within(x, atol):
+            result = np.where(np.abs(x - kink) <= atol, -1, result)
+        return result
+
+    def _clarke(self, x: Array) -> tuple[Array, Array]:
+        left, right = self.left(x), self.right(x)
+        return np.minimum(left, right), np.maximum(left, right)
+
+    def _kinks_within(self, x: Array, atol: float | Array) -> Array:
+        if np.size(x) == 0:
+            return np.empty(0)
+        return self.kinks[(self.kinks >= np.min(x - atol)) & (self.kinks <= np.max(x + atol))]
 
 
 _KEYS_BESIDE = {"multiplier", "length_multiplier"}
@@ -116,8 +247,7 @@ _KEYS_BESIDE = {"multiplier", "length_multiplier"}
 def _refuse_hidden_properties(cls: type[Superpotential]) -> None:
     """A parameter called `peak`, say, would silently replace the property of that name."""
     known = {key for base in Superpotential.__mro__ for key in vars(base) if not key.startswith("_")}
-    reserved = known | _KEYS_BESIDE
-    hidden = sorted(reserved & (inspect.get_annotations(cls).keys() - {"name", "powers"}))
+    hidden = sorted((known | _KEYS_BESIDE) & (inspect.get_annotations(cls).keys() - {"name", "powers"}))
     if hidden:
         raise InputError(
             f"law class {cls.__name__}: the parameter name {hidden[0]!r} is taken by a property that "
@@ -146,9 +276,6 @@ class ScaledLaw(Superpotential, register=False):
     length: float
     traction: float
 
-    def __post_init__(self) -> None:
-        require_positive(self._title, length=self.length, traction=self.traction)
-
     @override
     def value(self, x: Array) -> Array:
         return quotient(self.law.value(x * self.length), self.length * self.traction)
@@ -164,19 +291,14 @@ class ScaledLaw(Superpotential, register=False):
         return ScaledPart(self.law.concave, self.length, self.traction)
 
     @override
-    @cached_property
-    def graph(self) -> TractionGraph | None:
-        return None if self.law.graph is None else self.law.graph.scaled(self.length, self.traction)
-
-    @override
     @property
     def growth(self) -> Directional:
-        return Directional(self.law.growth.minus / self.traction, self.law.growth.plus / self.traction)
+        return self.law.growth.times(1.0 / self.traction)
 
     @override
-    @property
-    def peak(self) -> Directional:
-        return Directional(self.law.peak.minus / self.traction, self.law.peak.plus / self.traction)
+    @cached_property
+    def _extremes(self) -> tuple[Directional, float]:
+        return self.law.peak.times(1.0 / self.traction), self.law.c4 / self.traction
 
     @override
     @property
@@ -195,11 +317,6 @@ class ScaledLaw(Superpotential, register=False):
 
     @override
     @property
-    def is_linear(self) -> bool:
-        return self.law.is_linear
-
-    @override
-    @property
     def breaks(self) -> Array:
         return quotient(self.law.breaks, self.length)
 
@@ -212,6 +329,62 @@ class ScaledLaw(Superpotential, register=False):
     def piece(self, x: Array) -> Integers:
         return self.law.piece(x * self.length)
 
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return ScaledLaw(self.law, self.length * length, self.traction * traction)
+
+_Objective = Callable[[Array, Array, Array], Array]
+"""Objective f(lo, hi, |x|) of an interval of tractions lo..hi and a displacement."""
+
+
+def extremes(law: Superpotential, thresholds: LawThresholds = DEFAULT) -> tuple[Directional, float]:
+    """The largest resistance and c4 of a law known only by its split j = H - G: bounds from above by bisection.
+
+    On an interval (a, b) the traction j' = H' - G' lies in [H'(a+) - G'(b-), H'(b-) - G'(a+)], since H' and G'
+    are monotone. Bisecting wherever this bound still exceeds the best sample gives a bound from above that
+    is as sharp as wished: no peak, however narrow, can hide between samples.
+
+    Args:
+        law: by its split.
+        thresholds: how sharp, and how far out.
+    """
+    unit, kinks = law.length_scale, np.abs(law.kinks)
+    ends = thresholds.resolution * unit, thresholds.resolution**-2 * max(unit, 1.0, *kinks)
+    ahead = np.unique(np.concatenate([[0.0], kinks, np.geomspace(*ends, thresholds.samples)]))
+    behind = -ahead[::-1]
+    both = np.append(behind[:-1], ahead)
+    minus = _supremum(law, both, lambda lo, hi, r: -lo, thresholds)
+    plus = _supremum(law, both, lambda lo, hi, r: hi, thresholds)
+    against = (
+        _supremum(law, ahead, lambda lo, hi, r: np.where(r > 0, -lo, 0.0), thresholds),
+        _supremum(law, behind, lambda lo, hi, r: np.where(r > 0, hi, 0.0), thresholds),
+    )
+    return Directional(max(law.growth.minus, minus), max(law.growth.plus, plus)), max(0.0, *against)
+
+
+def _supremum(law: Superpotential, grid: Array, objective: _Objective, thresholds: LawThresholds) -> float:
+    """A bound from above of the objective's supremum over the range of the grid."""
+    a, b = grid[:-1], grid[1:]
+    lo, hi = law.interval(grid)
+    best, size = _sample(law, grid, objective), np.maximum(np.abs(lo), np.abs(hi))
+    typical = float(np.abs(objective(-size, size, np.abs(grid))).max())  # so that the tolerance is never zero
+    tolerance = thresholds.resolution * max(abs(best), typical)
+    while (undecided := (bound := _bound(law, a, b, objective)) > best + tolerance).any():
+        a, b = a[undecided], b[undecided]
+        middle = 0.5 * (a + b)
+        if a.size > thresholds.samples**2 or np.any((middle == a) | (middle == b)):
+            break
+        best = max(best, _sample(law, middle, objective))
+        a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
+    if undecided.any():
+        return float(bound.max())
+    return best + tolerance if best > 0 else best
+
+
+def _sample(law: Superpotential, x: Array, objective: _Objective) -> float:
+    return float(objective(*law.interval(x), np.abs(x)).max())
+
+
+def _bound(law: Superpotential, a: Array, b: Array, objective: _Objective) -> Array:
+    lo = law.convex.right(a) - law.concave.left(b)
+    hi = law.convex.left(b) - law.concave.right(a)
+    nearest = np.minimum(np.abs(a), np.abs(b))
+    # The interval is open: where it starts at zero, it is not the excluded point x = 0 that counts.
+    return objective(lo, hi, np.where(nearest > 0, nearest, np.finfo(float).tiny))

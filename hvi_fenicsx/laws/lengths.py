@@ -17,7 +17,7 @@ from typing_extensions import override
 from ..class_registry import enter
 from ..errors import InputError
 from ..typing import Array, Mask
-from .parameter_checks import require_number, require_positive
+from .registry import require_number, require_positive
 
 _ROUNDS = 40
 """Newton steps to the boundary of an ellipsoid, at most; they end long before."""

@@ -14,10 +14,10 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from ..errors import InputError
+from ..geometry import ROUNDING
 from ..typing import Array, Integers
 from .base import Superpotential
 from .convex_parts import ConvexPart, Directional
-from .traction_bounds import DEFAULT, Extremes, LawThresholds
 from .traction_graph import TractionGraph
 
 
@@ -51,10 +51,6 @@ class PolylinePart(ConvexPart):
     @override
     def derivatives(self, x: Array) -> tuple[Array, Array]:
         return self.graph.right_and_slope(x)
-
-    @override
-    def second_range(self, low: Array, high: Array) -> tuple[Array, Array]:
-        return self.graph.slope_range(low, high)
 
 
 class PolylineLaw(Superpotential):
@@ -142,10 +138,9 @@ class PolylineLaw(Superpotential):
         return bool(np.all(g.left == g.right) and np.all(g.slopes == g.slopes[0]) and g.left[g.zero] == 0.0)
 
     @override
-    @cached_property
+    @property
     def steepest_fall(self) -> float:
-        drops = bool(np.any(self.graph.jumps < 0.0))
-        return np.inf if drops else max(0.0, -float(np.min(self.graph.slopes)))
+        return self.graph.steepest_fall
 
     @override
     @cached_property
@@ -153,26 +148,15 @@ class PolylineLaw(Superpotential):
         g = self.graph
         return Directional(_limit(-g.left[0], g.slopes[0]), _limit(g.right[-1], g.slopes[-1]))
 
-    @override
     @cached_property
-    def peak(self) -> Directional:
-        g = self.graph
-        limits = np.concatenate([g.left, g.right])
-        return Directional(
-            max(self.growth.minus, float(np.max(-limits)) + 0.0), max(self.growth.plus, float(np.max(limits)))
-        )
-
-    @cached_property
-    def _extremes(self) -> Extremes:
+    def _extremes(self) -> tuple[Directional, float]:
         """In closed form: on each piece the traction is monotone."""
-        g = self.graph
+        g, growth = self.graph, self.growth
+        limits = np.concatenate([g.left, g.right])
         ahead = np.append(g.left[g.zero + 1 :], g.right[g.zero :])
         behind = np.append(g.left[: g.zero + 1], g.right[: g.zero])
-        return Extremes(
-            self.peak.minus,
-            self.peak.plus,
-            c4=float(max(0.0, np.max(-ahead), -self.growth.plus, np.max(behind), -self.growth.minus)),
-        )
+        peak = Directional(max(growth.minus, float(np.max(-limits)) + 0.0), max(growth.plus, float(np.max(limits))))
+        return peak, float(max(0.0, np.max(-ahead), -growth.plus, np.max(behind), -growth.minus))
 
     @override
     @cached_property
@@ -293,7 +277,7 @@ class SampledLaw(PolylineLaw):
 
 
 def sample_traction(
-    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200, thresholds: LawThresholds = DEFAULT
+    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200
 ) -> tuple[tuple[float, float], ...]:
     """Points (displacement, traction) of a graph law from a function.
 
@@ -301,7 +285,6 @@ def sample_traction(
         traction: the traction (m,) at displacements (m,) > 0, smooth between 0 and the ends.
         ends: ascending, > 0.
         samples: intervals between two ends.
-        thresholds: what is meant as a jump.
 
     Raises:
         InputError: ends or samples are of no use, or a traction is not finite.
@@ -313,10 +296,10 @@ def sample_traction(
         )
     pieces = [_sample_piece(traction, a, b, samples) for a, b in itertools.pairwise(stops)]
     size = max(float(np.abs(t).max()) for _, t in pieces)
-    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > thresholds.jump * size else 0.0)]
+    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > ROUNDING * size else 0.0)]
     for (x, t), follower in zip(pieces, [*pieces[1:], None], strict=True):
         points += [(float(a), float(b)) for a, b in zip(x[1:], t[1:], strict=True)]
-        if follower is not None and abs(follower[1][0] - t[-1]) > thresholds.jump * size:
+        if follower is not None and abs(follower[1][0] - t[-1]) > ROUNDING * size:
             points.append((float(x[-1]), float(follower[1][0])))
     return tuple(points)
 

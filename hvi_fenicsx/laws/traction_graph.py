@@ -175,6 +175,11 @@ class TractionGraph:
         """Jumps (k,) of the traction at the breaks; most of them may be 0."""
         return self.right - self.left
 
+    @property
+    def steepest_fall(self) -> float:
+        """How steeply the traction falls at most; inf where it drops."""
+        return np.inf if np.any(self.jumps < 0.0) else max(0.0, -float(np.min(self.slopes)))
+
     @cached_property
     def zero(self) -> int:
         """Index of the break at displacement 0."""
@@ -242,23 +247,6 @@ class TractionGraph:
     def slope(self, x: Array) -> Array:
         """Slope (m,) at x; at a break the larger of the two."""
         return self._steeper(*self._pieces(x))
-
-    def slope_range(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """The least and the largest slope on closed intervals, (m,) each.
-
-        Args:
-            low: begin of the intervals, (m,).
-            high: end of the intervals, (m,).
-        """
-        first = np.searchsorted(self.breaks, low, side="left")
-        last = np.searchsorted(self.breaks, high, side="right")
-        least, most = np.sort([self.slopes[first], self.slopes[last]], axis=0)
-        several = np.flatnonzero(last - first > 1)
-        pieces = np.arange(len(self.slopes))
-        met = (pieces >= first[several, None]) & (pieces <= last[several, None])
-        least[several] = np.where(met, self.slopes, np.inf).min(axis=1)
-        most[several] = np.where(met, self.slopes, -np.inf).max(axis=1)
-        return least, most
 
     def primitive(self, x: Array) -> Array:
         """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""

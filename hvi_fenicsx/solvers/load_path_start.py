@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
-from ..laws.smoothing.base import SmoothedLaw
+from ..laws.smoothing import SmoothedLaw
 from ..paths.full_load import FullLoad, at_full_load
 from ..paths.state import PathOptions
 from ..paths.vertex_laws import is_straight
