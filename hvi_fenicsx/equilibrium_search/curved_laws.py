@@ -3,8 +3,8 @@
 Between two nodes a curve's traction becomes two lines that meet in the middle, such that tractions and energies at the
 nodes are the law's own (Schumaker 1983, SIAM Journal on Numerical Analysis 20, with the knot in the middle). The
 difference of the energies between nodes is bounded by sampling it, and between samples by the range of its first
-derivative, which follows from the derivatives of the law's convex parts at the samples (these never fall). Newton's
-method makes a point of polylines exact.
+derivative, which follows from the derivatives of the law's convex parts at the samples (these never fall), or of its
+second at their ends, widened by as much as that changes. Newton's method makes a point of polylines exact.
 """
 
 from __future__ import annotations
@@ -165,6 +165,14 @@ def _rises(law: Superpotential, x: Array) -> Array:
     return np.asarray(rises).reshape(len(x), x.shape[1] - 1)
 
 
+def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
+    """What the slopes of the law and its polyline differ by between samples, (n, k - 1)."""
+    step, ends = np.diff(x, axis=1), law.derivatives(x.ravel())[1].reshape(x.shape)
+    apart = np.abs(np.stack([ends[:, 1:], ends[:, :-1]]) - np.diff(traction, axis=1) / step).max(axis=0)
+    rounding = 4.0 * np.finfo(float).eps * np.abs(traction[:, 1:]) / step
+    return np.asarray(apart + np.abs(np.diff(ends, axis=1)) + rounding)
+
+
 def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Array:
     """Bounds of the difference of the energies on intervals, (n,)."""
     share, x = _samples(begin, end, samples)
@@ -173,7 +181,8 @@ def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Arra
     difference = np.abs(energy + value[:, :1] - value)
     step = np.diff(x, axis=1)
     span = np.abs(np.diff(traction, axis=1)) + _rises(law, x)
-    most = np.maximum(difference[:, 1:], difference[:, :-1]) + 0.25 * step * span
+    between = step * np.minimum(0.25 * span, 0.125 * step * _slopes_apart(law, x, traction))
+    most = np.maximum(difference[:, 1:], difference[:, :-1]) + between
     return np.asarray(most.max(axis=1) + np.finfo(float).eps * np.abs(value).max(axis=1))
 
 

@@ -22,7 +22,7 @@ class PolylineThresholds:
     far: float = 1e6
     bent: float = 0.01
     coarse: float = 1e-6
-    samples: int = 256
+    samples: int = 64
     most_nodes: int = 2_000
     one_place: float = 1e-12
 
