@@ -21,10 +21,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import compat
+from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
 from .domain import Domain
 from .thresholds import DEFAULT, MeshThresholds
-from .transfer import Numbers, Rows, Transfer, mean_rows, weighted_rows
+from .transfer import InterpolationTransfer, Numbers, Rows, Transfer, mean_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -52,8 +53,8 @@ def block(
     def coarsening() -> tuple[Domain, Transfer]:
         assert coarser is not None
         nested = all(2 * few == n for few, n in zip(coarser, cells, strict=True))
-        kind = NestedGridTransfer if nested else GridTransfer
-        return block(comm, size, coarser, thresholds), kind(size, coarser)
+        transfer = NestedGridTransfer(size, coarser) if nested else InterpolationTransfer()
+        return block(comm, size, coarser, thresholds), transfer
 
     return Domain(
         mesh=grid,
@@ -70,7 +71,7 @@ def coarser_cells(cells: Sequence[int], thresholds: MeshThresholds = DEFAULT) ->
     """The cells each way of the next coarser block; None where it would not pay.
 
     They are halved, so that the blocks are nested. Of a large block of which they cannot be halved, the coarser one has
-    nearly half of them, such that these can be halved as often as possible.
+    nearly half of them, such that these can be halved twice.
 
     Args:
         cells: cells each way, (d,).
@@ -78,19 +79,11 @@ def coarser_cells(cells: Sequence[int], thresholds: MeshThresholds = DEFAULT) ->
     """
     if all(n % 2 == 0 for n in cells):
         fewer = [n // 2 for n in cells]
-    elif len(cells) * math.prod(n + 1 for n in cells) >= thresholds.uneven_from:
-        fewer = [_often_halved(n / 2, thresholds.uneven_half) for n in cells]
+    elif len(cells) * math.prod(n + 1 for n in cells) >= thresholds.coarsest:
+        fewer = [4 * round(n / 8) for n in cells]
     else:
         return None
     return fewer if min(fewer) >= thresholds.coarsest_block else None
-
-
-def _often_halved(wanted: float, share: float) -> int:
-    """The number near to the one wanted, up to a share of it, that can be halved most often."""
-    step = 1
-    while abs(round(wanted / (2 * step)) * 2 * step - wanted) <= share * wanted:
-        step *= 2
-    return round(wanted / step) * step
 
 
 def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:
@@ -183,7 +176,7 @@ def _sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:
     if len(facets):  # dolfinx divides by their number
         middles = dmesh.compute_midpoints(mesh, d - 1, facets)
     ends = {n: (axis % d, end) for n, (axis, end) in _AXIS_OF_SIDE.items() if d == 3 or n not in ("front", "back")}
-    return {name: facets[np.abs(middles[:, i] - end * size[i]) < 1e-9 * size[i]] for name, (i, end) in ends.items()}
+    return {name: facets[np.abs(middles[:, i] - end * size[i]) < ROUNDING * size[i]] for name, (i, end) in ends.items()}
 
 
 def facets(simplices: Integers, steps: Sequence[int], vertices: int) -> tuple[Entities, Entities]:
@@ -315,35 +308,6 @@ class NestedGridTransfer(Transfer):
         parents = np.stack([_flat(end, cells) for end in (place // 2, (place + 1) // 2)], axis=1)
         pairs = _numbered(parents, coarse, far, self.size, cells)
         return mean_rows(pairs, fine.dofmap.index_map_bs)
-
-
-@dataclass(frozen=True)
-class GridTransfer(Transfer):
-    """From a block to one of any other numbers of cells: linear interpolation.
-
-    Attributes:
-        size: lengths of the block's edges, m, (d,).
-        coarser_cells: cells each way of the coarser block, (d,).
-    """
-
-    size: Sequence[float]
-    coarser_cells: Sequence[int]
-
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
-        near, far = points
-        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
-        place = _grid_places(near, self.size, cells)
-        corner = np.clip(np.floor(place), 0, cells - 1).astype(PETSc.IntType)
-        within = np.clip(place - corner, 0.0, 1.0)
-        order = np.argsort(-within, axis=1)  # the path to the highest corner takes the largest coordinate first
-        falling = np.take_along_axis(within, order, axis=1)
-        ends = np.ones((len(place), 1)), np.zeros((len(place), 1))
-        weights = -np.diff(np.hstack([ends[0], falling, ends[1]]), axis=1)
-        ways = np.cumsum(np.eye(len(cells), dtype=PETSc.IntType)[order], axis=1, dtype=PETSc.IntType)
-        corners = np.concatenate([corner[:, None], corner[:, None] + ways], axis=1)
-        numbers = _flat(corners.reshape(-1, len(cells)), cells).reshape(weights.shape)
-        return weighted_rows(_numbered(numbers, coarse, far, self.size, cells), weights, fine.dofmap.index_map_bs)
 
 
 def _grid_places(points: Array, size: Sequence[float], cells: Numbers) -> Array:

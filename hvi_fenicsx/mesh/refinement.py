@@ -14,7 +14,7 @@ import numpy as np
 from dolfinx import mesh as dmesh
 
 from .. import compat
-from ..geometry import Curve
+from ..geometry import ROUNDING, Curve
 from ..typing import Array, Entities
 from . import curved
 from .domain import Domain, check_affordable
@@ -22,7 +22,7 @@ from .facets import cell_facets
 from .thresholds import DEFAULT, MeshThresholds
 from .transfer import Halves, ParentCellTransfer, Transfer
 
-_SKEWED = np.eye(3) + 1e-6 * np.sqrt([[2.0, 3.0, 5.0], [3.0, 7.0, 11.0], [5.0, 11.0, 13.0]])
+_SKEWED = np.eye(3) + ROUNDING * np.sqrt([[2, 3, 5], [3, 7, 11], [5, 11, 13]])
 """Edges are measured after this linear map: there edges of equal length differ by direction, on all ranks alike."""
 
 

@@ -8,18 +8,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class MeshThresholds:
-    """When coarser meshes are made, which of them are used, and what counts as rounding.
+    """When coarser meshes are made, which of them are used, and how far cells are bent.
 
     Attributes:
         coarsest_block: cells each way of a block below which a coarser level does not help.
-        uneven_half: part by which the cells of a coarser block may differ from half of an odd number.
-        uneven_from: unknowns of a block whose cells cannot be halved from which a coarser one pays.
         bisected_edges: length of the edges of a marked tetrahedron that are bisected, relative to its longest one. All
             six edges would make a step of 4 to 5 times the unknowns; the longest and, in a sixth of a cube, the
             diagonals of its faces make it about 2.
         hierarchy_from: unknowns of a mesh file from which coarser meshes pay: with fewer, one factorisation takes less
             time than gmsh. Of a larger one, so many cells tell the sizes, regions and ranks of all.
-        coarsest: unknowns of the coarsest mesh of a mesh file, about.
+        coarsest: unknowns of the coarsest mesh of a mesh file, about; of a block of more, whose cells cannot be halved,
+            a coarser one pays.
         outline_turn: angle (radian) by which an outline turns at a vertex that is kept in any case, and by which it
             turns at most between two vertices that are kept: a coarse chord must stay near its curve. Twice as
             much is an edge of a surface.
@@ -29,8 +28,6 @@ class MeshThresholds:
     """
 
     coarsest_block: int = 4
-    uneven_half: float = 0.07
-    uneven_from: int = 5_000
     bisected_edges: float = 0.76
     hierarchy_from: int = 20_000
     coarsest: int = 2_500

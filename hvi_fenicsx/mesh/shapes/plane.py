@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 from pydantic import model_validator
 
 from ...errors import InputError
-from ...geometry import Outline
+from ...geometry import ROUNDING, Outline
 from ...schema import Mistake, validation_error
 from .base import LARGEST_PART, DomainShape
 
@@ -91,34 +91,13 @@ class PlaneShape(DomainShape):
 
     def unknowns(self, dimension: int) -> float:
         """About how many unknowns the mesh has, if all its cells have one size."""
-        return 2.0 * vertices(self.outline().area, self.mesh_size, self.mesh_size)
-
-
-def vertices(area: float, coarse: float, fine: float) -> float:
-    """About how many vertices a mesh has: one for √3/2 h², h growing evenly from the centre of half a disk to its rim.
-
-    Args:
-        area: of the half-disk, m².
-        coarse: h at its rim, m.
-        fine: h at its centre, m.
-    """
-    radius = math.sqrt(2.0 * area / math.pi)
-    growth = (coarse - fine) / radius
-    if growth <= 1e-3 * coarse / radius:
-        return area / (_AREA_OF_VERTEX * coarse**2)
-    whole = (math.log(coarse / fine) + fine / coarse - 1.0) / growth**2
-    return math.pi * whole / _AREA_OF_VERTEX
+        return 2.0 * self.outline().area / (_AREA_OF_VERTEX * self.mesh_size**2)
 
 
 class Round(PlaneShape):
-    """A disk or a part of it that touches y = 0 at the origin, where its mesh may be finer.
-
-    Class attributes:
-        part: of the disk.
-    """
+    """A disk or a part of it that touches y = 0 at the origin, where its mesh may be finer."""
 
     mesh_sizes: ClassVar[tuple[str, ...]] = ("mesh_size", "mesh_size_below")
-    part: ClassVar[float]
 
     if TYPE_CHECKING:
         radius: float
@@ -134,14 +113,15 @@ class Round(PlaneShape):
         return 4.0 * self.radius**2
 
     def unknowns(self, dimension: int) -> float:
-        """About how many unknowns the mesh has."""
-        return 2.0 * vertices(math.pi * self.radius**2 * self.part, self.mesh_size, self.finest)
+        """About how many unknowns the mesh has, if the size of its cells grows evenly up to half the disk's extent."""
+        growth = 1.0 - self.finest / self.mesh_size
+        graded = 2.0 * (-math.log(1.0 - growth) - growth) / growth**2 if growth**2 > ROUNDING else 1.0
+        return graded * super().unknowns(dimension)
 
 
 class Disk(Round):
     """A disk whose lowest point is the origin."""
 
-    part: ClassVar[float] = 1.0
     normals: ClassVar[Mapping[str, int | None]] = {"lower_arc": None, "upper_arc": None}
 
     shape: Literal["disk"] = "disk"
@@ -163,7 +143,6 @@ class Disk(Round):
 class HalfDisk(Round):
     """The lower half of a disk whose lowest point is the origin."""
 
-    part: ClassVar[float] = 0.5
     normals: ClassVar[Mapping[str, int | None]] = {"arc": None, "top": 1}
 
     shape: Literal["half_disk"] = "half_disk"

@@ -194,12 +194,12 @@ class SeveralBodies(DomainShape):
         return self._joined(comm, with_hierarchies(domains, thresholds))
 
     def _joined(self, comm: MPI.Comm, domains: Sequence[Domain]) -> Domain:
-        from .. import placement
         from ..joined import joined
+        from ..placement import check_places
 
         found = zip(self.bodies.items(), domains, strict=True)
         placed = [body.placed(name, domain) for (name, body), domain in found]
-        placement.check(comm, placed)
+        check_places(comm, placed)
         return joined(comm, placed)
 
     def _with_forms(self, forms: Mapping[str, DomainShape]) -> Self:
