@@ -59,7 +59,7 @@ def _box(comm: MPI.Comm, corners: Array) -> tuple[Array, Array]:
 
 
 def _inside(points: Array, cells: Array) -> Array:
-    """The points well within a cell: each weight is half of that of its middle; (k, d).
+    """The points well within a cell: each weight is two fifths of those of its middle; (k, d).
 
     The facets of curved sides that touch overlap by less.
     """
@@ -67,4 +67,4 @@ def _inside(points: Array, cells: Array) -> Array:
         return points[:0]
     _, near = cKDTree(cells.mean(axis=1)).query(points, k=list(range(1, min(_NEAREST, len(cells)) + 1)))
     least = barycentric_weights(cells[near], points[:, None]).min(axis=2)
-    return np.asarray(points[np.any(2 * cells.shape[1] * least > 1, axis=1)])
+    return np.asarray(points[np.any(5 * cells.shape[1] * least > 2, axis=1)])
