@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.estimate.contact_errors import ratio
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.model import Model
 from hvi_fenicsx.runtime import cost
 from hvi_fenicsx.runtime.cost import Timer

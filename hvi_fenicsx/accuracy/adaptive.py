@@ -16,9 +16,9 @@ from petsc4py import PETSc
 from ..estimate import bubbles, data_errors
 from ..estimate.estimator import Estimate
 from ..mesh import nodes, refinement
+from ..mesh.domain import DEFAULT as MESH
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
-from ..mesh.thresholds import DEFAULT as MESH
 from ..model import Model
 from ..problem.problem import Problem
 from ..runtime.cost import Timer

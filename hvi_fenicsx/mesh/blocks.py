@@ -23,8 +23,7 @@ from petsc4py import PETSc
 from .. import compat
 from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
-from .domain import Domain
-from .thresholds import DEFAULT, MeshThresholds
+from .domain import DEFAULT, Domain, MeshThresholds
 from .transfer import InterpolationTransfer, Numbers, Rows, Transfer, mean_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}

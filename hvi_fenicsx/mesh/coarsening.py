@@ -26,8 +26,7 @@ from ..runtime.mpi import agree, on_root, total
 from ..typing import Array, Entities, Integers, Mask
 from . import facets as cell_facets
 from . import gmsh_process, refinement
-from .domain import Domain
-from .thresholds import DEFAULT, MeshThresholds
+from .domain import DEFAULT, Domain, MeshThresholds
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ from ..geometry import ROUNDING, Curve, spot
 from ..runtime.mpi import agree, total
 from ..typing import Array, Entities, Integers
 from . import nodes, transfer
-from .domain import Domain
-from .thresholds import DEFAULT, MeshThresholds
+from .domain import DEFAULT, Domain, MeshThresholds
 
 _MORE_SWEEPS = 2
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""

@@ -22,9 +22,8 @@ from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
 from ..typing import Entities
 from . import curved, gmsh_process
-from .domain import Domain, check_affordable
+from .domain import DEFAULT, Domain, MeshThresholds, check_affordable
 from .gmsh_arrays import MeshArrays, extract, session
-from .thresholds import DEFAULT, MeshThresholds
 
 _SCRIPTS = (".geo", ".geo_unrolled")
 _HEADER = b"$MeshFormat"

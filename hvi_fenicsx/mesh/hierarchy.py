@@ -24,9 +24,8 @@ from ..typing import Entities, Integers, Mask
 from . import facets as cell_facets
 from . import refinement
 from .coarsening import coarsen
-from .domain import Domain
+from .domain import DEFAULT, Domain, MeshThresholds
 from .joined import PlacedBody, coarsening
-from .thresholds import DEFAULT, MeshThresholds
 from .transfer import InterpolationTransfer
 
 

@@ -17,9 +17,8 @@ from .. import compat
 from ..geometry import ROUNDING, Curve
 from ..typing import Array, Entities
 from . import curved
-from .domain import Domain, check_affordable
+from .domain import DEFAULT, Domain, MeshThresholds, check_affordable
 from .facets import cell_facets
-from .thresholds import DEFAULT, MeshThresholds
 from .transfer import Halves, ParentCellTransfer, Transfer
 
 _SKEWED = np.eye(3) + ROUNDING * np.sqrt([[2, 3, 5], [3, 7, 11], [5, 11, 13]])

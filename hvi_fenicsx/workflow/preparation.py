@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from ..certify import plausibility
 from ..mesh import nodes
+from ..mesh.domain import DEFAULT as MESH
 from ..mesh.domain import Domain, check_affordable
-from ..mesh.thresholds import DEFAULT as MESH
 from ..model import Model
 from ..problem.compose import Formulation
 from ..problem.problem import Problem

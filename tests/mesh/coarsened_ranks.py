@@ -11,8 +11,8 @@ from domains import COMM, measure
 from petsc4py import PETSc
 
 from hvi_fenicsx.mesh import gmsh_file
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 
 
 def main() -> None:

@@ -15,8 +15,8 @@ from mpi4py import MPI
 
 from hvi_fenicsx.mesh import gmsh_file, nodes
 from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 
 COMM = MPI.COMM_WORLD
 

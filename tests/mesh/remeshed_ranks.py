@@ -9,8 +9,8 @@ import numpy as np
 from mpi4py import MPI
 
 from hvi_fenicsx.mesh import coarsening, gmsh_file
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 
 COMM = MPI.COMM_WORLD
 

@@ -22,9 +22,9 @@ from scenes import NESTED
 from hvi_fenicsx import Model, read_scene, workflow
 from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.mesh.shapes import HalfDisk
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.transfer import InterpolationTransfer
 
 HERE = Path(__file__).parent

@@ -21,8 +21,8 @@ from runs import LONG_RANKS
 from hvi_fenicsx import read_tables, workflow
 from hvi_fenicsx.mesh import coarsening, gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.transfer import InterpolationTransfer
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 

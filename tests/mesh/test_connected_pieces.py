@@ -14,7 +14,7 @@ from mpi4py import MPI
 from runs import LONG_RANKS, on_ranks
 
 from hvi_fenicsx import read_tables, workflow
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
 
 COARSER = Thresholds(hierarchy_from=500, coarsest=100)

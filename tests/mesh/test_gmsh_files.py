@@ -22,7 +22,7 @@ from hvi_fenicsx import InputError
 from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.mesh import gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.runtime import cost, processes
 from hvi_fenicsx.runtime.mpi import raise_second
 

@@ -17,7 +17,7 @@ from scenes import NESTED, solved_system
 
 from hvi_fenicsx import InputError, read_scene, workflow
 from hvi_fenicsx.mesh.blocks import block
-from hvi_fenicsx.mesh.thresholds import DEFAULT as MESH
+from hvi_fenicsx.mesh.domain import DEFAULT as MESH
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.resting_start import contact_dofs

@@ -11,8 +11,8 @@ from mpi4py import MPI
 from scenes import model
 
 from hvi_fenicsx import InputError, prepare, read_tables
+from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.shapes import DomainShape
-from hvi_fenicsx.mesh.thresholds import MeshThresholds as Thresholds
 from hvi_fenicsx.runtime import cost
 
 

@@ -3,15 +3,9 @@
 # isort: off
 from ...class_registry import load_modules
 from .base import DomainShape
-from .block import Box, Rectangle
-from .plane import LShape
-from .plane import Disk
-from .plane import HalfDisk
-from .plane import NotchedStrip
-from .fixed_mesh import FixedMesh, MeshFile, Refinements
-from .fixed_mesh import GivenMesh
-from .fixed_mesh import OnlyMesh
-from .plane import PlaneShape
+from .built_in import Rectangle, Box
+from .built_in import LShape, Disk, HalfDisk, NotchedStrip, PlaneShape
+from .given import FixedMesh, MeshFile, Refinements, GivenMesh, OnlyMesh
 from .several import PlacedShape, SeveralBodies
 # isort: on
 

@@ -19,8 +19,7 @@ from ...schema import Table
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..domain import Domain
-    from ..thresholds import MeshThresholds
+    from ..domain import Domain, MeshThresholds
 
 
 FEWEST_ADAPTIVE = 3

@@ -26,9 +26,8 @@ from .base import DomainShape
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..domain import Domain
+    from ..domain import Domain, MeshThresholds
     from ..joined import PlacedBody
-    from ..thresholds import MeshThresholds
 
 Coordinate = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
 _SEVERAL = "set of bodies"
@@ -194,8 +193,7 @@ class SeveralBodies(DomainShape):
         return self._joined(comm, with_hierarchies(domains, thresholds))
 
     def _joined(self, comm: MPI.Comm, domains: Sequence[Domain]) -> Domain:
-        from ..joined import joined
-        from ..placement import check_places
+        from ..joined import check_places, joined
 
         found = zip(self.bodies.items(), domains, strict=True)
         placed = [body.placed(name, domain) for (name, body), domain in found]

@@ -1,13 +1,13 @@
-"""Shapes whose mesh is given and can only be refined, each cell in all: mesh files."""
+"""Shapes whose mesh is given and can only be refined, each cell in all: mesh files, and meshes of a user's program."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from ...errors import InputError
 from ...schema import ExistingFile, Positive
@@ -16,17 +16,7 @@ from .base import UNKNOWNS_OF_FILE, DomainShape
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..domain import Domain
-    from ..thresholds import MeshThresholds
-from typing import TYPE_CHECKING, Any
-
-from pydantic import ConfigDict
-
-if TYPE_CHECKING:
-    from mpi4py import MPI
-
-    from ..domain import Domain
-    from ..thresholds import MeshThresholds
+    from ..domain import Domain, MeshThresholds
 
 
 MOST_REFINEMENTS = 10
