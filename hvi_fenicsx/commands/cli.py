@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
-import re
 import shlex
 import signal
 import sys
@@ -72,16 +71,13 @@ def _with_petsc_joined(words: Sequence[str]) -> list[str]:
 def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
     if options.command == "version":
         return _version()
-    if getattr(options, "np", None) and not processes.is_under_mpirun():
-        from ..runtime import mpirun
-
-        return mpirun.run(options.np, words)
-    if not processes.is_under_mpirun():
-        return _run_on_ranks(options)
     from ..runtime import mpirun
 
-    processes.die_with_parent(signal.SIGKILL)
-    return mpirun.hand_over(_told(lambda: _run_on_ranks(options)))
+    if processes.is_under_mpirun():
+        processes.die_with_parent(signal.SIGKILL)
+        return mpirun.hand_over(_told(lambda: _run_on_ranks(options)))
+    ranks = getattr(options, "np", None)
+    return mpirun.run(ranks, words) if ranks else _run_on_ranks(options)
 
 
 def _run_on_ranks(options: argparse.Namespace) -> int:
@@ -172,7 +168,7 @@ def _folder() -> argparse.ArgumentParser:
     found.add_argument("--force", action="store_true", help="replace what is there")
     text = "keep a finished result of the same scene; else go on with what was stopped, or begin"
     found.add_argument("--resume", action="store_true", help=text)
-    found.add_argument("--np", type=_whole_number(4096), metavar="N", help="run on N MPI ranks")
+    found.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
     return found
 
 
@@ -212,17 +208,17 @@ def _study(study: argparse.ArgumentParser) -> None:
     )
     study.add_argument("--axis", action="append", default=[], metavar="NAME=VALUE,...", help=text)
     text = "solve a point at most N times for its time, by default 9"
-    study.add_argument("--repeat", type=_whole_number(1000), default=9, metavar="N", help=text)
+    study.add_argument("--repeat", type=_times, default=9, metavar="N", help=text)
     text = "give a point up after so many seconds, by default 120"
     study.add_argument("--limit", type=_seconds, default=120.0, metavar="SECONDS", help=text)
 
 
-def _number(below: float, allowed: str) -> Callable[[str], float]:
+def _number(below: float, allowed: str, kind: Callable[[str], float] = float) -> Callable[[str], float]:
     """Reads a number above 0."""
 
     def read(text: str) -> float:
         try:
-            value = float(text)
+            value = kind(text)
         except ValueError:
             value = math.nan
         if not 0 < value < below:
@@ -234,14 +230,4 @@ def _number(below: float, allowed: str) -> Callable[[str], float]:
 
 _relative = _number(1.0, "a relative error between 0 and 1, like 1e-2")
 _seconds = _number(math.inf, "a number of seconds above 0")
-
-
-def _whole_number(most: int) -> Callable[[str], int]:
-    """Reads a number of things."""
-
-    def read(text: str) -> int:
-        if not re.fullmatch(r"[1-9][0-9]{0,8}", text) or int(text) > most:
-            raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {most}, in digits like 2 (is {text!r})")
-        return int(text)
-
-    return read
+_ranks, _times = (_number(most + 1, f"a whole number from 1 to {most}, in digits like 2", int) for most in (4096, 1000))

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from .. import console
 from ..load_paths import path_files
 from ..load_paths.following import Control, PathRun
-from ..model import PathTable
+from ..model import Model, PathTable
 from ..paths.load_path import PathRow
 from ..paths.state import End
 from ..runtime import writing
-from ..runtime.cost import Timer
 from ..runtime.mpi import on_root
 from ..runtime.writing import Journal
 from ..workflow import prepare
 from . import session
-from .session import COMM, LOG, Command, Session, say, tell_moving
+from .session import COMM, LOG, Record, Session, say, tell_moving
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -26,14 +24,14 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         InputError: on all ranks alike.
     """
-    timer, scene = Timer(), session.scene_of(options)
-    command = Command(suffix="-path", again="the path is followed again", done=_done)
-    return session.execute(options, scene.changed(path=scene.path or PathTable()), command, timer, _run)
 
+    def done(record: Record) -> bool:
+        return record.get("path") is not None and record["path"]["end"] != End.INTERRUPTED
 
-def _done(record: dict[str, Any]) -> bool:
-    """Whether a summary is of a path that came to its end."""
-    return record.get("path") is not None and record["path"]["end"] != End.INTERRUPTED
+    def changed(scene: Model) -> Model:
+        return scene.changed(path=scene.path or PathTable())
+
+    return session.execute(options, _run, suffix="-path", done=done, changed=changed)
 
 
 def _run(call: Session) -> int:
@@ -89,4 +87,4 @@ def _tell(number: int, row: PathRow) -> None:
     """The moving line."""
     place = f" on {row.part}" if row.part else ""
     kind = "" if row.stable else ", unstable"
-    tell_moving("row %d, factor %.6g%s: %s%s", number, row.factor, kind, row.event, place)
+    tell_moving(f"row {number}, factor {row.factor:.6g}{kind}: {row.event}{place}")

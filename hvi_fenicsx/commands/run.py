@@ -11,10 +11,9 @@ from .. import console, results
 from ..errors import ExitCode, InputError
 from ..load_paths import last_borne
 from ..results.whole import write_whole
-from ..runtime.cost import Timer
 from ..workflow import Solution, find_solution, prepare
 from . import session
-from .session import COMM, LOG, Command, Record, Session, say
+from .session import COMM, LOG, Record, Session, say
 
 if TYPE_CHECKING:
     from ..accuracy.control import AccuracyResult, Goal  # a tenth of a second, for runs that ask for it
@@ -28,22 +27,20 @@ def execute(options: argparse.Namespace) -> int:
     """
     if options.accuracy is None and options.quantity is not None:
         raise InputError("--quantity: says what --accuracy is of; give it too")
-    timer, scene = Timer(), session.scene_of(options)
-    goal = _goal(options)  # a plugin of the scene may define its quantity
 
     def done(record: Record) -> bool:
+        goal = _goal(options)
         of_run = all(record.get(other) is None for other in ("path", "equilibria"))
         ended = record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
         accuracy = record["accuracy"]
         same = accuracy is None if goal is None else goal.as_dict().items() <= (accuracy or {}).items()
         return of_run and ended and same
 
-    command = Command(suffix="", again="the scene is run again", done=done)
-    return session.execute(options, scene, command, timer, lambda call: _run(call, goal))
+    return session.execute(options, _run, suffix="", done=done)
 
 
 def _goal(options: argparse.Namespace) -> Goal | None:
-    """The accuracy that is asked for; None where none is."""
+    """The accuracy that is asked for; None where none is. A plugin of the scene may define its quantity."""
     if options.accuracy is None:
         return None
     from ..accuracy import control, quantities
@@ -53,8 +50,9 @@ def _goal(options: argparse.Namespace) -> Goal | None:
     return goal
 
 
-def _run(call: Session, goal: Goal | None) -> int:
+def _run(call: Session) -> int:
     """Solve, write and tell; the exit code. Collective."""
+    goal = _goal(call.options)
     options, given = call.options, dict[str, Any](call.given)
     if goal is None:
         solution = _solved(call)

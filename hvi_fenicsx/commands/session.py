@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-import logging
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from mpi4py import MPI
 
@@ -25,24 +25,8 @@ from ..system import petsc_options
 
 COMM = MPI.COMM_WORLD
 LOG = log.logger("commands")
-H = TypeVar("H", bound=logging.Handler)
 Record = dict[str, Any]
 """A summary."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Command:
-    """A command that writes a folder.
-
-    Attributes:
-        suffix: what the default folder has behind the name of the scene.
-        again: what is done where a result cannot be kept, for the line that says so.
-        done: whether a summary is of what is asked for, and finished.
-    """
-
-    suffix: str
-    again: str
-    done: Callable[[Record], bool]
 
 
 @dataclass(frozen=True)
@@ -76,46 +60,40 @@ class Session:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def scene_of(options: argparse.Namespace) -> Model:
-    """The scene, with PETSc's options set. Collective.
-
-    Args:
-        options: of the command.
-
-    Raises:
-        InputError: on all ranks alike.
-    """
-    petsc_options.insert(options.petsc)
-    return on_root(COMM, lambda: read_scene(options.scene, options.overrides))
-
-
 def execute(
-    options: argparse.Namespace, scene: Model, command: Command, timer: Timer, work: Callable[[Session], int]
+    options: argparse.Namespace,
+    work: Callable[[Session], int],
+    *,
+    suffix: str,
+    done: Callable[[Record], bool],
+    changed: Callable[[Model], Model] = lambda scene: scene,
 ) -> int:
     """Have a command write its folder, unless that is finished already; the exit code. Collective.
 
     Args:
         options: the words of the command line.
-        scene: what it is of.
-        command: the command.
-        timer: where time goes.
         work: writes all files but ``run.log``, and gives the exit code (collective).
+        suffix: what the default folder has behind the name of the scene.
+        done: whether a summary is of what is asked for, and finished. Rank 0 only.
+        changed: what the command makes of the scene.
 
     Raises:
         InputError: on all ranks alike.
     """
-    default = Path("results") / f"{options.scene.stem}{command.suffix}"
-    target = on_root(COMM, lambda: results.resolved(options.out or default))
-    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, command))) is not None:
+    timer = Timer()
+    petsc_options.insert(options.petsc)
+    scene = changed(on_root(COMM, lambda: read_scene(options.scene, options.overrides)))
+    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / f"{options.scene.stem}{suffix}"))
+    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, done))) is not None:
         return code
     kept = existing(force=options.force or options.resume)
     with results.ResultFolder(COMM, target, kept, inputs=[options.scene]) as folder:
-        interrupted = stop_on_signals(COMM)
-        run_logs = on_first_rank(lambda: log.RunLog(folder.work / "run.log"))
-        with log.handled(*on_first_rank(log.TerminalDisplay)):
+        interrupted, run_logs = stop_on_signals(COMM), list[log.RunLog]()
+        on_root(COMM, lambda: run_logs.append(log.RunLog(folder.work / "run.log")))
+        with display():
             with log.handled(*run_logs):
                 code = work(Session(options, scene, folder, timer, interrupted))
-            on_root(COMM, lambda: _finish(run_logs))
+            on_root(COMM, lambda: [run_log.finish() for run_log in run_logs])
             folder.commit(scene)
             say(console.warnings([*folder.kept, *petsc_options.unread(options.petsc)]))
             first = on_root(COMM, lambda: f"; open {PAGE} there" if (target / PAGE).is_file() else "")
@@ -123,28 +101,20 @@ def execute(
     return int(code)
 
 
-def _finished(target: Path, scene: Model, command: Command) -> int | None:
+def _finished(target: Path, scene: Model, done: Callable[[Record], bool]) -> int | None:
     """The exit code of a finished result of the same scene, which is told; None where there is none. Rank 0 only."""
     record, fault = read_finished(target, scene)
     if fault is not None:
-        log.say(f"{target}: {fault}; {command.again}")
-    if record is None or not command.done(record):
+        log.say(f"{target}: {fault}; the scene is run again")
+    if record is None or not done(record):
         return None
     log.say(f"{target}: finished already ({record['reason']})")
     return int(record["exit_code"])
 
 
-def on_first_rank(make: Callable[[], H]) -> list[H]:
-    """The handler that rank 0 makes, none on the others. Collective."""
-    made: list[H] = []
-    on_root(COMM, lambda: made.append(make()))
-    return made
-
-
-def _finish(run_logs: Iterable[log.RunLog]) -> None:
-    """Close logs; an error of writing is raised. Rank 0 only."""
-    for run_log in run_logs:
-        run_log.finish()
+def display() -> AbstractContextManager[None]:
+    """Shows the lines of the command on the terminal, in a block; on rank 0."""
+    return log.handled(*([log.TerminalDisplay()] if COMM.rank == 0 else []))
 
 
 def say(lines: Iterable[str]) -> None:
@@ -153,11 +123,6 @@ def say(lines: Iterable[str]) -> None:
         LOG.info(line)
 
 
-def tell_moving(text: str, *values: object) -> None:
-    """Tell what is being done, on the terminal's moving line.
-
-    Args:
-        text: with the places of the values, as for logging.
-        *values: these.
-    """
-    LOG.debug(text, *values, extra={"moving": True})
+def tell_moving(text: str) -> None:
+    """Tell what is being done, on the terminal's moving line."""
+    LOG.debug("%s", text, extra={"moving": True})

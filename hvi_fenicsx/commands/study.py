@@ -9,13 +9,12 @@ from .. import results
 from ..errors import ExitCode
 from ..model import read_scene
 from ..results.output_folder import Existing
-from ..runtime import log
 from ..runtime.manifest import MARKS
 from ..runtime.mpi import on_root, stop_on_signals
 from ..study import plan
 from ..study.conduct import conduct
 from ..study.table import Study
-from .session import COMM, on_first_rank, say
+from .session import COMM, display, say
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -32,7 +31,7 @@ def execute(options: argparse.Namespace) -> int:
     interrupted = stop_on_signals(COMM)
     default = Path("results") / f"{options.scene.stem}-study"
     folder = on_root(COMM, lambda: results.resolved(options.out or default))
-    with log.handled(*on_first_rank(log.TerminalDisplay)):
+    with display():
         study, warnings = conduct(
             planned,
             COMM,
