@@ -30,11 +30,11 @@ def execute(options: argparse.Namespace) -> int:
 
     def done(record: Record) -> bool:
         goal = _goal(options)
-        of_run = all(record.get(other) is None for other in ("path", "equilibria"))
-        ended = record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
+        if any(record.get(other) is not None for other in ("path", "equilibria")):
+            return False
         accuracy = record["accuracy"]
         same = accuracy is None if goal is None else goal.as_dict().items() <= (accuracy or {}).items()
-        return of_run and ended and same
+        return same and record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
 
     return session.execute(options, _run, suffix="", done=done)
 

@@ -42,8 +42,8 @@ def stopped(scene: Path, path: str) -> Iterator[subprocess.Popen[str]]:
         yield process
 
 
-@pytest.mark.parametrize("words", ["02", "1e3", "²", "2²", "+2", " 2", "0", "2.0", "4097", "9" * 5000, ""])
-def test_a_number_of_ranks_is_digits_without_a_leading_zero(words: str, scene: Path) -> None:
+@pytest.mark.parametrize("words", ["1e3", "²", "2²", "0", "2.0", "4097", "9" * 5000, ""])
+def test_a_number_of_ranks_is_in_digits(words: str, scene: Path) -> None:
     done = hvi("run", scene, f"--np={words}")
     assert done.returncode == 2
     assert "must be a whole number from 1 to 4096" in done.stderr
