@@ -27,7 +27,6 @@ from hvi_fenicsx.estimate.estimator import Estimate, estimate
 from hvi_fenicsx.mesh import nodes, refinement
 from hvi_fenicsx.problem.spaces import displacement_space
 from hvi_fenicsx.runtime.cost import Timer
-from hvi_fenicsx.solvers.method import RunControl
 from hvi_fenicsx.solvers.nested_iteration import CoarseStart, LevelSolution, refined_levels, solve, solve_from_coarser
 from hvi_fenicsx.system.system import System, assemble
 from hvi_fenicsx.workflow import prepare
@@ -55,16 +54,16 @@ class Step:
 
 def steps(scene: Model, count: int) -> list[Step]:
     """A scene on its own mesh and on uniform refinements of it. Collective."""
-    prepared, control = prepare(scene), RunControl(timer=Timer())
-    model, options, verdict = prepared.model, prepared.options, prepared.solvability
-    found = [Step(solve(model, prepared.system, verdict, options, control), None)]
+    prepared = prepare(scene)
+    task = prepared.task()
+    found = [Step(solve(task, prepared.system), None)]
     for _ in range(count - 1):
         coarse = found[-1].solved
         refined = refinement.uniform(coarse.system.problem.domain)
-        system = assemble(refined.domain, model, Timer())
-        lift, levels = refined_levels(model, system, coarse.system, coarse.levels, refined.transfer, options, control)
+        system = assemble(refined.domain, task.model, Timer())
+        lift, levels = refined_levels(task, system, coarse.system, coarse.levels, refined.transfer)
         start = CoarseStart(system=coarse.system, result=coarse.result, prolongation=lift, levels=levels)
-        found.append(Step(solve_from_coarser(system, start, verdict, options, control), refined))
+        found.append(Step(solve_from_coarser(task, system, start), refined))
     return found
 
 

@@ -21,7 +21,6 @@ from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.load_paths.following import Control, PathRun
 from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.solvers import SolveContext, SolveResult, method, quadratic
-from hvi_fenicsx.solvers.method import RunControl
 from hvi_fenicsx.workflow import Preparation, finish
 from hvi_fenicsx.workflow.solving import examine
 
@@ -104,8 +103,7 @@ def _judged(
         assert solution.solve_result is not None
         assert solution.examination is not None
         return solution.solve_result, solution.examination
-    control = RunControl(timer=prepared.timer, interrupted=late)
-    found = _solved(case, data, prepared, control)
+    found = _solved(case, data, prepared, late)
     return found, examine(prepared, found.u)
 
 
@@ -118,9 +116,9 @@ def _unsolved(state: str, found: SolveResult) -> str:
     return "no_equilibrium" if state in UNDECIDED and not broken else "failed"
 
 
-def _solved(case: Case, data: Mapping[str, Any], prepared: Preparation, control: RunControl) -> SolveResult:
+def _solved(case: Case, data: Mapping[str, Any], prepared: Preparation, late: Callable[[], bool]) -> SolveResult:
     """The method's result; the case's start is for the methods that begin on pieces of the laws."""
-    context = SolveContext.create(prepared.system, (), prepared.solvability, prepared.options, control)
+    context = SolveContext.create(prepared.task(interrupted=late), prepared.system)
     method = quadratic.choose(prepared.options, prepared.system)(context)
     begin = hard_scenes.branches(case, prepared, data)
     takes = "branches" in inspect.signature(method.solve).parameters

@@ -27,7 +27,6 @@ from hvi_fenicsx.runtime import cost
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
-from hvi_fenicsx.solvers.method import RunControl, options_of
 from hvi_fenicsx.solvers.resting_start import resting_start
 from hvi_fenicsx.system import petsc_options
 from hvi_fenicsx.system.held_solver import LinearSettings
@@ -67,9 +66,10 @@ def linear(scene: Model, kind: str) -> Figures:
     if kind == "hypre":
         petsc_options.insert(HYPRE)
     timer = Timer()
-    system, options, levels = assembled(scene, timer), options_of(scene.solver), ()
+    prepared = prepare(scene, timer=timer)
+    system, levels = prepared.system, ()
     if kind == "mg":
-        levels = nested_iteration.coarser_levels(scene.formulation(), system, options, RunControl(timer=timer))
+        levels = nested_iteration.coarser_levels(prepared.task(), system)
     solver = ActiveSetSolver(system, levels, LinearSettings(KINDS[kind]), timer)
     _, iterations = resting_start(solver, [t.law for t in system.terms], scene.solver.tolerance)
     return {**timer.report(), "linear": iterations, "dofs": system.dofs, "certified": True}

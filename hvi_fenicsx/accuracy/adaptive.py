@@ -24,7 +24,7 @@ from ..problem.problem import Problem
 from ..runtime.cost import Timer
 from ..runtime.log import newton_step
 from ..runtime.mpi import agree, total
-from ..solvers.method import Progress, RunControl, never
+from ..solvers.method import Progress, never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.multigrid import Level, Levels
 from ..typing import Array, Entities
@@ -153,13 +153,11 @@ class AdaptiveSolver:
         prepared, coarse = self._prepared(level, scene, refined.domain), level.prepared.system
         with self.timer("setup"):
             found = refined_levels(
-                prepared.model,
+                prepared.task(),
                 prepared.system,
                 coarse,
                 level.levels,
                 refined.transfer,
-                prepared.options,
-                RunControl(timer=self.timer),
             )
         step, levels = found
         return self._solved(level, prepared, levels, step, ahead)

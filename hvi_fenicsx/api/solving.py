@@ -19,8 +19,8 @@ from ..problem import spaces
 from ..runtime.log import newton_step
 from ..schema import Table
 from ..solvers.method import Progress
-from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import petsc_options
+from ..system.thresholds import DEFAULT, Thresholds
 from ..workflow import Preparation, Solution
 from .solution import ModelSolution
 

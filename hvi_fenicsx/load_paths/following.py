@@ -73,7 +73,7 @@ class PathRun:
         if not known:
             raise InputError("path: nothing drives the body; add a load or a prescribed displacement")
         with prepared.timer("setup"):
-            most = prepared.options.thresholds.largest_dense
+            most = prepared.system.thresholds.largest_dense
             self._condensation = Condensation(system, self.scaled, most, interrupted)
             self._measures = Measures(system, self._condensation, self.scaled, remember=wanted.memory)
         self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
@@ -135,7 +135,6 @@ class PathRun:
             follow=Follow(wanted.follow),
             remember=self._remember,
             stops=wanted.contact_at,
-            thresholds=self.prepared.options.thresholds.following,
             **self._limits(),
         )
         resume = self.states[-1] if self.states else None

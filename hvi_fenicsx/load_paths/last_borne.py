@@ -20,7 +20,7 @@ from ..problem.problem import Problem
 from ..reduced import loading
 from ..runtime.log import logger
 from ..solvers import frozen_mixity, obstacle_force
-from ..solvers.method import Borne, never
+from ..solvers.method import Borne, decides_stability, never
 from ..workflow import LastBorne, Preparation, Solution
 
 _LOG = logger("path")
@@ -59,7 +59,7 @@ def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable
     )
 
     run = PathRun(prepared, PathTable(memory=False))
-    if not run.is_straight and 2 * run.size > prepared.options.thresholds.curve_unknowns:
+    if not run.is_straight and 2 * run.size > prepared.system.thresholds.curve_unknowns:
         run.free()
         return failed
     path = run.follow(Control(interrupted=interrupted))
@@ -84,7 +84,7 @@ def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
         return False
     if obstacle_force.pressed(prepared.problem) is not None:
         return False
-    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.options.thresholds.vertex_unknowns:
+    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.system.thresholds.vertex_unknowns:
         return False
     system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
     return True
@@ -95,7 +95,7 @@ def _shown(prepared: Preparation, problem: Problem, borne: Borne, failed: Soluti
     assert failed.solve_result is not None
     options, u = prepared.options, borne.u
     frozen_mixity.freeze(problem, u)
-    inertia = options.decides_stability(prepared.system)
+    inertia = decides_stability(options, prepared.system)
     found = certificate.examine(problem, u, options.tolerance, inertia=inertia)
     return replace(
         failed,

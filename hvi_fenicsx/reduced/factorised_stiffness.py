@@ -89,7 +89,7 @@ class FactorisedStiffness(CondensedStiffness):
 
     @override
     def inverse(self, columns: CellColumns) -> CellInverse:
-        return _inverse(self.factorised(_moving(columns), columns.slope), columns, self._system.thresholds.exchanges)
+        return _inverse(self.factorised(_moving(columns), columns.slope), columns, self._system.thresholds.columns)
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:

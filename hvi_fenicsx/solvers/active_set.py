@@ -22,9 +22,9 @@ from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.multigrid import Levels
 from ..system.petsc_options import default_options, prefix, raise_python_error
 from ..system.system import System
+from ..system.thresholds import Thresholds
 from ..typing import Entities
 from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
-from .thresholds import DEFAULT, Thresholds
 
 StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
@@ -48,7 +48,6 @@ class ActiveSetSolver:
         settings: how linear systems are solved.
         timer: where time goes.
         interrupted: whether to stop (collective, asked at each Newton step).
-        thresholds: how exact steps are, and when to give up.
 
     Attributes:
         convergence: the convergence test.
@@ -63,12 +62,11 @@ class ActiveSetSolver:
         settings: LinearSettings,
         timer: Timer,
         interrupted: Callable[[], bool] = lambda: False,
-        thresholds: Thresholds = DEFAULT,
     ) -> None:
         self.system, self.settings, self.timer = system, settings, timer
         self.held = HeldPreconditioner(system, levels, settings, timer)
-        self.interrupted, self.thresholds = interrupted, thresholds
-        self.convergence = ConvergenceTest(system, thresholds)
+        self.interrupted, self.thresholds = interrupted, system.thresholds
+        self.convergence = ConvergenceTest(system)
         self.progress: StepReport | None = None
         self._residual = system.load.duplicate()
 

@@ -67,7 +67,7 @@ class Auto(BranchIteration):
 
     def __init__(self, context: SolveContext) -> None:
         self._held, self._interrupted = context.solvability.state == "held", context.solver.interrupted
-        most = None if self._held else context.options.thresholds.search_steps
+        most = None if self._held else context.system.thresholds.search_steps
         self._limit = _StepLimit(context.solver.interrupted, most)
         super().__init__(replace(context, solver=context.solver.with_interruption(self._limit)))
 
@@ -126,7 +126,7 @@ class Auto(BranchIteration):
         A body that is held has an equilibrium, be it off the path.
         """
         with self.context.timer("setup"):
-            path = load_path_start.follow(self.system, self.options.thresholds, self._interrupted)
+            path = load_path_start.follow(self.system, self._interrupted)
         if path is None or (path.x is None and self._held):
             return None
         if path.x is None:

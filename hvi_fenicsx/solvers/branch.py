@@ -56,7 +56,7 @@ class BranchIteration(Method):
         check_bounded: bool = False,
     ) -> None:
         super().__init__(context)
-        self.thresholds, self.counts = context.options.thresholds, Counts()
+        self.thresholds, self.counts = context.system.thresholds, Counts()
         self.energies: list[float] = []
         self._laws = [t.law for t in self.system.terms] if laws is None else list(laws)
         self._epsilon = context.epsilon if epsilon is None else epsilon
@@ -237,7 +237,7 @@ class Continuation(Method):
             start: not used; each width starts from the solution of the width before.
         """
         counts, start, context = Counts(), None, self.context
-        thresholds = self.options.thresholds
+        thresholds = self.system.thresholds
         loose = context.with_options(tolerance=max(thresholds.coarse_tolerance, self.options.tolerance))
         for width in widths(context, 1.0):
             laws = [QUADRATIC.relative(t.exact, width) for t in self.system.terms]
@@ -257,7 +257,7 @@ def widths(context: SolveContext, first: float) -> Iterator[float]:
         context: with the wanted width.
         first: the widest.
     """
-    width, thresholds = first, context.options.thresholds
+    width, thresholds = first, context.system.thresholds
     while width > max(thresholds.narrowest, context.epsilon or 0.0):
         yield width
         width /= 2.0

@@ -125,7 +125,7 @@ class Condensation(Method):
 
     def _limits(self) -> dict[str, Any]:
         """When least squares end; not by the gradient, which is small wherever Φ is."""
-        thresholds = self.options.thresholds
+        thresholds = self.system.thresholds
         most = self.options.max_iterations
         return {"max_nfev": most, "ftol": thresholds.energy_rounding, "xtol": thresholds.energy_rounding, "gtol": None}
 

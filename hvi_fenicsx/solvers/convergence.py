@@ -14,7 +14,6 @@ from ..system.free_motions import Motions, SupportedBody
 from ..system.net_forces import ActingForces, Holder
 from ..system.system import System
 from ..typing import Array, Mask
-from .thresholds import Thresholds
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,16 +73,15 @@ class ConvergenceTest:
 
     Args:
         system: the assembled problem.
-        thresholds: what counts as rounding, and as being on a bound.
     """
 
-    def __init__(self, system: System, thresholds: Thresholds) -> None:
-        self._system, self._thresholds = system, thresholds
+    def __init__(self, system: System) -> None:
+        self._system, self._thresholds = system, system.thresholds
         rows = system.jacobian.rows.dofs
         self._limits = traction_limits(system)[rows]
         self._blocks = rows // system.problem.scales.dimension
-        self._near = thresholds.near * system.references.at(self._blocks)
-        self._net = NetForceTest(system, thresholds)
+        self._near = self._thresholds.near * system.references.at(self._blocks)
+        self._net = NetForceTest(system)
 
     def sizes(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> Sizes:
         """Size of the residual of the inequality. Collective.
@@ -200,11 +198,10 @@ class NetForceTest:
 
     Args:
         system: the assembled problem.
-        thresholds: what counts as being on a bound.
     """
 
-    def __init__(self, system: System, thresholds: Thresholds) -> None:
-        self._system, self._thresholds = system, thresholds
+    def __init__(self, system: System) -> None:
+        self._system, self._thresholds = system, system.thresholds
         self._d = system.problem.scales.dimension
         self._contact = (system.jacobian.rows.dofs[:: self._d] // self._d).astype(np.int32)
         self._loads = NodalForces.of(self._local(system.pushing))

@@ -43,7 +43,7 @@ class ConvexStep:
     ) -> None:
         self._system, self._solver = context.system, context.solver
         self._laws, self._counts, self._check_bounded = laws, counts, check_bounded
-        self._options, self._thresholds = context.options, context.options.thresholds
+        self._options, self._thresholds = context.options, context.system.thresholds
         self._residual = context.system.load.duplicate()
 
     def arguments(self, x: PETSc.Vec) -> list[Array]:
@@ -53,7 +53,7 @@ class ConvexStep:
     def cells(self, x: PETSc.Vec) -> list[Cells]:
         """The cells between convex kinks that hold x, by term."""
         terms = zip(self._system.terms, self._laws, self.arguments(x), strict=True)
-        return [Cells.around(law.convex, a, radial=t.radial, thresholds=self._thresholds.linear) for t, law, a in terms]
+        return [Cells.around(law.convex, a, radial=t.radial) for t, law, a in terms]
 
     def subgradients(self, x: PETSc.Vec, shifts: Sequence[Array] | None = None) -> list[Array]:
         """ξ ∈ ∂G at x, by term, (m,) each.
@@ -243,9 +243,9 @@ class ConvexStep:
             self._check_bounded = True
             if self._is_unbounded([m.xi for m in models if m.xi is not None]):
                 yield UNBOUNDED
-        yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.linear.foundation)
+        yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.foundation)
         secants = [replace(m, secant_from=m.law.length_scale) for m in models]
-        yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.linear.foundation)
+        yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
         yield Attempt(models=models, line_search=FULL_STEPS)
 
     def _is_unbounded(self, xi: Sequence[Array]) -> bool:

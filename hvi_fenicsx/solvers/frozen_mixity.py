@@ -12,35 +12,28 @@ from dataclasses import replace
 import numpy as np
 from dolfinx import fem
 
-from ..problem.compose import Formulation
 from ..problem.problem import Problem
-from ..rigid import Solvability
 from ..runtime.log import logger
 from ..runtime.mpi import largest
 from ..system.system import System
+from ..system.thresholds import DEFAULT
 from ..typing import Array
 from . import nested_iteration
 from .convergence import Counts
-from .method import RunControl, SolverOptions
+from .method import SolveTask
 from .nested_iteration import LevelSolution
-from .thresholds import DEFAULT
 
 _LOG = logger("solvers")
 _ROUNDS = 60
 """Solves at most; the certificate tells where they do not end."""
 
 
-def settled(
-    model: Formulation, found: LevelSolution, solvability: Solvability, options: SolverOptions, control: RunControl
-) -> LevelSolution:
+def settled(task: SolveTask, found: LevelSolution) -> LevelSolution:
     """A solution whose mode mixity is the frozen one; the same where no law asks for it. Collective.
 
     Args:
-        model: what is solved.
+        task: what is solved.
         found: a solution with any mixity.
-        solvability: whether a solution can exist.
-        options: method, tolerance, limits.
-        control: timer, progress and interruption.
 
     Raises:
         SolverError: a convex step raised the energy.
@@ -55,13 +48,13 @@ def settled(
         anew = _energies(found.system.problem, found.result.u)
         change = _change(found.system, anew)
         _LOG.info("the energies of separation change by %.1e with the mode mixity", change)
-        if change <= options.thresholds.margin * options.tolerance:
+        if change <= found.system.thresholds.margin * task.options.tolerance:
             break
         for term, energies in zip(found.system.terms, anew, strict=True):
             term.freeze(energies)
         start = fem.Function(found.result.u.function_space)
         start.x.array[:] = found.result.u.x.array * found.system.problem.scales.displacement
-        found = nested_iteration.solve_from_displacement(model, found.system, start, solvability, options, control)
+        found = nested_iteration.solve_from_displacement(task, found.system, start)
         counts.add(found.result.counts)
     return replace(found, result=replace(found.result, counts=counts))
 

@@ -19,13 +19,13 @@ from ..laws import Superpotential
 from ..laws.smoothing import SmoothedLaw
 from ..paths.full_load import FullLoad, at_full_load
 from ..paths.state import PathOptions
+from ..paths.thresholds import DEFAULT as FOLLOWING
 from ..paths.vertex_laws import is_straight
 from ..reduced.condensation import Condensation
 from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking
 from ..system.system import System
 from .method import Borne
-from .thresholds import Thresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,18 +73,17 @@ def _are_straight(laws: Sequence[Superpotential]) -> bool:
     return all(law.graph is not None for law in laws)
 
 
-def follow(system: System, thresholds: Thresholds, interrupted: Callable[[], bool]) -> PathStart | None:
+def follow(system: System, interrupted: Callable[[], bool]) -> PathStart | None:
     """The start, where its path can be followed in short time; None where it cannot, or is lost. Collective.
 
     A path of other than piecewise linear equations is followed where laws soften and Γc has few unknowns.
 
     Args:
         system: the system; its tangent and what it holds are taken away.
-        thresholds: how large the condensed system may be.
         interrupted: whether to stop (collective); then None.
     """
     laws = [term.exact for term in system.terms]
-    most = thresholds.vertex_unknowns if _are_straight(laws) else _most_on_curve(laws, thresholds)
+    most = system.thresholds.vertex_unknowns if _are_straight(laws) else _most_on_curve(system)
     if system.comm.allreduce(len(system.jacobian.rows.dofs)) > most:
         return None
     system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
@@ -92,7 +91,7 @@ def follow(system: System, thresholds: Thresholds, interrupted: Callable[[], boo
         condensation = Condensation(system)
     except (InputError, SolverError):
         return None
-    found = _on_first_rank(system, condensation.problem, thresholds, interrupted)
+    found = _on_first_rank(system, condensation.problem, interrupted)
     start = None if found is None else _expanded(condensation, found)
     condensation.free()
     return start
@@ -107,27 +106,20 @@ def _expanded(condensation: Condensation, found: FullLoad) -> PathStart:
     return PathStart(x=x, reason=found.reason, borne=borne)
 
 
-def _on_first_rank(
-    system: System, problem: CondensedProblem, thresholds: Thresholds, interrupted: Callable[[], bool]
-) -> FullLoad | None:
+def _on_first_rank(system: System, problem: CondensedProblem, interrupted: Callable[[], bool]) -> FullLoad | None:
     """Where the path leads, the same on all ranks to the last digit. Collective."""
-    if not _is_short(system, problem, thresholds):
+    if not is_straight(problem) and problem.size > _most_on_curve(system):
         return None
 
     def followed(ask: Callable[[], bool]) -> FullLoad | None:
         with suppress(np.linalg.LinAlgError, InputError):  # some edges in space have no path
-            options = PathOptions(most_events=thresholds.most_events, thresholds=thresholds.following)
+            options = PathOptions(most_events=FOLLOWING.waits * problem.size)
             return at_full_load(problem, options, ask)
         return None
 
     return on_root_asking(system.comm, followed, interrupted)
 
 
-def _is_short(system: System, problem: CondensedProblem, thresholds: Thresholds) -> bool:
-    """Whether the path is piecewise linear, or a curve of few unknowns that softening makes worth while."""
-    return is_straight(problem) or problem.size <= _most_on_curve([t.exact for t in system.terms], thresholds)
-
-
-def _most_on_curve(laws: Sequence[Superpotential], thresholds: Thresholds) -> int:
+def _most_on_curve(system: System) -> int:
     """The unknowns up to which a curve is followed: none where no law softens, which makes it worth while."""
-    return thresholds.curve_unknowns if any(softens(law) for law in laws) else 0
+    return system.thresholds.curve_unknowns if any(softens(term.exact) for term in system.terms) else 0

@@ -16,17 +16,14 @@ from ..errors import InputError
 from ..mesh import nodes
 from ..mesh.transfer import DegreeTransfer, Transfer
 from ..problem.compose import Formulation
-from ..rigid import Solvability
 from ..runtime.log import logger
 from ..system.held_solver import LinearSettings
 from ..system.multigrid import Level, Levels, prolongation, with_coarser_system
 from ..system.system import System, assemble
 from ..typing import Integers
-from . import quadratic
 from .convergence import Counts
-from .method import Method, RunControl, SolveContext, SolveResult, SolverOptions
-from .quadratic import LinearSolve
-from .thresholds import Thresholds
+from .method import SolveContext, SolveResult, SolverTable, SolveTask
+from .quadratic import LinearSolve, choose
 
 _LOG = logger("solvers")
 
@@ -44,246 +41,6 @@ class LevelSolution:
     system: System
     levels: Levels
     result: SolveResult
-
-
-def linear_settings(system: System, options: SolverOptions) -> LinearSettings:
-    """How a system's linear equations will be solved: by multigrid where it has a mesh hierarchy.
-
-    Args:
-        system: the assembled problem.
-        options: method, linear solver and thresholds.
-    """
-    kind = quadratic.choose(options, system)
-    nested = _has_coarser(system, options) and (kind.takes_start or kind is LinearSolve)
-    return LinearSettings.choose(system, options.linear_solver, options.thresholds.linear, levels=nested)
-
-
-def _has_coarser(system: System, options: SolverOptions) -> bool:
-    """Whether there is a coarser mesh, and the system is large enough for it to pay."""
-    domain, degree = system.problem.domain, nodes.degree(system.problem.space)
-    return system.dofs >= options.thresholds.nested_from and (degree > 1 or domain.coarsening is not None)
-
-
-def solve(
-    model: Formulation, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
-) -> LevelSolution:
-    """Solve a system; with a mesh hierarchy and a method that takes a start, from the coarsest level on. Collective.
-
-    Args:
-        model: what is solved, for the coarser meshes.
-        system: assembled on the finest mesh.
-        solvability: whether a solution can exist.
-        options: method, tolerance, limits.
-        control: timer, progress and interruption.
-
-    Raises:
-        SolverError: a convex step raised the energy.
-    """
-    kind = quadratic.choose(options, system)
-    nested = _has_coarser(system, options)
-    coarser = _coarser_system(model, system, control) if nested and kind.takes_start else None
-    if coarser is None:
-        levels = coarser_levels(model, system, options, control) if nested and kind is LinearSolve else ()
-        context = SolveContext.create(system, levels, solvability, options, control)
-        _log_level(system, kind)
-        return LevelSolution(system=system, levels=levels, result=kind(context).solve())
-    coarse, transfer = coarser
-    coarse.attach_free_motions(system.free_motions.modes if system.free_motions else ())
-    found = solve(model, coarse, solvability, _with_coarse_tolerance(options), control)
-    with control.timer("setup"):
-        step = prolongation(system, coarse, transfer)
-    levels = (Level(system, coarse, step), *found.levels)
-    start = CoarseStart(system=coarse, result=found.result, prolongation=step, levels=levels)
-    return solve_from_coarser(system, start, solvability, options, control)
-
-
-def solve_from_coarser(
-    system: System, start: CoarseStart, solvability: Solvability, options: SolverOptions, control: RunControl
-) -> LevelSolution:
-    """Solve a system from a solution on a coarser mesh. Collective.
-
-    Args:
-        system: assembled on the finer mesh.
-        start: the solution on the coarser mesh.
-        solvability: whether a solution can exist.
-        options: method, tolerance, limits.
-        control: timer, progress and interruption.
-
-    Raises:
-        SolverError: a convex step raised the energy.
-    """
-    if start.result.interrupted or control.interrupted():
-        return _stopped(system, start, options.thresholds)
-    kind, found = quadratic.choose(options, system), start.result
-    takes = found.converged and kind.takes_start
-    first = prolonged(start, system, options.thresholds) if takes else None
-    context = SolveContext.create(system, start.levels, solvability, options, control, steady=found.steady)
-    _log_level(system, kind)
-    result = kind(context).solve() if first is None else kind(context).solve(first)
-    if first is not None and not result.converged and not result.interrupted:
-        first = None
-        result = kind(SolveContext.create(system, start.levels, solvability, options, control)).solve()
-    counts = Counts()
-    counts.add(found.counts)
-    counts.add(result.counts)
-    steady = result.steady and (found.steady or found.levels == 1)  # a single coarser level says too little
-    off_path = result.off_path if first is None else found.off_path
-    result = replace(result, counts=counts, levels=found.levels + 1, steady=steady, off_path=off_path)
-    return LevelSolution(system=system, levels=start.levels, result=result)
-
-
-def _stopped(system: System, start: CoarseStart, thresholds: Thresholds) -> LevelSolution:
-    """What was found on the coarser mesh: where the solve is to stop, nothing is set up for it any more. Collective."""
-    u = system.displacement(prolonged(start, system, thresholds))
-    result = replace(
-        start.result,
-        u=u,
-        converged=False,
-        reason="interrupted",
-        interrupted=True,
-        levels=start.result.levels + 1,
-        borne=None,
-    )
-    return LevelSolution(system=system, levels=start.levels, result=result)
-
-
-def solve_from_displacement(
-    model: Formulation,
-    system: System,
-    u: fem.Function,
-    solvability: Solvability,
-    options: SolverOptions,
-    control: RunControl,
-) -> LevelSolution:
-    """Solve a system from a displacement on its own mesh, such as the solution of a similar load. Collective.
-
-    Args:
-        model: what is solved, for the coarser meshes.
-        system: assembled.
-        u: the displacement, m.
-        solvability: whether a solution can exist.
-        options: method, tolerance, limits.
-        control: timer, progress and interruption.
-
-    Raises:
-        SolverError: a convex step raised the energy.
-    """
-    kind = quadratic.choose(options, system)
-    if not kind.takes_start:
-        return solve(model, system, solvability, options, control)
-    levels = coarser_levels(model, system, options, control)
-    first = system.unknowns(u)
-    first.scale(1.0 / system.problem.scales.displacement)
-    make_admissible(first, system, options.thresholds)
-    _log_level(system, kind)
-    context = SolveContext.create(system, levels, solvability, options, control)
-    result = kind(context).solve(first)
-    if result.converged or result.interrupted:
-        return LevelSolution(system=system, levels=levels, result=result)
-    return solve(model, system, solvability, options, control)
-
-
-def _log_level(system: System, kind: type[Method]) -> None:
-    _LOG.info("level of %d unknowns: method %s", system.dofs, kind.label)
-
-
-def coarser_levels(model: Formulation, system: System, options: SolverOptions, control: RunControl) -> Levels:
-    """The coarser levels for the multigrid of an equation, which needs no solutions on them. Collective.
-
-    Args:
-        model: what is solved.
-        system: assembled on the finest mesh.
-        options: from which size on a coarser level pays.
-        control: where time goes.
-    """
-    if not _has_coarser(system, options):
-        return ()
-    coarser = _coarser_system(model, system, control)
-    if coarser is None:
-        return ()
-    coarse, transfer = coarser
-    levels = coarser_levels(model, coarse, options, control)
-    with control.timer("setup"):
-        return (Level(system, coarse, prolongation(system, coarse, transfer)), *levels)
-
-
-def _coarser_system(model: Formulation, system: System, control: RunControl) -> tuple[System, Transfer] | None:
-    """The next coarser system, of degree 1 first, then on coarser meshes, and the transfer from it. Collective.
-
-    None where a piece of a side is lost on the coarser mesh, or meets another one there.
-    """
-    domain = system.problem.domain
-    if nodes.degree(system.problem.space) > 1:
-        return _of_degree_one(model, system, control), DegreeTransfer()
-    with control.timer("mesh"):
-        coarser = domain.coarser()
-    assert coarser is not None
-    domain, transfer = coarser
-    try:
-        return assemble(domain, _coarser_model(model, system), control.timer, system.thresholds), transfer
-    except InputError:
-        if all(part.where is None for part in model.parts.values()):
-            raise
-        return None
-
-
-def _of_degree_one(model: Formulation, system: System, control: RunControl) -> System:
-    """The system of degree 1 on the same mesh. Collective."""
-    return assemble(system.problem.domain, _coarser_model(model, system), control.timer, system.thresholds)
-
-
-def _coarser_model(model: Formulation, system: System) -> Formulation:
-    """The model of the next coarser level, of degree 1.
-
-    Below degree 2 a nearly incompressible body that is too large for a direct solver is softened, and stays so on the
-    levels below: of degree 1 no multigrid solves it, and this one only gives a start.
-    """
-    limits, mesh, ratio = system.thresholds, system.problem.domain.mesh, system.problem.bulk.volumetric_ratio
-    if model.degree == 1:
-        return model
-    large = mesh.geometry.dim * nodes.count(mesh, 1) > limits.largest_rubber[mesh.geometry.dim]
-    softened = 0.0 < ratio <= limits.volumetric_ratio or large
-    return replace(model, degree=1, volumetric_ratio=limits.volumetric_ratio if softened else np.inf)
-
-
-def refined_levels(
-    model: Formulation,
-    system: System,
-    coarse: System,
-    below: Levels,
-    transfer: Transfer,
-    options: SolverOptions,
-    control: RunControl,
-) -> tuple[PETSc.Mat, Levels]:
-    """The way to a system from the one on the mesh that was refined, and the system's coarser levels. Collective.
-
-    At degree 2 these are degree 1 on the same mesh and then on the coarser ones. A small system has none.
-
-    Args:
-        model: what is solved.
-        system: assembled on the refined mesh.
-        coarse: on the mesh that was refined.
-        below: the coarser levels of that one.
-        transfer: from that mesh.
-        options: from which size on a coarser level pays.
-        control: where time goes.
-    """
-    step = prolongation(system, coarse, transfer)
-    if system.dofs < options.thresholds.nested_from:
-        return step, ()
-    if nodes.degree(system.problem.space) == 1:
-        return step, with_coarser_system(system, coarse, below, step)
-    linear = _of_degree_one(model, system, control)
-    linear.attach_free_motions(system.free_motions.modes if system.free_motions else ())
-    coarser = below[0].system if below else _of_degree_one(model, coarse, control)
-    levels = with_coarser_system(linear, coarser, below[1:], prolongation(linear, coarser, transfer))
-    return step, (Level(system, linear, prolongation(system, linear, DegreeTransfer())), *levels)
-
-
-def _with_coarse_tolerance(options: SolverOptions) -> SolverOptions:
-    """The options with the tolerance of a coarser level."""
-    tolerance = max(options.thresholds.coarse_tolerance, options.tolerance)
-    return options.model_copy(update={"tolerance": tolerance})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -305,20 +62,229 @@ class CoarseStart:
     way: float | None = None
 
 
-def prolonged(start: CoarseStart, system: System, thresholds: Thresholds) -> PETSc.Vec:
+def linear_settings(system: System, options: SolverTable) -> LinearSettings:
+    """How a system's linear equations will be solved: by multigrid where it has a mesh hierarchy.
+
+    Args:
+        system: the assembled problem.
+        options: method and linear solver.
+    """
+    kind = choose(options, system)
+    nested = _has_coarser(system) and (kind.takes_start or kind is LinearSolve)
+    return LinearSettings.choose(system, options.linear_solver, levels=nested)
+
+
+def _has_coarser(system: System) -> bool:
+    """Whether there is a coarser mesh, and the system is large enough for it to pay."""
+    domain, degree = system.problem.domain, nodes.degree(system.problem.space)
+    return system.dofs >= system.thresholds.nested_from and (degree > 1 or domain.coarsening is not None)
+
+
+def solve(task: SolveTask, system: System) -> LevelSolution:
+    """Solve a system; with a mesh hierarchy and a method that takes a start, from the coarsest level on. Collective.
+
+    Args:
+        task: what is solved.
+        system: assembled on the finest mesh.
+
+    Raises:
+        SolverError: a convex step raised the energy.
+    """
+    kind = choose(task.options, system)
+    coarser = _coarser_system(task, system) if kind.takes_start else None
+    if coarser is None:
+        levels = coarser_levels(task, system) if kind is LinearSolve else ()
+        return _solved(task, system, levels)
+    coarse, transfer = coarser
+    coarse.attach_free_motions(system.free_motions.modes if system.free_motions else ())
+    tolerance = max(system.thresholds.coarse_tolerance, task.options.tolerance)
+    found = solve(task.with_options(tolerance=tolerance), coarse)
+    with task.timer("setup"):
+        step = prolongation(system, coarse, transfer)
+    levels = (Level(system, coarse, step), *found.levels)
+    return solve_from_coarser(
+        task, system, CoarseStart(system=coarse, result=found.result, prolongation=step, levels=levels)
+    )
+
+
+def _solved(task: SolveTask, system: System, levels: Levels, *start: PETSc.Vec, steady: bool = False) -> LevelSolution:
+    """What the method finds on one level. Collective."""
+    kind = choose(task.options, system)
+    _LOG.info("level of %d unknowns: method %s", system.dofs, kind.label)
+    result = kind(SolveContext.create(task, system, levels, steady=steady)).solve(*start)
+    return LevelSolution(system=system, levels=levels, result=result)
+
+
+def solve_from_coarser(task: SolveTask, system: System, start: CoarseStart) -> LevelSolution:
+    """Solve a system from a solution on a coarser mesh. Collective.
+
+    Args:
+        task: what is solved.
+        system: assembled on the finer mesh.
+        start: the solution on the coarser mesh.
+
+    Raises:
+        SolverError: a convex step raised the energy.
+    """
+    known, levels = start.result, start.levels
+    if known.interrupted or task.interrupted():
+        return _stopped(system, start)
+    takes = known.converged and choose(task.options, system).takes_start
+    first = (prolonged(start, system),) if takes else ()
+    result = _solved(task, system, levels, *first, steady=known.steady).result
+    off_path = known.off_path
+    if not first or not (result.converged or result.interrupted):
+        result = _solved(task, system, levels).result if first else result
+        off_path = result.off_path
+    counts = Counts()
+    counts.add(known.counts)
+    counts.add(result.counts)
+    steady = result.steady and (known.steady or known.levels == 1)  # a single coarser level says too little
+    result = replace(result, counts=counts, levels=known.levels + 1, steady=steady, off_path=off_path)
+    return LevelSolution(system=system, levels=levels, result=result)
+
+
+def _stopped(system: System, start: CoarseStart) -> LevelSolution:
+    """What was found on the coarser mesh: where the solve is to stop, nothing is set up for it any more. Collective."""
+    result = replace(
+        start.result,
+        u=system.displacement(prolonged(start, system)),
+        converged=False,
+        reason="interrupted",
+        interrupted=True,
+        levels=start.result.levels + 1,
+        borne=None,
+    )
+    return LevelSolution(system=system, levels=start.levels, result=result)
+
+
+def solve_from_displacement(task: SolveTask, system: System, u: fem.Function) -> LevelSolution:
+    """Solve a system from a displacement on its own mesh, such as the solution of a similar load. Collective.
+
+    Args:
+        task: what is solved.
+        system: assembled.
+        u: the displacement, m.
+
+    Raises:
+        SolverError: a convex step raised the energy.
+    """
+    if not choose(task.options, system).takes_start:
+        return solve(task, system)
+    first = system.unknowns(u)
+    first.scale(1.0 / system.problem.scales.displacement)
+    return solve_from(task, system, coarser_levels(task, system), first)
+
+
+def solve_from(task: SolveTask, system: System, levels: Levels, first: PETSc.Vec) -> LevelSolution:
+    """Solve a system from unknowns near its solution, and where that fails from the coarse meshes. Collective.
+
+    Args:
+        task: what is solved, by a method that takes a start.
+        system: assembled.
+        levels: its coarser levels.
+        first: the unknowns, changed in place.
+    """
+    make_admissible(first, system)
+    found = _solved(task, system, levels, first)
+    return found if found.result.converged or found.result.interrupted else solve(task, system)
+
+
+def coarser_levels(task: SolveTask, system: System) -> Levels:
+    """The coarser levels for the multigrid of an equation, which needs no solutions on them. Collective.
+
+    Args:
+        task: what is solved.
+        system: assembled on the finest mesh.
+    """
+    coarser = _coarser_system(task, system)
+    if coarser is None:
+        return ()
+    coarse, transfer = coarser
+    levels = coarser_levels(task, coarse)
+    with task.timer("setup"):
+        return (Level(system, coarse, prolongation(system, coarse, transfer)), *levels)
+
+
+def _coarser_system(task: SolveTask, system: System) -> tuple[System, Transfer] | None:
+    """The next coarser system, of degree 1 first, then on coarser meshes, and the transfer from it. Collective.
+
+    None where the system is small or has none, or a piece of a side is lost on the coarser mesh, or meets another one.
+    """
+    if not _has_coarser(system):
+        return None
+    if nodes.degree(system.problem.space) > 1:
+        return _of_degree_one(task, system), DegreeTransfer()
+    with task.timer("mesh"):
+        coarser = system.problem.domain.coarser()
+    assert coarser is not None
+    domain, transfer = coarser
+    try:
+        return assemble(domain, _coarser_model(task.model, system), task.timer, system.thresholds), transfer
+    except InputError:
+        if all(part.where is None for part in task.model.parts.values()):
+            raise
+        return None
+
+
+def _of_degree_one(task: SolveTask, system: System) -> System:
+    """The system of degree 1 on the same mesh. Collective."""
+    return assemble(system.problem.domain, _coarser_model(task.model, system), task.timer, system.thresholds)
+
+
+def _coarser_model(model: Formulation, system: System) -> Formulation:
+    """The model of the next coarser level, of degree 1.
+
+    Below degree 2 a nearly incompressible body that is too large for a direct solver is softened, and stays so on the
+    levels below: of degree 1 no multigrid solves it, and this one only gives a start.
+    """
+    limits, mesh, ratio = system.thresholds, system.problem.domain.mesh, system.problem.bulk.volumetric_ratio
+    if model.degree == 1:
+        return model
+    small = limits.is_direct(mesh.geometry.dim * nodes.count(mesh, 1), mesh.geometry.dim)
+    softened = 0.0 < ratio <= limits.volumetric_ratio or not small
+    return replace(model, degree=1, volumetric_ratio=limits.volumetric_ratio if softened else np.inf)
+
+
+def refined_levels(
+    task: SolveTask, system: System, coarse: System, below: Levels, transfer: Transfer
+) -> tuple[PETSc.Mat, Levels]:
+    """The way to a system from the one on the mesh that was refined, and the system's coarser levels. Collective.
+
+    At degree 2 these are degree 1 on the same mesh and then on the coarser ones. A small system has none.
+
+    Args:
+        task: what is solved.
+        system: assembled on the refined mesh.
+        coarse: on the mesh that was refined.
+        below: the coarser levels of that one.
+        transfer: from that mesh.
+    """
+    step = prolongation(system, coarse, transfer)
+    if system.dofs < system.thresholds.nested_from:
+        return step, ()
+    if nodes.degree(system.problem.space) == 1:
+        return step, with_coarser_system(system, coarse, below, step)
+    linear = _of_degree_one(task, system)
+    linear.attach_free_motions(system.free_motions.modes if system.free_motions else ())
+    coarser = below[0].system if below else _of_degree_one(task, coarse)
+    levels = with_coarser_system(linear, coarser, below[1:], prolongation(linear, coarser, transfer))
+    return step, (Level(system, linear, prolongation(system, linear, DegreeTransfer())), *levels)
+
+
+def prolonged(start: CoarseStart, system: System) -> PETSc.Vec:
     """The coarse solution on the finer mesh, within its bounds and with its prescribed values. Collective.
 
     Args:
         start: the coarse solution, and the way from there.
         system: on the finer mesh.
-        thresholds: what counts as on a bound.
     """
     coarse = start.system
     x, known = system.load.duplicate(), coarse.unknowns(start.result.u)
     start.prolongation.mult(known, x)
     _interpolate_relative(x, known, start, system)
     x.scale(coarse.problem.scales.displacement / system.problem.scales.displacement)
-    make_admissible(x, system, thresholds)
+    make_admissible(x, system)
     return x
 
 
@@ -351,16 +317,15 @@ def _relative_dofs(system: System) -> Integers:
     return np.concatenate([one.surface.dofs.ravel() for one in system.problem.interfaces])
 
 
-def make_admissible(x: PETSc.Vec, system: System, thresholds: Thresholds) -> None:
+def make_admissible(x: PETSc.Vec, system: System) -> None:
     """Move unknowns within their bounds, onto a bound that only rounding keeps them from, and to prescribed values.
 
     Args:
         x: the unknowns, changed in place.
         system: with bounds and prescribed values.
-        thresholds: what counts as on a bound.
     """
     at, d = system.jacobian.rows.dofs, system.problem.scales.dimension
-    near = thresholds.near * system.references.at(at // d)
+    near = system.thresholds.near * system.references.at(at // d)
     values, lower, upper = (vector.array_r[at] for vector in (x, system.lower, system.upper))
     values = np.where(values <= lower + near, lower, np.where(values >= upper - near, upper, values))
     x.array[at] = values

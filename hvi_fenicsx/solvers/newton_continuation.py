@@ -36,7 +36,7 @@ def solve(context: SolveContext) -> SolveResult:
     counts = Counts()
     for one in (still, held):
         counts.add(one.counts)
-    for width in widths(context, 1.0 / context.options.thresholds.narrowest) if held.converged else ():
+    for width in widths(context, 1.0 / context.system.thresholds.narrowest) if held.converged else ():
         start, laws = (
             found if found.converged else held,
             [QUADRATIC.relative(t.exact, width) for t in context.system.terms],

@@ -16,16 +16,15 @@ from mpi4py import MPI
 from scipy.optimize import newton
 
 from ..errors import InputError
-from ..problem.compose import Formulation
 from ..problem.problem import BoundsForce, Problem
-from ..rigid import Solvability
 from ..runtime.log import logger
 from ..system.system import System
 from ..typing import Array
-from . import nested_iteration, quadratic
+from . import nested_iteration
 from .convergence import Counts
-from .method import RunControl, SolveContext, SolverOptions
+from .method import SolveTask
 from .nested_iteration import CoarseStart, LevelSolution
+from .quadratic import choose
 
 _LOG = logger("solvers")
 _MOST = 60
@@ -117,21 +116,14 @@ class ObstacleForceSolve:
     """A solve with an obstacle that a force presses; call :meth:`solve` once.
 
     Args:
-        model: what is solved, for the coarser meshes.
+        task: what is solved; whether a solution can exist, where the obstacle stands still.
         system: assembled, the obstacle where it is described.
-        solvability: whether a solution can exist where the obstacle stands still.
-        options: method, tolerance, limits.
-        control: timer, progress and interruption.
     """
 
-    def __init__(
-        self, model: Formulation, system: System, solvability: Solvability, options: SolverOptions, control: RunControl
-    ) -> None:
+    def __init__(self, task: SolveTask, system: System) -> None:
         force = pressed(system.problem)
         assert force is not None
-        self._model, self._system, self._force = model, system, force
-        self._solvability, self._options, self._control = solvability, options, control
-        self._counts = Counts()
+        self._task, self._system, self._force, self._counts = task, system, force, Counts()
 
     def solve(self, start: CoarseStart | fem.Function | None = None) -> tuple[LevelSolution, ObstacleBalance]:
         """The solution and where the obstacle is. Collective.
@@ -140,41 +132,27 @@ class ObstacleForceSolve:
             start: a solution on a coarser mesh; or a displacement on the same mesh to begin at, m.
         """
         touch, force = self._first_touch(), self._force.force
-        ways = touch, touch + force  # the second is that of a block of the body's size
+        scales, way = self._system.problem.scales, start.way if isinstance(start, CoarseStart) else None
+        first = touch + force if way is None else way / scales.displacement  # at first that of a block of this size
         found: list[tuple[LevelSolution, ObstacleBalance]] = []
 
         def excess(way: float) -> float:
             """What contact bears beyond the force, 0 within the tolerance; nothing where the obstacle touches."""
             if way == touch:
                 return -force
-            if found and abs(way - touch) > self._farthest:
+            if found and abs(way - touch) > scales.length / scales.displacement:
                 raise _Ended
-            new = self._at(way, found[-1][0]) if found else self._begun(ways[1], start)
+            new = self._at(way, found[-1][0] if found else start)
+            self._counts.add(new.result.counts)
             found.append((new, self._balance(new)))
             if not new.result.converged:
                 raise _Ended
             return 0.0 if found[-1][1].passed else found[-1][1].borne - force
 
         with suppress(_Ended):
-            newton(excess, touch, x1=self._way_of(start, ways[1]), tol=_DIGIT, rtol=_DIGIT, maxiter=_MOST, disp=False)
+            newton(excess, touch, x1=first, tol=_DIGIT, rtol=_DIGIT, maxiter=_MOST, disp=False)
         solution, balance = found[-1]
         return self._told(solution, balance), balance
-
-    def _way_of(self, start: CoarseStart | fem.Function | None, first: float) -> float:
-        """The way that is tried first."""
-        if not isinstance(start, CoarseStart):
-            return first
-        assert start.way is not None
-        return start.way / self._system.problem.scales.displacement
-
-    def _begun(self, way: float, start: CoarseStart | fem.Function | None) -> LevelSolution:
-        return self._refined(start) if isinstance(start, CoarseStart) else self._anew(way, start)
-
-    @property
-    def _farthest(self) -> float:
-        """The length of the body, in units of u0."""
-        scales = self._system.problem.scales
-        return scales.length / scales.displacement
 
     def _first_touch(self) -> float:
         """The way after which the obstacle touches the body at rest; behind it where it would overlap. Collective."""
@@ -182,42 +160,18 @@ class ObstacleForceSolve:
         least = min((float(np.min(way, initial=np.inf)) for way in ways), default=np.inf)
         return float(self._system.comm.allreduce(least, op=MPI.MIN))
 
-    def _refined(self, start: CoarseStart) -> LevelSolution:
-        """From a solution on a coarser mesh, the obstacle where it was there. Collective."""
-        system = self._system.with_obstacle_at(self._way_of(start, 0.0))
-        found = nested_iteration.solve_from_coarser(system, start, self._solvability, self._options, self._control)
-        self._counts.add(found.result.counts)
-        return found
-
-    def _anew(self, way: float, start: fem.Function | None) -> LevelSolution:
-        """From the coarse meshes, or from a displacement. Collective."""
-        system, model = self._system.with_obstacle_at(way), self._moved(way)
-        arguments = self._solvability, self._options, self._control
-        if start is None:
-            found = nested_iteration.solve(model, system, *arguments)
-        else:
-            found = nested_iteration.solve_from_displacement(model, system, start, *arguments)
-        self._counts.add(found.result.counts)
-        return found
-
-    def _moved(self, way: float) -> Formulation:
-        metres = way * self._system.problem.scales.displacement
-        return replace(self._model, effects=[(w, effect.obstacle_moved(metres)) for w, effect in self._model.effects])
-
-    def _at(self, way: float, before: LevelSolution) -> LevelSolution:
-        """From the solution where the obstacle was before; from the coarse meshes where that fails. Collective."""
-        system = self._system.with_obstacle_at(way)
-        kind = quadratic.choose(self._options, system)
-        if not kind.takes_start:
-            return self._anew(way, None)
-        first = system.unknowns(before.result.u)
-        nested_iteration.make_admissible(first, system, self._options.thresholds)
-        context = SolveContext.create(system, before.levels, self._solvability, self._options, self._control)
-        result = kind(context).solve(first)
-        self._counts.add(result.counts)
-        if not result.converged and not result.interrupted:
-            return self._anew(way, None)
-        return LevelSolution(system=system, levels=before.levels, result=result)
+    def _at(self, way: float, start: LevelSolution | CoarseStart | fem.Function | None) -> LevelSolution:
+        """The solution with the obstacle there, from a start, else from the coarse meshes. Collective."""
+        system, metres = self._system.with_obstacle_at(way), way * self._system.problem.scales.displacement
+        if isinstance(start, CoarseStart):
+            return nested_iteration.solve_from_coarser(self._task, system, start)
+        effects = [(where, effect.obstacle_moved(metres)) for where, effect in self._task.model.effects]
+        task = replace(self._task, model=replace(self._task.model, effects=effects))
+        if isinstance(start, LevelSolution) and choose(task.options, system).takes_start:
+            return nested_iteration.solve_from(task, system, start.levels, system.unknowns(start.result.u))
+        if isinstance(start, fem.Function):
+            return nested_iteration.solve_from_displacement(task, system, start)
+        return nested_iteration.solve(task, system)
 
     def _balance(self, found: LevelSolution) -> ObstacleBalance:
         """What contact bears: what the body's energy gains by a unit of the obstacle's way. Collective."""
@@ -236,7 +190,7 @@ class ObstacleForceSolve:
             direction=self._force.direction,
             force=self._force.force,
             borne=float(system.comm.allreduce(borne)),
-            tolerance=self._options.tolerance,
+            tolerance=self._task.options.tolerance,
         )
 
     def _told(self, found: LevelSolution, balance: ObstacleBalance) -> LevelSolution:

@@ -16,7 +16,7 @@ from ..system.system import System
 from .active_set import ENERGY, EXACT, FULL_STEPS
 from .attempts import Attempt, first_success
 from .convergence import Counts, Outcome
-from .method import Method, SolveResult, SolverOptions, find
+from .method import Method, SolveResult, SolverTable, find
 from .resting_start import at_rest, resting_start
 
 
@@ -48,7 +48,7 @@ class LinearSolve(Method):
         while falls and not outcome.converged:
             outcome = self._step(x, models, left)
             counts.linear += outcome.linear
-            falls, left = outcome.measure < self.options.thresholds.margin * left, outcome.measure
+            falls, left = outcome.measure < self.system.thresholds.margin * left, outcome.measure
         self.context.tell(self.name, None, 1, outcome.measure, 0)
         reason = "stationary" if outcome.converged else outcome.reason
         return SolveResult(
@@ -57,7 +57,7 @@ class LinearSolve(Method):
 
     def _step(self, x: PETSc.Vec, models: Sequence[VertexModel], left: float) -> Outcome:
         """One solve of the residual equation, of which ``left`` is known, and the residual left then. Collective."""
-        rtol = self.options.thresholds.margin * self.options.tolerance / min(left, 1.0)
+        rtol = self.system.thresholds.margin * self.options.tolerance / min(left, 1.0)
         step = self.solver.newton_step(x, np.empty(0, np.int32), models, rtol)
         return self.solver.check_step(step, x, models, self.options.tolerance)
 
@@ -109,12 +109,12 @@ class ConvexProgramme(Method):
         models = [VertexModel(term.law) for term in self.system.terms]
         yield Attempt(models=models, line_search=FULL_STEPS, steady=self.context.steady)
         yield Attempt(models=models, line_search=FULL_STEPS, start=self._from_rest(models, counts))
-        yield Attempt(models=models, line_search=EXACT, foundation=self.options.thresholds.linear.foundation)
+        yield Attempt(models=models, line_search=EXACT, foundation=self.system.thresholds.foundation)
         yield Attempt(models=models, line_search=ENERGY)
 
     def _from_rest(self, models: list[VertexModel], counts: Counts) -> PETSc.Vec | None:
         """The displacement of bodies at rest on their supports; None where there is none."""
-        rtol = min(self.options.thresholds.coarse_tolerance, self.options.tolerance)
+        rtol = min(self.system.thresholds.coarse_tolerance, self.options.tolerance)
         laws = [term.law for term in self.system.terms]
         rested = at_rest(self.context, laws, lambda _: models, rtol)
         if rested is None:
@@ -123,7 +123,7 @@ class ConvexProgramme(Method):
         return rested[0]
 
 
-def choose(options: SolverOptions, system: System) -> type[Method]:
+def choose(options: SolverTable, system: System) -> type[Method]:
     """The method that solves a system: the one that is named, or the simplest that the effects allow.
 
     Args:

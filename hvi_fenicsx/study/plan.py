@@ -17,7 +17,7 @@ from ..model import Model, SolverTable, dump_scene
 from ..report.units import quantity
 from ..schema import unknown
 from ..solvers import method
-from ..solvers.method import options_of
+from ..solvers.method import checked
 
 EXACT = "exact"
 """The width of a smoothing that is none."""
@@ -241,7 +241,7 @@ def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:
         values = {**dict.fromkeys(_WIDTHS), **values, "smoothing": kind}
     found = scene.with_solver(**values)
     solver = found.solver
-    options_of(solver)
+    checked(solver)
     for law in found.laws() if solver.smoothing else ():
         smoothing.create(str(solver.smoothing), law, epsilon=solver.epsilon, epsilon_absolute=solver.epsilon_absolute)
     return found

@@ -17,6 +17,7 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..typing import Array, Integers
+from .thresholds import DEFAULT
 
 
 class ContactRows:
@@ -25,7 +26,6 @@ class ContactRows:
     Args:
         matrix: A, which becomes J.
         surfaces: the parts of Γc.
-        held_stiffness: diagonal of a held unknown.
 
     Attributes:
         vertices: their local numbers, sorted, (m,).
@@ -34,8 +34,8 @@ class ContactRows:
         tangent: W K, (m, d, d).
     """
 
-    def __init__(self, matrix: PETSc.Mat, surfaces: Sequence[Surface], held_stiffness: float) -> None:
-        d, self._held_stiffness = matrix.getBlockSize(), held_stiffness
+    def __init__(self, matrix: PETSc.Mat, surfaces: Sequence[Surface]) -> None:
+        d = matrix.getBlockSize()
         blocks = np.concatenate([np.empty(0, np.int64), *(s.blocks for s in surfaces)])
         self.vertices: Integers = np.unique(blocks).astype(np.int64)
         self.dofs: Integers = (self.vertices[:, None] * d + np.arange(d)).ravel()
@@ -73,7 +73,7 @@ class ContactRows:
         values = self._elastic + self.tangent
         d = values.shape[1]
         diagonal = np.zeros(self.dofs.shape)
-        diagonal[np.isin(self.dofs, held)] = self._held_stiffness
+        diagonal[np.isin(self.dofs, held)] = DEFAULT.held_stiffness
         values[:, np.arange(d), np.arange(d)] += diagonal.reshape(-1, d)
         matrix.setValuesBlockedRCV(self._blocks, self._blocks, values)
         matrix.assemble()

@@ -15,7 +15,6 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds
 from ..typing import Array, Entities
 from .contact_rows import ContactRows
-from .thresholds import DEFAULT, Thresholds
 
 
 @dataclass(frozen=True)
@@ -189,7 +188,6 @@ class Jacobian:
         stiffness: A, which becomes J.
         terms: the laws.
         bounds: the contact bounds.
-        thresholds: how unknowns are held.
 
     Attributes:
         matrix: J; Dirichlet rows and columns are those of the identity; block size d.
@@ -197,16 +195,10 @@ class Jacobian:
         held: the unknowns of Γc (local, owned, sorted) that J holds.
     """
 
-    def __init__(
-        self,
-        stiffness: PETSc.Mat,
-        terms: Sequence[LawTerm],
-        bounds: Sequence[Bounds],
-        thresholds: Thresholds = DEFAULT,
-    ) -> None:
+    def __init__(self, stiffness: PETSc.Mat, terms: Sequence[LawTerm], bounds: Sequence[Bounds]) -> None:
         self.matrix, self._terms = stiffness, tuple(terms)
         surfaces = [*(t.surface for t in terms), *(b.surface for b in bounds)]
-        self.rows = ContactRows(stiffness, surfaces, thresholds.held_stiffness)
+        self.rows = ContactRows(stiffness, surfaces)
         self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
         self.held: Entities = np.empty(0, np.int32)
         self._comm = stiffness.comm.tompi4py()

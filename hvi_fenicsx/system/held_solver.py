@@ -24,7 +24,6 @@ from .factorisation import Direct, FactorForm, form_of
 from .multigrid import Algebraic, Levels, MixedMultigrid, Multigrid
 from .petsc_options import CHOLESKY, configure, prefix
 from .system import System
-from .thresholds import DEFAULT, Thresholds
 
 
 class Preconditioner(Protocol):
@@ -86,7 +85,7 @@ class HeldPreconditioner:
         changed, drift = len(np.setxor1d(held, self._held, assume_unique=True)), self.system.jacobian.drift(self._rates)
         if self.settings.kind in ("lu", "mixed"):
             return changed == 0 and drift == 0.0
-        thresholds = self.settings.thresholds
+        thresholds = self.system.thresholds
         most = 0 if self.settings.kind == "mg" else max(2, thresholds.drift * len(held))
         return changed <= most and drift <= thresholds.drift
 
@@ -99,11 +98,11 @@ class HeldPreconditioner:
             iterations: of the solve, the same on all ranks.
             failed: whether it broke down.
         """
-        thresholds = self.settings.thresholds
+        thresholds = self.system.thresholds
         self._first_iterations = self._first_iterations or iterations
         self._outdated = failed or iterations > 2 * self._first_iterations
         if (failed or iterations > thresholds.slow) and self.settings.replaceable:
-            self.settings, self._outdated = LinearSettings("lu", thresholds), True
+            self.settings, self._outdated = LinearSettings("lu"), True
 
     def _build(self, held: Entities) -> None:
         if self.settings.kind != self._kind or self._preconditioner is None:
@@ -186,12 +185,14 @@ class HeldPreconditioner:
     def _krylov(self, rtol: float) -> PETSc.KSP:
         """The Krylov method, to be destroyed after use."""
         assert self._preconditioner is not None
-        ksp, settings = PETSc.KSP().create(self.system.comm), self.settings
+        ksp, settings, thresholds = PETSc.KSP().create(self.system.comm), self.settings, self.system.thresholds
         ksp.setOperators(self._preconditioner.matrix)
         ksp.setPC(self._preconditioner.pc)
         if isinstance(self._preconditioner, MixedMultigrid):
-            self._preconditioner.accuracy = min(rtol, settings.thresholds.mixed_accuracy)
-        ksp.setTolerances(rtol=rtol, max_it=settings.iterations)
+            self._preconditioner.accuracy = min(rtol, thresholds.mixed_accuracy)
+        given_up = settings.replaceable or settings.kind == "mixed"
+        most = 2 * thresholds.slow if given_up else thresholds.krylov_iterations
+        ksp.setTolerances(rtol=rtol, max_it=most)
         configure(ksp, settings.ksp(ksp.getPC()))
         if settings.kind in ("gamg", "mg"):
             held = np.union1d(self._wanted, self.system.pins)
@@ -278,12 +279,10 @@ class LinearSettings:
     Attributes:
         kind: a factorisation (lu), algebraic multigrid (gamg), geometric multigrid (mg), or that with averaged
             pressures as unknowns (mixed).
-        thresholds: when another kind takes over, and when a preconditioner is made anew.
         replaceable: whether the system is small enough for a direct solver to take over.
     """
 
     kind: Kind
-    thresholds: Thresholds = DEFAULT
     replaceable: bool = False
 
     @classmethod
@@ -291,7 +290,6 @@ class LinearSettings:
         cls,
         system: System,
         wanted: Literal["auto", "lu", "gamg"] = "auto",
-        thresholds: Thresholds = DEFAULT,
         *,
         levels: bool = False,
     ) -> LinearSettings:
@@ -300,21 +298,21 @@ class LinearSettings:
         Args:
             system: the system to be solved.
             wanted: what the user wants.
-            thresholds: up to which size a direct solver is used.
             levels: whether the system has coarser levels when it is solved.
         """
-        small = system.dofs <= thresholds.largest_direct[system.problem.scales.dimension]
+        thresholds = system.thresholds
+        small = thresholds.is_direct(system.dofs, system.problem.scales.dimension)
         if wanted != "auto":
-            return cls(wanted, thresholds, small)
+            return cls(wanted, small)
         stiff, degree = system.problem.bulk.volumetric_ratio, nodes.degree(system.problem.space)
         if levels and system.free_motions is None:
             if stiff <= thresholds.volumetric_ratio:
-                return cls("mg", thresholds, small)
+                return cls("mg", small)
             if degree > 1:
-                return cls("mixed", thresholds)
+                return cls("mixed")
         if stiff > 0.0:
-            return cls("lu", thresholds)
-        return cls("lu" if small else "gamg", thresholds)
+            return cls("lu")
+        return cls("lu" if small else "gamg")
 
     def ksp(self, pc: PETSc.PC) -> dict[str, str]:
         """Default options of the Krylov method.
@@ -329,13 +327,6 @@ class LinearSettings:
         if PETSc.Options().getString(f"{prefix()}ksp_type", method) in _OF_OTHER_NORM:
             return {"ksp_type": method}
         return {"ksp_type": method, "ksp_norm_type": "unpreconditioned"}
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of the Krylov method at most."""
-        if self.kind == "mixed":
-            return self.thresholds.replaced_iterations
-        return self.thresholds.replaced_iterations if self.replaceable else self.thresholds.krylov_iterations
 
     @property
     def pc(self) -> Mapping[str, object]:

@@ -124,7 +124,7 @@ class Interior:
         Raises:
             Interrupted: on all ranks alike: it is to stop.
         """
-        columns, at_once = self.coupling.tocsc(), self._system.thresholds.dense_columns
+        columns, at_once = self.coupling.tocsc(), self._system.thresholds.columns
         found = np.zeros((self.size, self.size))
         for start in range(0, self.size, at_once):
             if interrupted():

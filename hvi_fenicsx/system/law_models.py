@@ -14,7 +14,7 @@ import numpy as np
 
 from ..laws import ConvexPart, Superpotential
 from ..typing import Array, Integers
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -35,19 +35,18 @@ class Cells:
     ramp: float = 0.0
 
     @classmethod
-    def around(cls, part: ConvexPart, x: Array, *, radial: bool = False, thresholds: Thresholds = DEFAULT) -> Cells:
+    def around(cls, part: ConvexPart, x: Array, *, radial: bool = False) -> Cells:
         """The cells that hold x; on a kink the cell to its right, for a law of |u_t| the stuck one.
 
         Args:
             part: H.
             x: arguments, (m,).
             radial: whether it is a law of |u_t|.
-            thresholds: how long the ramp is.
         """
         side: Literal["left", "right"] = "left" if radial else "right"
         ramp = 0.0
         if radial and len(part.kinks):
-            ramp = thresholds.first_ramp * max(float(np.max(x, initial=0.0)), thresholds.least_slip)
+            ramp = DEFAULT.first_ramp * max(float(np.max(x, initial=0.0)), DEFAULT.coarse_tolerance)
         return cls(part.kinks, np.searchsorted(part.kinks, x, side=side), ramp)
 
     @property

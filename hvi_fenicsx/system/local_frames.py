@@ -22,7 +22,7 @@ from ..problem.vectors import new_vector, null_space, turn
 from ..rigid import rigid_fields
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,10 @@ class LocalFrames:
     Attributes:
         blocks: local vertex indices, (k,).
         axes: R at these vertices, rows are the local axes, (k, d, d).
-        rounding: of the local components of a unit vector.
     """
 
     blocks: Entities
     axes: Array
-    rounding: float
 
     def at(self, vertices: npt.NDArray[np.integer]) -> Array:
         """R at vertices of this rank, (m, d, d)."""
@@ -63,7 +61,7 @@ class LocalFrames:
         normals = np.einsum("mij,mj->mi", axes, surface.normals)
         return replace(
             surface,
-            normals=np.where(np.abs(normals) > 1 - self.rounding, np.round(normals), normals),
+            normals=np.where(np.abs(normals) > 1 - DEFAULT.rounding, np.round(normals), normals),
             tangents=np.einsum("mij,mkj->mki", axes, surface.tangents),
         )
 
@@ -77,7 +75,7 @@ class LocalFrames:
         A slip that a bound holds on a kink is then the kink itself, not the kink but for rounding.
         """
         directions = np.einsum("mij,mkj->mki", self.at(term.surface.blocks), term.directions)
-        directions = np.where(np.abs(directions) < self.rounding, 0.0, directions)
+        directions = np.where(np.abs(directions) < DEFAULT.rounding, 0.0, directions)
         directions /= np.linalg.norm(directions, axis=2, keepdims=True)
         return replace(term, surface=self.surface(term.surface), directions=directions)
 
@@ -100,12 +98,11 @@ class LocalFrames:
         return q
 
 
-def frames_of(problem: Problem, thresholds: Thresholds = DEFAULT) -> LocalFrames | None:
+def frames_of(problem: Problem) -> LocalFrames | None:
     """The local frames of a problem; None where every normal is parallel to an axis. Collective.
 
     Args:
         problem: the problem.
-        thresholds: what is rounding of a local component.
     """
     d, comm = problem.scales.dimension, problem.domain.mesh.comm
     if not any(agree(comm, any(_slanted(s.normals).any() for s in problem.surfaces))):
@@ -114,7 +111,7 @@ def frames_of(problem: Problem, thresholds: Thresholds = DEFAULT) -> LocalFrames
     fixed = {int(dof) for dof in problem.fixed}
     frames = [_axes(normals, [i for i in range(d) if block * d + i in fixed], d) for block, normals in slanted.items()]
     axes = np.array(frames, dtype=np.float64).reshape(-1, d, d)
-    return LocalFrames(np.array(list(slanted), dtype=np.int32), axes, thresholds.rounding)
+    return LocalFrames(np.array(list(slanted), dtype=np.int32), axes)
 
 
 def _slanted(normals: Array) -> Mask:

@@ -128,10 +128,10 @@ class MixedMultigrid:
             y: where the displacement is written.
         """
         thresholds = self._system.thresholds
-        rtol = thresholds.mixed_margin * self.accuracy / self._ratio
+        rtol = thresholds.mixed_accuracy * self.accuracy / self._ratio
         self.accuracy = thresholds.mixed_accuracy
         most = thresholds.krylov_iterations
-        self._minres.setTolerances(rtol=max(rtol, thresholds.least_mixed_accuracy), atol=0.0, max_it=most)
+        self._minres.setTolerances(rtol=max(rtol, thresholds.rounding), atol=0.0, max_it=most)
         self._given.set(0.0)
         self._given.getNestSubVecs()[0].array[:] = x.array_r
         self._minres.solve(self._given, self._found)

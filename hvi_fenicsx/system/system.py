@@ -41,11 +41,11 @@ class System:
     Args:
         problem: the problem.
         timer: where time goes.
-        thresholds: what counts as rounding, and how unknowns are held.
+        thresholds: the numbers that tune how it is solved.
 
     Attributes:
         problem: what was assembled.
-        thresholds: the numbers that tune the linear solvers.
+        thresholds: the numbers that tune how it is solved.
         frames: local frames of vertices with slanted normals; None where there are none.
         rotation: the matrix Q with u = Q û for unknowns û in local components; None likewise.
         terms: the problem's laws, in the unknowns' components.
@@ -64,14 +64,14 @@ class System:
 
     def __init__(self, problem: Problem, timer: Timer, thresholds: Thresholds = DEFAULT) -> None:
         self.problem, self.thresholds = problem, thresholds
-        self.frames = local_frames.frames_of(problem, thresholds)
+        self.frames = local_frames.frames_of(problem)
         self.free_motions: FreeMotions | None = None
         with timer("assembly"):
             self.forces = {name: assembled(form) for name, form in problem.loads.items()}
             self._loads = self._sum_of(self.forces)
             stiffness, self.load, pull = self._constrained()
             stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
-            self.jacobian = Jacobian(stiffness, self.terms, self.bounds, thresholds)
+            self.jacobian = Jacobian(stiffness, self.terms, self.bounds)
             self.references = references.of(problem, self._loads)
             self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))
         self.equations = Equations(self.jacobian, self.terms, self._first_base(pull))
@@ -296,7 +296,7 @@ def assemble(domain: Domain, model: Formulation, timer: Timer, thresholds: Thres
         domain: the body and its mesh.
         model: the effects and their places.
         timer: where time goes.
-        thresholds: the numbers that tune the linear solvers.
+        thresholds: the numbers that tune how it is solved.
 
     Raises:
         InputError: the model does not fit the mesh, on all ranks alike.

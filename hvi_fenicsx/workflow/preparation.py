@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from mpi4py import MPI
@@ -11,15 +12,16 @@ from ..mesh import nodes
 from ..mesh.domain import DEFAULT as MESH
 from ..mesh.domain import Domain, check_affordable
 from ..model import Model
+from ..model.options import SolverTable
 from ..problem.compose import Formulation
 from ..problem.problem import Problem
 from ..rigid import LoadFactors, Solvability
 from ..runtime.cost import Timer
-from ..runtime.log import logger, warn
-from ..solvers.method import SolverOptions, options_of
-from ..solvers.thresholds import DEFAULT, Thresholds
+from ..runtime.log import logger, newton_step, warn
+from ..solvers.method import Progress, SolveTask, checked, never
 from ..system import existence
 from ..system.system import System, assemble
+from ..system.thresholds import DEFAULT, Thresholds
 
 _LOG = logger("preparation")
 
@@ -40,7 +42,7 @@ class Preparation:
 
     scene: Model
     model: Formulation
-    options: SolverOptions
+    options: SolverTable
     system: System
     solvability: Solvability
     timer: Timer
@@ -50,6 +52,22 @@ class Preparation:
     def problem(self) -> Problem:
         """The problem that is assembled."""
         return self.system.problem
+
+    def task(self, progress: Progress = newton_step, interrupted: Callable[[], bool] = never) -> SolveTask:
+        """What is to be solved, and how.
+
+        Args:
+            progress: called at each Newton step; by default it is logged.
+            interrupted: whether to stop (collective, asked at each Newton step).
+        """
+        return SolveTask(
+            model=self.model,
+            solvability=self.solvability,
+            options=self.options,
+            timer=self.timer,
+            progress=progress,
+            interrupted=interrupted,
+        )
 
     def load_factors(self, *loads: str) -> LoadFactors:
         """Between which factors of some loads together the body is held, the others constant. Collective.
@@ -86,10 +104,10 @@ def prepare(
         InputError: on all ranks alike.
     """
     timer = timer or Timer()
-    options, model = options_of(scene.solver, thresholds), scene.formulation()
+    options, model = checked(scene.solver), scene.formulation()
     with timer("mesh"):
         domain = domain or _meshed(scene, comm)
-    system = assemble(domain, model, timer, thresholds.linear)
+    system = assemble(domain, model, timer, thresholds)
     with timer("existence"):
         solvability = solvability or existence.solvability(system.problem, system.forces)
     margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"

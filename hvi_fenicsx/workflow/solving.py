@@ -18,12 +18,12 @@ from ..model import Model
 from ..runtime.cost import Timer
 from ..runtime.log import logger, newton_step, warn
 from ..solvers import frozen_mixity, nested_iteration, obstacle_force
-from ..solvers.method import Progress, RunControl, SolveResult, never
+from ..solvers.method import Progress, SolveResult, SolveTask, decides_stability, never, relative_width
 from ..solvers.nested_iteration import CoarseStart, LevelSolution
 from ..solvers.obstacle_force import ObstacleBalance
-from ..solvers.thresholds import DEFAULT, Thresholds
 from ..system import free_motions
 from ..system.multigrid import Levels
+from ..system.thresholds import DEFAULT, Thresholds
 from .preparation import Preparation, prepare
 from .solution import Solution
 
@@ -137,9 +137,8 @@ def find_solution(
     """
     if prepared.solvability.state == "escapes":
         return FoundSolution(prepared=prepared, solution=unsolved(prepared), levels=())
-    control = RunControl(timer=prepared.timer, progress=progress, interrupted=interrupted)
     with prepared.timer("solve"):
-        solved, balance = _solved(prepared, control, start)
+        solved, balance = _solved(prepared, prepared.task(progress, interrupted), start)
     prepared = replace(prepared, system=solved.system)
     result = solved.result
     examination, warnings = _examined(prepared, result)
@@ -185,7 +184,7 @@ def examine(prepared: Preparation, u: fem.Function) -> Examination:
         u: nondimensional, ghosts updated.
     """
     options = prepared.options
-    inertia = options.decides_stability(prepared.system)
+    inertia = decides_stability(options, prepared.system)
     return certificate.examine(prepared.problem, u, options.tolerance, inertia=inertia)
 
 
@@ -215,7 +214,7 @@ def _solution(
         estimate=None,
         uniqueness=only,
         dofs=prepared.system.dofs,
-        epsilon=prepared.options.relative_width(prepared.system),
+        epsilon=relative_width(prepared.options, prepared.system),
         timer=prepared.timer,
         warnings=warnings,
         balance=balance,
@@ -230,24 +229,22 @@ def _log_certificate(found: certificate.Certificate) -> None:
 
 
 def _solved(
-    prepared: Preparation, control: RunControl, start: CoarseStart | fem.Function | None
+    prepared: Preparation, task: SolveTask, start: CoarseStart | fem.Function | None
 ) -> tuple[LevelSolution, ObstacleBalance | None]:
     """What the method found, zero where it broke down; and where an obstacle is that a force presses. Collective."""
-    model, system, options, solvability = prepared.model, prepared.system, prepared.options, prepared.solvability
-    balance = None
+    system, options, balance = prepared.system, prepared.options, None
     try:
         if obstacle_force.pressed(prepared.problem) is not None:
-            solve = obstacle_force.ObstacleForceSolve(model, system, solvability, options, control)
-            found, balance = solve.solve(start)
+            found, balance = obstacle_force.ObstacleForceSolve(task, system).solve(start)
         elif isinstance(start, CoarseStart):
-            found = nested_iteration.solve_from_coarser(system, start, solvability, options, control)
+            found = nested_iteration.solve_from_coarser(task, system, start)
         elif start is not None:
-            found = nested_iteration.solve_from_displacement(model, system, start, solvability, options, control)
+            found = nested_iteration.solve_from_displacement(task, system, start)
         else:
-            found = nested_iteration.solve(model, system, solvability, options, control)
-        found = frozen_mixity.settled(model, found, solvability, options, control)
+            found = nested_iteration.solve(task, system)
+        found = frozen_mixity.settled(task, found)
         if system.free_motions is not None:
-            free_motions.remove_free_motions(prepared.problem, solvability.free, found.result.u)
+            free_motions.remove_free_motions(prepared.problem, prepared.solvability.free, found.result.u)
         return found, balance
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")

@@ -15,7 +15,7 @@ from runs import ROOT
 from scenes import STEEL, Table, displacement, points, solved
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.solvers.thresholds import DEFAULT
+from hvi_fenicsx.system.thresholds import DEFAULT
 from hvi_fenicsx.workflow import Solution
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "attack"))

@@ -24,7 +24,7 @@ from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.mesh.transfer import InterpolationTransfer
-from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.system.thresholds import Thresholds as SolverThresholds
 
 HERE = Path(__file__).parent
 COMM = MPI.COMM_WORLD

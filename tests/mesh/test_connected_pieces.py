@@ -15,7 +15,7 @@ from runs import LONG_RANKS, on_ranks
 
 from hvi_fenicsx import read_tables, workflow
 from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
-from hvi_fenicsx.solvers.thresholds import Thresholds as SolverThresholds
+from hvi_fenicsx.system.thresholds import Thresholds as SolverThresholds
 
 COARSER = Thresholds(hierarchy_from=500, coarsest=100)
 """Coarser meshes for small ones too."""

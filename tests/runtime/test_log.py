@@ -13,7 +13,7 @@ from runs import command, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import read_tables, solve
-from hvi_fenicsx.solvers.thresholds import Thresholds
+from hvi_fenicsx.system.thresholds import Thresholds
 
 NESTED = Thresholds(nested_from=500)
 LAW = quadratic_linear(1.0e6)

@@ -12,7 +12,7 @@ import pytest
 from scenes import P, Table, displacement, energy, far, model, quadratic_linear, solved
 
 from hvi_fenicsx import Solution, prepare, read_tables
-from hvi_fenicsx.solvers.thresholds import Thresholds
+from hvi_fenicsx.system.thresholds import Thresholds
 from hvi_fenicsx.workflow import finish
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))

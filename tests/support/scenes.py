@@ -8,12 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hvi_fenicsx import Solution, read_tables, solve
-from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
-from hvi_fenicsx.solvers.method import RunControl, SolveContext
+from hvi_fenicsx.solvers.method import SolveContext
 from hvi_fenicsx.solvers.nested_iteration import LevelSolution
-from hvi_fenicsx.solvers.thresholds import DEFAULT, Thresholds
-from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.system.thresholds import DEFAULT, Thresholds
 from hvi_fenicsx.workflow import Preparation
 
 Array = npt.NDArray[np.float64]
@@ -77,7 +75,7 @@ def two_blocks(shape: str, flat: list[float], cells: list[list[int]], elasticity
     }
 
 
-NESTED = Thresholds(nested_from=1_000, linear=LinearThresholds(largest_direct={2: 1_000, 3: 1_000}))
+NESTED = Thresholds(nested_from=1_000, largest_direct=(1_000, 1_000))
 """Small meshes have coarser levels too, and take their multigrid."""
 
 
@@ -88,14 +86,12 @@ def solved(table: Table, thresholds: Thresholds = DEFAULT) -> Solution:
 
 def solved_system(prepared: Preparation) -> LevelSolution:
     """The solve alone, without certificate and estimate."""
-    control = RunControl(timer=Timer())
-    return nested_iteration.solve(prepared.model, prepared.system, prepared.solvability, prepared.options, control)
+    return nested_iteration.solve(prepared.task(), prepared.system)
 
 
 def context_of(prepared: Preparation) -> SolveContext:
     """What a method is given, without coarser levels."""
-    control = RunControl(timer=Timer())
-    return SolveContext.create(prepared.system, (), prepared.solvability, prepared.options, control)
+    return SolveContext.create(prepared.task(), prepared.system)
 
 
 def points(solution: Solution) -> Array:

@@ -11,13 +11,12 @@ from mpi4py import MPI
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.load_paths.following import PathRun
 from hvi_fenicsx.paths.load_path import LoadPath
-from hvi_fenicsx.solvers.thresholds import DEFAULT
+from hvi_fenicsx.system.thresholds import DEFAULT
 
 
 def path_run(table: dict[str, Any], *, formed: bool, comm: MPI.Comm = MPI.COMM_WORLD) -> PathRun:
     """A path that is to be followed with or without S as an array."""
-    linear = replace(DEFAULT.linear, solve_overhead=np.inf if formed else 0.0)
-    thresholds = replace(DEFAULT, largest_dense=10**6 if formed else 0, linear=linear)
+    thresholds = replace(DEFAULT, largest_dense=10**6 if formed else 0, solve_overhead=np.inf if formed else 0.0)
     scene = read_tables(table)
     assert scene.path is not None
     return PathRun(prepare(scene, comm, thresholds=thresholds), scene.path)

@@ -14,7 +14,6 @@ from scenes import NESTED, Table, model, two_blocks
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers import nested_iteration
-from hvi_fenicsx.solvers.method import RunControl
 from hvi_fenicsx.system.held_solver import HeldPreconditioner, LinearSettings
 from hvi_fenicsx.system.multigrid import Levels
 from hvi_fenicsx.workflow import Preparation
@@ -65,9 +64,7 @@ def blocks() -> Table:
 def prepared(table: Table) -> tuple[Preparation, Levels]:
     scene = read_tables(table)
     found = prepare(scene, MPI.COMM_SELF, thresholds=NESTED)
-    levels = nested_iteration.coarser_levels(
-        scene.formulation(), found.system, found.options, RunControl(timer=Timer())
-    )
+    levels = nested_iteration.coarser_levels(found.task(), found.system)
     assert levels
     return found, levels
 

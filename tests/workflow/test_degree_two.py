@@ -20,8 +20,7 @@ from scenes import NESTED, STEEL, Table, model, quadratic_linear
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import read_tables, solve
-from hvi_fenicsx.solvers.thresholds import Thresholds
-from hvi_fenicsx.system.thresholds import Thresholds as LinearThresholds
+from hvi_fenicsx.system.thresholds import Thresholds
 
 TRESCA: Table = {"law": "tresca", "yield_traction": 5e5}
 P, E, NU, LIFTING = 1.0e6, 2.15e11, 0.29, {"on": "top", "traction": [0.0, "-1e6*(1 - 1.8*x)"]}
@@ -185,8 +184,7 @@ def test_nearly_incompressible_bodies_are_solved_by_multigrid(nu: float, largest
 
     So too where starts of degree 1 are those of a softer body, and no level is solved directly but the coarsest.
     """
-    each, linear = [], LinearThresholds(largest_rubber={2: largest})
-    small_nested = Thresholds(nested_from=1_000, linear=linear)
+    each, small_nested = [], Thresholds(nested_from=1_000, largest_direct=(largest, largest))
     for cells in (16, 32):
         scene = model(cells, 3e6, friction=quadratic_linear(1e6), degree=2)
         scene["material"] = {"model": "plane_strain", "youngs_modulus": E, "poisson_ratio": nu}
