@@ -12,8 +12,7 @@ import numpy as np
 
 from .. import console, results
 from ..equilibrium_search.bodies import Equilibria
-from ..equilibrium_search.found import Found, Saved, certified_in_words, counted
-from ..equilibrium_search.search import falls_passed
+from ..equilibrium_search.search import Found, Saved, counted, falls_passed
 from ..equilibrium_search.stationarity import StationaryPoint
 from ..errors import ExitCode, NotWrittenError
 from ..model import dump_scene
@@ -137,7 +136,7 @@ def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[Ro
             write_whole(own, solution, call.given, call.timer, LOG.info, pictures=drawn)
             own.commit(call.scene)
         yield {"index": number, "folder": name, **_row(bodies, point, solution)}
-        tell_moving(certified_in_words(number, count))
+        tell_moving(f"certified: {number} of {count} equilibria")
 
 
 def _row(bodies: Equilibria, point: StationaryPoint, solution: Solution) -> Row:

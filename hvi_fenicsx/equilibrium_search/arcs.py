@@ -17,11 +17,9 @@ import numpy as np
 
 from ..laws.traction_graph import Arc, TractionGraph
 from ..typing import Array, Integers, Mask
+from .thresholds import LIMITS
 
 INF = math.inf
-ROUNDING = 1e-13
-"""Drops of the traction of this relative size are rounding."""
-
 
 Chain = tuple[Arc, ...]
 FREE: Chain = (Arc(-INF, INF, 0.0, 0.0, 0.0, 0.0),)
@@ -92,7 +90,7 @@ def apart(a: float, b: float) -> bool:
         a: the first.
         b: the other.
     """
-    return not (math.isfinite(a) and math.isfinite(b)) or b - a > ROUNDING * max(abs(a), abs(b))
+    return not (math.isfinite(a) and math.isfinite(b)) or b - a > LIMITS.rounding * max(abs(a), abs(b))
 
 
 @dataclass(frozen=True)
@@ -228,7 +226,7 @@ class ArcTable:
     @cached_property
     def rounding(self) -> Array:
         """The size of a jump of the traction that is rounding, (n,)."""
-        return np.asarray(ROUNDING * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1))
+        return np.asarray(LIMITS.rounding * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1))
 
     def at(self, x: Array) -> Integers:
         """The arc that holds x, of the two at a joint the left one; (n,)."""

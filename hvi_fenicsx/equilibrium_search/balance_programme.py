@@ -16,6 +16,7 @@ from ..typing import Array, Integers
 from .interior_point import Iterate, Programme, iterates
 from .relaxation import Relaxation
 from .scalar_problem import Box, ScalarProblem
+from .thresholds import LIMITS
 from .weighed_balance import Graphs, Split, weighed
 
 
@@ -71,7 +72,7 @@ class BalanceProgramme:
         np.maximum.at(most, points.owner, points.t)
         np.minimum.at(least, points.owner, points.t)
         forces = np.maximum(most - least, np.abs(self._problem.stiffness) @ self._half)
-        forces = np.maximum(forces, float(forces.max()) / self._problem.thresholds.cells.price + 1e-300)
+        forces = np.maximum(forces, LIMITS.enough * float(forces.max()) + 1e-300)
         largest = np.maximum(np.abs(most), np.abs(least)) + np.abs(self._problem.force)
         return forces, float(largest @ self._half) + 1e-300
 
@@ -82,7 +83,7 @@ class BalanceProgramme:
         along = np.divide(away, half[owner], out=np.zeros_like(away), where=half[owner] > 0.0)
         pull = 2.0 * (matrix @ middle) - problem.force
         cost = self._split.diagonal[owner] * points.x**2 + points.x * points.t + pull[owner] * away
-        price = problem.thresholds.cells.price * scale * float(np.max(np.abs([self._low, self._high]))) / unit
+        price = scale * float(np.max(np.abs([self._low, self._high]))) / (LIMITS.enough * unit)
         pushing = self._push * self._bounds * scale[self._pushed] / unit
         spare, each = np.zeros(len(self._push) + 2 * n), np.arange(n)
         ones = np.ones(n)
@@ -104,8 +105,7 @@ class BalanceProgramme:
 
     def iterates(self) -> Iterator[Iterate]:
         """The steps of the method."""
-        limits = self._problem.thresholds
-        return iterates(self._programme, limits.programmes.most_steps, limits.points.zero, limits.programmes.close)
+        return iterates(self._programme, LIMITS.most_steps, LIMITS.zero, LIMITS.nearly)
 
     def weights(self, here: Iterate) -> tuple[Array, Array]:
         """The weights and the point of an iterate, (n,) each.
@@ -133,7 +133,7 @@ class BalanceProgramme:
         forces = pushes * self._force_scale[self._pushed]
         np.add.at(bound, self._pushed, forces * np.abs(x[self._pushed] - self._bounds))
         law, size = x * t + d * x * x - mean, np.abs(x * t) + np.abs(d) * x * x
-        far = free & (law > self._problem.thresholds.points.same * size)
+        far = free & (law > LIMITS.same * size)
         return Guide(x=x, law=np.where(far, law, 0.0), bound=np.where(free, bound, 0.0))
 
 
@@ -184,15 +184,15 @@ class BalanceTest:
         if not np.isfinite(split.short):
             return Look(cell=cell, guide=None)
         programme = BalanceProgramme(self._problem, split, cell.low, cell.high)
-        best, last, limits = None, None, self._problem.thresholds
+        best, last = None, None
         for step, last in enumerate(programme.iterates()):
             if cut():
                 break
-            if step % 3 == 0 and 4 * step >= limits.programmes.most_steps:
+            if step % 3 == 0 and 4 * step >= LIMITS.most_steps:
                 proof = weighed(self._problem, split, (cell.low, cell.high), *programme.weights(last))
                 if proof.excludes:
                     return None
-                if best is not None and not proof.total > best.total + limits.cells.enough * abs(best.total):
+                if best is not None and not proof.total > best.total + LIMITS.enough * abs(best.total):
                     break
                 if np.isfinite(proof.total):
                     best = proof

@@ -17,11 +17,10 @@ from ..typing import Array
 from ..workflow import Preparation, Solution, certified, finish
 from .condensed_form import scalar_problem
 from .curved_laws import stationary_point
-from .found import Found, Keep, Saved, Task, Unit, forget
 from .scalar_problem import ScalarProblem
-from .search import find
+from .search import Found, Keep, Saved, Task, find
 from .stationarity import Kind, StationaryPoint
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import LIMITS
 
 NONE = Found(complete=True, proven=True, reason="no solution exists")
 """What is found where the load moves a body away."""
@@ -42,7 +41,6 @@ class Equilibria:
 
     Args:
         prepared: the scene, assembled.
-        thresholds: the numbers that tune the search.
         interrupted: whether to stop (collective), asked while the body is condensed.
 
     Attributes:
@@ -53,19 +51,14 @@ class Equilibria:
         Interrupted: on all ranks alike: it is to stop.
     """
 
-    def __init__(
-        self,
-        prepared: Preparation,
-        thresholds: Thresholds = DEFAULT,
-        interrupted: Callable[[], bool] = lambda: False,
-    ) -> None:
+    def __init__(self, prepared: Preparation, interrupted: Callable[[], bool] = lambda: False) -> None:
         obstacle_force.refuse(prepared.problem, "equilibria are not searched")
-        self._prepared, self._thresholds = prepared, thresholds
+        self._prepared = prepared
         self.problem: ScalarProblem | None = None
         if prepared.solvability.state != "escapes":
             with prepared.timer("assembly"):
                 self._condensation = Condensation(prepared.system, interrupted=interrupted)
-                self.problem = scalar_problem(self._condensation.problem, thresholds=thresholds)
+                self.problem = scalar_problem(self._condensation.problem)
 
     def find(
         self,
@@ -75,7 +68,7 @@ class Equilibria:
         stop: Callable[[], bool],
         report: Callable[[str], None],
         saved: Saved | None = None,
-        keep: Keep = forget,
+        keep: Keep = lambda _: None,
     ) -> Found:
         """Search; all ranks do the same. Collective.
 
@@ -106,18 +99,11 @@ class Equilibria:
             has_potential=self._prepared.problem.has_potential,
             no_lowest=self._no_lowest,
             known=() if lowest or saved is not None or stop() else self._known(stop),
-            unit=self._unit,
             exact=self._exact,
             refined=self._refined,
         )
         with self._prepared.timer("solve"):
             return find(task)
-
-    @property
-    def _unit(self) -> Unit:
-        """The unit of energies."""
-        scales = self._prepared.problem.scales
-        return Unit(size=scales.energy, name="J/m" if scales.dimension == 2 else "J")
 
     @property
     def _no_lowest(self) -> str:
@@ -162,13 +148,11 @@ class Equilibria:
 
     def _refined(self, tolerance: float, within: Array) -> ScalarProblem:
         """The problem with polylines near curved laws."""
-        return scalar_problem(
-            self._condensation.problem, tolerance=tolerance, within=within, thresholds=self._thresholds
-        )
+        return scalar_problem(self._condensation.problem, tolerance=tolerance, within=within)
 
     def _check_same(self, x: Array) -> None:
         """Refuse points that differ from rank to rank. Collective."""
-        comm, allowed = self._prepared.system.comm, self._thresholds.points.accuracy * np.max(np.abs(x), initial=0.0)
+        comm, allowed = self._prepared.system.comm, LIMITS.accuracy * np.max(np.abs(x), initial=0.0)
         same = np.max(np.abs(comm.bcast(x) - x), initial=0.0) <= allowed
         if not all(agree(comm, bool(same))):
             raise SolverError("the ranks found different equilibria; run on one")

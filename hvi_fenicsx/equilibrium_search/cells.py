@@ -19,6 +19,7 @@ from .convex_programme import minimise
 from .relaxation import envelopes
 from .scalar_problem import Box, ScalarProblem, clipped
 from .stationarity import StationaryPoint
+from .thresholds import LIMITS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +64,7 @@ class PolylineCells:
             return OPEN
         slopes = arcs.least_slope(cell.low, cell.high)
         matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
-        if _positive(matrix, problem.thresholds.cells.regular):
+        if _positive(matrix):
             return self._done(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
         if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(at_bounds(problem, cell)[free]):
             return OPEN
@@ -78,7 +79,7 @@ class PolylineCells:
         """
         problem = self._problem
         x = np.clip(x, problem.lower, problem.upper)
-        if stationarity.imbalance(problem, x) > problem.thresholds.points.accuracy:
+        if stationarity.imbalance(problem, x) > LIMITS.accuracy:
             return None
         kind = stationarity.kind(problem, x)
         return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
@@ -90,8 +91,7 @@ class PolylineCells:
     def _minimum(self, cell: Box, added: Array) -> Array:
         """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
         problem, chains = self._problem, envelopes(self._problem, cell.low, cell.high, added)
-        programmes = problem.thresholds.programmes
-        return minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x, programmes).x
+        return minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x).x
 
     def _linear(self, cell: Box, free: Integers, matrix: Array) -> Verdict:
         """The solutions of a cell in which every law is on one arc."""
@@ -101,9 +101,9 @@ class PolylineCells:
         held = np.setdiff1d(rows, free)
         right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
         x, low, high = cell.low.copy(), cell.low[free], cell.high[free]
-        if not is_singular(matrix, problem.thresholds.cells.condition):
+        if np.linalg.cond(matrix) < 1.0 / LIMITS.rounding:
             x[free] = np.linalg.solve(matrix, right)
-            near = problem.thresholds.points.same * (1.0 + np.abs(x[free]))
+            near = LIMITS.same * (1.0 + np.abs(x[free]))
             inside = np.all((x[free] >= low - near) & (x[free] <= high + near))
             return self._done(x) if inside else Verdict()
         if (inner := some_solution(matrix, right, np.column_stack([low, high]))) is None:
@@ -112,23 +112,13 @@ class PolylineCells:
         return self._done(x, isolated=False)
 
 
-def _positive(matrix: Array, regular: float) -> bool:
+def _positive(matrix: Array) -> bool:
     """Whether a matrix is positive definite, its least pivot above a share of the largest."""
     try:
         pivots = np.diag(cholesky(matrix, lower=True))
     except LinAlgError:
         return False
-    return bool(pivots.min() > regular * pivots.max())
-
-
-def is_singular(matrix: Array, condition: float) -> bool:
-    """Whether a linear system has no solution, or many.
-
-    Args:
-        matrix: of the system, (n, n).
-        condition: number beyond which it is singular.
-    """
-    return not np.linalg.cond(matrix) < condition
+    return bool(pivots.min() > LIMITS.regular * pivots.max())
 
 
 def some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
@@ -178,7 +168,7 @@ def _far(problem: ScalarProblem, pivots: Integers, cell: Box) -> list[Box]:
     begin, end = cell.low[pivots], cell.high[pivots]
     near = np.maximum(problem.joint, np.maximum(begin, -end))
     most = np.maximum(end, -begin)
-    wide = np.flatnonzero(most > problem.thresholds.cells.wide * near)
+    wide = np.flatnonzero(most > LIMITS.wide * near)
     if not wide.size:
         return []
     j = wide[np.argmax((end - begin)[wide])]
@@ -198,13 +188,11 @@ def _guided(problem: ScalarProblem, cell: Box, guide: Guide) -> list[Box]:
 
 
 def _near(problem: ScalarProblem, cell: Box, i: int, x: float) -> Iterator[Box]:
-    """Parts at the joint that is nearest to a place; at the place if there is none, or only a bend near an end."""
-    low, high = float(cell.low[i]), float(cell.high[i])
-    short = problem.thresholds.cells.off_end * (high - low)
-    at, jump = min(_joints(problem, cell, i), key=lambda joint: abs(joint[0] - x), default=(low, 0.0))
-    if _jumps(problem, i, jump) or low + short <= at <= high - short:
-        return _at_joint(problem, cell, i, at, jump)
-    return _halves(cell, i, min(max(x, low + short), high - short))
+    """Parts at the joint that is nearest to a place; halves if there is none."""
+    joints = _joints(problem, cell, i)
+    if not joints:
+        return _halves(cell, i, 0.5 * float(cell.low[i] + cell.high[i]))
+    return _at_joint(problem, cell, i, *min(joints, key=lambda joint: abs(joint[0] - x)))
 
 
 def _any(problem: ScalarProblem, cell: Box) -> Iterator[Box]:
@@ -274,7 +262,7 @@ def settled(problem: ScalarProblem, cell: Box) -> Box:
     """
     n, arcs = problem.size, problem.arcs
     low, high = cell.low[:n], cell.high[:n]
-    short = (low < high) & (high - low < problem.thresholds.cells.settled)
+    short = (low < high) & (high - low < LIMITS.rounding**2)
     if not short.any():
         return cell
     at = arcs.high[:n, :-1]

@@ -18,7 +18,7 @@ from .curved_laws import LawGraph, law_graph
 from .lengths import Lengths
 from .rigid_motions import with_motions
 from .scalar_problem import ScalarProblem
-from .thresholds import DEFAULT, PolylineThresholds, Thresholds
+from .thresholds import LIMITS
 
 
 def scalar_problem(
@@ -27,7 +27,6 @@ def scalar_problem(
     *,
     tolerance: float | None = None,
     within: Array | None = None,
-    thresholds: Thresholds = DEFAULT,
 ) -> ScalarProblem:
     """The problem at a load factor. Of energies that depend on the mode one nearby, as these have no potential.
 
@@ -36,21 +35,19 @@ def scalar_problem(
         factor: λ.
         tolerance: energy by which curved laws may differ from their polylines, altogether; None: a coarse one.
         within: displacements up to which curved laws are followed, (n,); None: far beyond all that the laws tell apart.
-        thresholds: the numbers that tune the search.
 
     Raises:
         InputError: a law acts on the length of a vector whose components have other laws.
     """
-    polylines = thresholds.polylines
-    far = np.full(problem.size, _far(problem.bonds, polylines.far)) if within is None else within
-    laws = _Laws.of(problem, _graphs(problem.bonds, far, tolerance, polylines), problem.constant_at(factor))
+    far = np.full(problem.size, _far(problem.bonds)) if within is None else within
+    laws = _Laws.of(problem, _graphs(problem.bonds, far, tolerance), problem.constant_at(factor))
     vectors = [argument for argument in laws.chains if argument.radial]
     _refuse_overlap(problem, laws.chains)
     unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
     chains = [*unknowns, *(laws.chains[v] for v in vectors)]
     whole = tuple(total(one) if one else FREE for one in chains)
-    lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, thresholds.points.zero)
-    stiffness, motions = with_motions(problem.stiffness, thresholds.cells)
+    lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, LIMITS.zero)
+    stiffness, motions = with_motions(problem.stiffness)
     return ScalarProblem(
         stiffness=stiffness,
         motions=motions,
@@ -62,7 +59,6 @@ def scalar_problem(
         constant=laws.constant,
         error=laws.error,
         farthest=float(np.max(far)) if laws.error else math.inf,
-        thresholds=thresholds,
     )
 
 
@@ -143,14 +139,12 @@ def _lengths(vectors: Sequence[_Argument]) -> Lengths:
     )
 
 
-def _graphs(
-    laws: Sequence[Bonds], far: Array, tolerance: float | None, thresholds: PolylineThresholds
-) -> Iterator[LawGraph]:
+def _graphs(laws: Sequence[Bonds], far: Array, tolerance: float | None) -> Iterator[LawGraph]:
     """The laws as polylines; those of curved laws share the error by their areas."""
     area = sum(float(b.weights.sum()) for b in laws if b.law.graph is None)
     for b in laws:
-        aim = thresholds.coarse * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
-        yield law_graph(b.law, _argument(b, far), aim, thresholds)
+        aim = LIMITS.coarse * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
+        yield law_graph(b.law, _argument(b, far), aim)
 
 
 def _argument(bonds: Bonds, far: Array) -> float:
@@ -159,10 +153,10 @@ def _argument(bonds: Bonds, far: Array) -> float:
     return float(np.max(arguments, initial=bonds.law.length_scale))
 
 
-def _far(laws: Sequence[Bonds], far: float) -> float:
+def _far(laws: Sequence[Bonds]) -> float:
     """A displacement beyond all that the laws tell apart."""
     sizes = [np.max(np.abs([b.law.length_scale, *b.law.breaks])) for b in laws]
-    return far * max([1.0, *map(float, sizes)])
+    return LIMITS.far * max([1.0, *map(float, sizes)])
 
 
 def _frozen(bonds: Bonds) -> Bonds:

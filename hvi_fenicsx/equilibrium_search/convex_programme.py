@@ -14,8 +14,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..typing import Array, Integers
-from .arcs import ROUNDING, ArcTable
-from .thresholds import DEFAULT, ProgrammeThresholds
+from .arcs import ArcTable
+from .thresholds import LIMITS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,6 @@ def minimise(
     b: Array,
     chains: ArcTable,
     start: Array,
-    thresholds: ProgrammeThresholds = DEFAULT.programmes,
     cut: Callable[[], bool] = never,
 ) -> Optimum:
     """Minimise ½ xᵀAx - bᵀx + Σ φᵢ(xᵢ).
@@ -59,10 +58,9 @@ def minimise(
         b: (n,).
         chains: φ.
         start: x (n,) to begin at.
-        thresholds: how many steps, and what is rounding.
         cut: whether to end with the point that is there, since the search stops.
     """
-    programme = _Programme(a, b, chains, thresholds, cut)
+    programme = _Programme(a, b, chains, cut)
     found = programme.active_set(np.clip(start, chains.low[:, 0], chains.last))
     if not found.done and not cut():
         found = programme.proximal(found)
@@ -72,10 +70,8 @@ def minimise(
 class _Programme:
     """One programme."""
 
-    def __init__(
-        self, a: Array, b: Array, chains: ArcTable, thresholds: ProgrammeThresholds, cut: Callable[[], bool]
-    ) -> None:
-        self._a, self._b, self._chains, self._thresholds, self._cut = a, b, chains, thresholds, cut
+    def __init__(self, a: Array, b: Array, chains: ArcTable, cut: Callable[[], bool]) -> None:
+        self._a, self._b, self._chains, self._cut = a, b, chains, cut
         diagonal = np.diag(a)
         self._scale = np.maximum(diagonal, 1e-3 * float(np.max(diagonal)) or 1.0)
         self._rows = np.arange(len(b))
@@ -86,7 +82,7 @@ class _Programme:
         low, high = chains.interval(x)
         states = chains.states(x + np.clip(self._b - self._a @ x, low, high) / scale, scale)
         seen: set[bytes] = set()
-        for _ in range(self._thresholds.most_steps):
+        for _ in range(LIMITS.most_steps):
             solved = self._solved(states)
             if solved is None:
                 return _Iterate(x=x, done=False)
@@ -123,10 +119,10 @@ class _Programme:
     def proximal(self, found: _Iterate) -> _Iterate:
         """The same with a proximal term, which shrinks where the states settle."""
         best, least, weight = found, self._objective(found.x), 1.0
-        for _ in range(self._thresholds.most_steps):
+        for _ in range(LIMITS.most_steps):
             added = weight * self._scale
             matrix, force = self._a + np.diag(added), self._b + added * best.x
-            near = _Programme(matrix, force, self._chains, self._thresholds, self._cut)
+            near = _Programme(matrix, force, self._chains, self._cut)
             trial = near.active_set(best.x)
             value = self._objective(trial.x)
             if value <= least:
@@ -148,7 +144,7 @@ class _Programme:
 
     def _stationary(self, x: Array) -> bool:
         largest = float(np.max(np.abs(self._b), initial=1e-300))
-        return bool(np.max(np.abs(self._residual(x)), initial=0.0) <= ROUNDING * largest)
+        return bool(np.max(np.abs(self._residual(x)), initial=0.0) <= LIMITS.rounding * largest)
 
     def bounded(self, found: _Iterate) -> Optimum:
         """The point with a bound that allows for its residual r and for rounding.

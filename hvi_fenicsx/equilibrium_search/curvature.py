@@ -19,6 +19,7 @@ import numpy as np
 from ..typing import Array, Integers, Mask
 from .arcs import FREE
 from .scalar_problem import ScalarProblem
+from .thresholds import LIMITS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +55,7 @@ class CurvatureShare:
     def kernel(self) -> Array:
         """Orthonormal columns that S maps to zero, (n, k)."""
         values, vectors = np.linalg.eigh(self._problem.stiffness)
-        zero = self._problem.thresholds.points.zero * max(float(values[-1]), 0.0)
+        zero = LIMITS.zero * max(float(values[-1]), 0.0)
         return np.asarray(vectors[:, values <= zero])
 
     @cached_property
@@ -64,7 +65,7 @@ class CurvatureShare:
         with_law = np.array([c != FREE for c in problem.chains[: problem.size]], dtype=np.bool_)
         with_law[problem.lengths.members] = True
         columns, sizes, _ = np.linalg.svd(np.where(with_law[:, None], self.kernel, 0.0), full_matrices=False)
-        return np.asarray(columns[:, sizes > problem.thresholds.points.accuracy])
+        return np.asarray(columns[:, sizes > LIMITS.accuracy])
 
     def share(self, low: Array, high: Array, undecided: Integers, seen: Array, *, lend: bool = False) -> Curvature:
         """D on a box.
@@ -80,8 +81,10 @@ class CurvatureShare:
         slope, drops = problem.arcs.least_slope(low, high), problem.arcs.drops(low, high)
         own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
         own[problem.size :] = 0.0
-        most, least = float(seen[undecided].max(initial=0.0)), problem.thresholds.bounds.least_weight
-        strength = np.where(drops > 0.0, drops, -slope * (high - low)) * (seen / most + least if most > 0.0 else 1.0)
+        most = float(seen[undecided].max(initial=0.0))
+        strength = np.where(drops > 0.0, drops, -slope * (high - low)) * (
+            seen / most + LIMITS.worthwhile if most > 0.0 else 1.0
+        )
         need = np.where(drops > 0.0, np.inf, np.maximum(-slope, 0.0))
         matrix = problem.stiffness + np.diag(problem.diagonal(own))
         if lend:
@@ -93,12 +96,12 @@ class CurvatureShare:
 
     def _given(self, matrix: Array, free: Array, undecided: Integers, weights: Array, need: Array) -> Array:
         """D, (n + m,): in proportion to the weights, but no more than is needed."""
-        added, limits = np.zeros(len(need)), self._problem.thresholds.bounds
+        added = np.zeros(len(need))
         fixed = self._moved(free)[undecided]
         left, weights = undecided[~fixed], np.maximum(weights[~fixed], 1e-12)
         while left.size:
             inverse = self._inverse(matrix - np.diag(self._problem.diagonal(added)), free)
-            given = limits.part / self._largest(inverse, left, weights) * weights
+            given = LIMITS.part / self._largest(inverse, left, weights) * weights
             enough = given >= need[left]
             if not enough.any():
                 added[left] = given
@@ -114,7 +117,7 @@ class CurvatureShare:
     def _moved(self, motions: Array) -> Mask:
         """Which arguments a rigid motion moves, (n + m,)."""
         lengths = self._problem.lengths
-        unknowns = np.any(np.abs(motions) > self._problem.thresholds.points.accuracy, axis=1)
+        unknowns = np.any(np.abs(motions) > LIMITS.accuracy, axis=1)
         return np.concatenate([unknowns, np.any(unknowns[lengths.unknowns] & lengths.there, axis=1)])
 
     def _largest(self, inverse: Array, left: Integers, weights: Array) -> float:
@@ -140,4 +143,4 @@ class CurvatureShare:
         if not rigid.shape[1]:
             return rigid
         values, vectors = np.linalg.eigh(rigid.T @ along @ rigid)
-        return np.asarray(rigid @ vectors[:, values <= self._problem.thresholds.points.zero * self.lent])
+        return np.asarray(rigid @ vectors[:, values <= LIMITS.zero * self.lent])

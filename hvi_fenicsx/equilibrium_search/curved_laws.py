@@ -20,7 +20,7 @@ from ..typing import Array
 from . import stationarity
 from .scalar_problem import ScalarProblem
 from .stationarity import StationaryPoint, Subdifferential
-from .thresholds import DEFAULT, PolylineThresholds
+from .thresholds import LIMITS
 
 
 def stationary_point(near: ScalarProblem, problem: CondensedProblem, x: Array) -> StationaryPoint | None:
@@ -33,22 +33,22 @@ def stationary_point(near: ScalarProblem, problem: CondensedProblem, x: Array) -
         problem: the problem with the laws, at the load factor 1.
         x: displacements, (n,).
     """
-    start, best, limits = x, None, near.thresholds.points
-    for _ in range(near.thresholds.programmes.most_steps):
+    start, best = x, None
+    for _ in range(LIMITS.most_steps):
         force, allowed = near.force - near.stiffness @ x, _subdifferential(near, problem, x)
         rest = force - np.clip(force, allowed.low, allowed.high)
         missing = float(np.max(np.abs(rest), initial=0.0))
-        if best is not None and missing >= 0.5 * best[0] and best[0] <= limits.accuracy * near.force_size:
+        if best is not None and missing >= 0.5 * best[0] and best[0] <= LIMITS.accuracy * near.force_size:
             break  # at a fold, where two points are one, a step leaves a quarter of the rest
         best = missing, x, allowed
-        free = (allowed.high - allowed.low <= limits.accuracy * near.force_size) | (rest != 0.0)
+        free = (allowed.high - allowed.low <= LIMITS.accuracy * near.force_size) | (rest != 0.0)
         matrix = near.stiffness[np.ix_(free, free)] + np.diag(allowed.least[free])
         step = np.zeros(len(x))
         step[free] = np.linalg.lstsq(matrix, rest[free], rcond=None)[0]
         x = np.clip(x + step, near.lower, near.upper)
-        if not np.max(np.abs(x - start)) <= limits.longest * (1.0 + np.max(np.abs(start))):
+        if not np.max(np.abs(x - start)) <= LIMITS.longest * (1.0 + np.max(np.abs(start))):
             break
-    if best is None or best[0] > limits.accuracy**1.5 * near.force_size:
+    if best is None or best[0] > LIMITS.accuracy**1.5 * near.force_size:
         return None
     _, x, allowed = best
     return StationaryPoint(x=x, energy=problem.energy(x), kind=stationarity.kind(near, x, allowed))
@@ -56,7 +56,7 @@ def stationary_point(near: ScalarProblem, problem: CondensedProblem, x: Array) -
 
 def _subdifferential(near: ScalarProblem, problem: CondensedProblem, x: Array) -> Subdifferential:
     """What the laws and bounds allow at a point."""
-    close = near.thresholds.points.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+    close = LIMITS.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
     low, high, slope = np.zeros((3, near.size))
     falls = np.zeros(near.size, dtype=np.bool_)
     for bonds in problem.bonds:
@@ -93,32 +93,29 @@ class LawGraph:
     error: float
 
 
-def law_graph(
-    law: Superpotential, far: float, tolerance: float, thresholds: PolylineThresholds = DEFAULT.polylines
-) -> LawGraph:
+def law_graph(law: Superpotential, far: float, tolerance: float) -> LawGraph:
     """The polyline of a law.
 
     Args:
         law: the law.
         far: displacements beyond it do not matter.
         tolerance: difference of energies per area that is aimed at, where the law is curved.
-        thresholds: how many nodes and samples.
     """
     offset = float(law.value(np.zeros(1))[0])
     if (graph := law.graph) is not None:
         return LawGraph(graph=graph, offset=offset, error=0.0)
-    nodes, error = _nodes(law, far, tolerance, thresholds)
+    nodes, error = _nodes(law, far, tolerance)
     return LawGraph(graph=_joined(law, nodes), offset=offset, error=error)
 
 
-def _nodes(law: Superpotential, far: float, tolerance: float, thresholds: PolylineThresholds) -> tuple[Array, float]:
+def _nodes(law: Superpotential, far: float, tolerance: float) -> tuple[Array, float]:
     """Nodes between which energies differ by at most a tolerance, and how far they do."""
-    first = _first_nodes(law, far, thresholds.one_place)
+    first = _first_nodes(law, far)
     begin, end = first[:-1], first[1:]
     kept, worst = [first[-1:]], 0.0
     while begin.size:
-        full = sum(map(len, kept)) + 2 * begin.size > thresholds.most_nodes
-        errors = _errors(law, begin, end, thresholds.samples)
+        full = sum(map(len, kept)) + 2 * begin.size > LIMITS.most_nodes
+        errors = _errors(law, begin, end)
         fine = (errors <= tolerance) | full
         worst = float(np.max(errors[fine], initial=worst))  # not a number stays so
         kept.append(begin[fine])
@@ -128,19 +125,19 @@ def _nodes(law: Superpotential, far: float, tolerance: float, thresholds: Polyli
     return np.sort(np.concatenate(kept)), worst
 
 
-def _first_nodes(law: Superpotential, far: float, one_place: float) -> Array:
+def _first_nodes(law: Superpotential, far: float) -> Array:
     """Breaks of a law, and distances from zero that double."""
     first = law.length_scale
     doubled = first * 2.0 ** np.arange(max(np.ceil(np.log2(far / first)), 1.0))
     known = np.concatenate([law.kinks, law.breaks, doubled, -doubled, [0.0, far, -far]])
-    return _apart(known[np.abs(known) <= far], one_place)
+    return _apart(known[np.abs(known) <= far])
 
 
-def _apart(places: Array, one_place: float) -> Array:
+def _apart(places: Array) -> Array:
     """Places in order; of those that only rounding tells apart, the one that is named first."""
     order = np.argsort(places, kind="stable")
     ordered = places[order]
-    begins = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > one_place * np.abs(ordered))
+    begins = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > LIMITS.rounding * np.abs(ordered))
     return np.asarray(places[np.minimum.reduceat(order, begins)])
 
 
@@ -150,9 +147,9 @@ def _middle_tractions(law: Superpotential, begin: Array, end: Array) -> Array:
     return np.asarray(2.0 * (law.value(end) - law.value(begin)) / (end - begin) - ends)
 
 
-def _samples(begin: Array, end: Array, samples: int) -> tuple[Array, Array]:
+def _samples(begin: Array, end: Array) -> tuple[Array, Array]:
     """Shares of intervals, and the places there, (n, k)."""
-    share: Array = np.linspace(0.0, 1.0, samples + 1, dtype=np.float64)
+    share: Array = np.linspace(0.0, 1.0, LIMITS.samples + 1, dtype=np.float64)
     x = begin[:, None] + (end - begin)[:, None] * share
     x[:, -1] = end
     return share, x
@@ -173,9 +170,9 @@ def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
     return np.asarray(apart + np.abs(np.diff(ends, axis=1)) + rounding)
 
 
-def _errors(law: Superpotential, begin: Array, end: Array, samples: int) -> Array:
+def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
     """Bounds of the difference of the energies on intervals, (n,)."""
-    share, x = _samples(begin, end, samples)
+    share, x = _samples(begin, end)
     energy, traction = _polyline(law, begin, end, share)
     value = law.value(x.ravel()).reshape(x.shape)
     difference = np.abs(energy + value[:, :1] - value)

@@ -1,7 +1,7 @@
 """All stationary points: cells that no point satisfies are given up, the others divided until each has one at most.
 
 A cell gives each unknown an interval, or one joint of its law. It needs no division where its laws tell that it has one
-stationary point at most, and which (:mod:`.polyline_cells`). A drop is divided in three: before it, behind it, and on
+stationary point at most, and which (:mod:`.cells`). A drop is divided in three: before it, behind it, and on
 it, where the traction may have any value between. Laws act on one component each, and their tractions are polylines.
 """
 
@@ -19,7 +19,8 @@ from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
 from .scalar_problem import Box, ScalarProblem
 from .stationarity import PointList
-from .tightening import ForceIntervals, clipped_again
+from .thresholds import LIMITS
+from .tightening import ForceIntervals, clipped_again, shorter
 
 
 @dataclass(kw_only=True)
@@ -41,7 +42,7 @@ class Enumeration:
     waiting: list[Box] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.points = PointList(self.problem.thresholds.points.same)
+        self.points = PointList(LIMITS.same)
         self._laws, self._balance = PolylineCells(self.problem), RigidBalance(self.problem)
         self._forces, self._weighed = ForceIntervals(self.problem), BalanceTest(Relaxation(self.problem))
 
@@ -86,20 +87,20 @@ class Enumeration:
 
     def _looked(self, cell: Box) -> Look | None:
         """The cell made smaller, and where to divide it; None if no stationary point is in it."""
-        look, limits = Look(cell=cell, guide=None), self.problem.thresholds.cells
-        for _ in range(limits.most_rounds):
+        look = Look(cell=cell, guide=None)
+        for _ in range(LIMITS.most_rounds):
             if (tight := self._tightened(look.cell)) is None:
                 return None
             if (found := self._weighed.look(tight, self.cut)) is None:
                 return None
             look = found
-            if self.cut() or not np.any(look.cell.high - look.cell.low < limits.shorter * (tight.high - tight.low)):
+            if self.cut() or not shorter(tight.low, tight.high, look.cell.low, look.cell.high).any():
                 break
         return look
 
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller by balances of forces; None if no stationary point is in it."""
-        ends = clipped_again(self._balanced, cell.low, cell.high, self.problem.thresholds.cells)
+        ends = clipped_again(self._balanced, cell.low, cell.high)
         return None if ends is None else settled(self.problem, Box.around(*ends, cell.x))
 
     def _balanced(self, low: Array, high: Array) -> tuple[Array, Array] | None:

@@ -18,7 +18,8 @@ from typing import cast
 import numpy as np
 
 from ..typing import Array, Integers, Mask
-from .arcs import INF, ROUNDING, ArcTable, apart
+from .arcs import INF, ArcTable, apart
+from .thresholds import LIMITS
 
 LOW, HIGH = 0, 1
 
@@ -75,7 +76,7 @@ def _falls(table: Array, meets: Mask) -> tuple[Mask, Mask]:
         before, after = (traction + slope * (x - anchor) for x in (high, low))
         sizes = np.maximum(np.abs(traction), np.abs(slope * anchor))
         size = np.maximum(np.maximum(np.abs(before), sizes)[:, :-1], np.abs(traction[:, 1:]))
-        drops = after[:, 1:] < before[:, :-1] - ROUNDING * size
+        drops = after[:, 1:] < before[:, :-1] - LIMITS.rounding * size
     return meets & (slope < 0.0), meets[:, :-1] & meets[:, 1:] & drops
 
 
@@ -101,7 +102,7 @@ def _risen(rows: Array) -> Mask:
     _, high, anchor, _, traction, slope = rows[:-1].T
     after = rows[1:, 4] + rows[1:, 5] * (rows[1:, LOW] - rows[1:, 2])
     before = traction + slope * (high - anchor)
-    return np.asarray(after > before + ROUNDING * np.maximum(np.abs(before), np.abs(slope * anchor)))
+    return np.asarray(after > before + LIMITS.rounding * np.maximum(np.abs(before), np.abs(slope * anchor)))
 
 
 def _point(arc: Array, end: int) -> Run:

@@ -14,10 +14,11 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Mask
-from .arcs import ROUNDING, ArcTable
+from .arcs import ArcTable
 from .convex_programme import Optimum, minimise, never
 from .lengths import Frames, left_out, parts, unknowns_of
 from .scalar_problem import ScalarProblem
+from .thresholds import LIMITS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +74,7 @@ class LengthProgramme:
         """
         x = self._admissible(start)
         value = self._value(x)
-        for _ in range(self.problem.thresholds.programmes.most_steps):
+        for _ in range(LIMITS.most_steps):
             found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
             if found is None or self.cut():
                 break
@@ -97,7 +98,7 @@ class LengthProgramme:
     def _better(self, x: Array, value: float, *, near_zero: bool) -> tuple[Array, float] | None:
         """A point of lower objective on the way to the solution in the frames; vectors may be held at zero already."""
         goal = self._solved(x, self._frame(x, near_zero=near_zero), bounding=False).x
-        least = ROUNDING * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
+        least = LIMITS.rounding * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
         for halvings in range(8):
             trial = self._admissible(x + 0.5**halvings * (goal - x))
             after = self._value(trial)
@@ -144,9 +145,8 @@ class LengthProgramme:
         chains: list[Array] = [self.laws.rows(i) for i in range(n)]
         for v, k in zip(*np.nonzero(lengths.there), strict=True):
             chains[lengths.unknowns[v, k]] = np.array(list(self._component(here, int(v), int(k), bounding)))
-        limits = self.problem.thresholds.programmes
         matrix, force = frames.matrix(self.a), frames.forces(self.b)
-        found = minimise(matrix, force, ArcTable.of(chains), self._begin(frames, x), limits, self.cut)
+        found = minimise(matrix, force, ArcTable.of(chains), self._begin(frames, x), self.cut)
         y = parts(lengths, found.x)
         vectors, ahead = frames.turned(y), np.abs(y[np.arange(len(y)), frames.axis])
         size = np.linalg.norm(vectors, axis=1)
@@ -161,9 +161,7 @@ class LengthProgramme:
         axis, joints = self.problem.lengths.unknowns[rows, frames.axis], self.laws.ends[len(x) :]
         size = np.abs(y[axis])
         at = joints[rows, np.argmin(np.abs(joints - size[:, None]), axis=1)]
-        y[axis] = np.where(
-            np.abs(at - size) <= self.problem.thresholds.cells.widened * size, np.copysign(at, y[axis]), y[axis]
-        )
+        y[axis] = np.where(np.abs(at - size) <= LIMITS.rounding * size, np.copysign(at, y[axis]), y[axis])
         return y
 
     def _rounding(self, y: Array) -> float:

@@ -21,33 +21,14 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .arcs import ROUNDING
 from .convex_programme import never
+from .descent import descend
 from .relaxation import Minimum, Relaxation
 from .scalar_problem import Box, ScalarProblem, clipped
-from .systematic import descend
+from .thresholds import LIMITS
 
 OpenBox = tuple[Array, Array, float]
 """Low and high of a box, and a bound of the laws' own energy in it."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Progress:
-    """How far a search has come.
-
-    Attributes:
-        lower: no point has a lower energy.
-        upper: the lowest energy found.
-        gap: their difference, relative to the energy.
-        boxes: bounded so far.
-        waiting: not yet decided.
-    """
-
-    lower: float
-    upper: float
-    gap: float
-    boxes: int
-    waiting: int
 
 
 @dataclass(kw_only=True)
@@ -76,7 +57,6 @@ class LowestSearch:
     _numbers: Iterator[int] = field(default_factory=count)
 
     def __post_init__(self) -> None:
-        self._thresholds = self.problem.thresholds.bounds
         self._relaxation = Relaxation(self.problem, self.cut)
 
     def start(self, points: Iterable[Array] = (), region: tuple[Array, Array] | None = None) -> None:
@@ -102,8 +82,9 @@ class LowestSearch:
         if region is None and problem.is_far(first.x):
             raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
         self._try(first.x)
-        level = self.upper + 2.0 * problem.error
-        self.region = level_set(self._relaxation, (low, high), first, level, self.cut)
+        level = self.upper + 2.0 * problem.error + LIMITS.accuracy**0.5 * problem.energy_size(first.x)
+        level_set = LevelSet(problem=problem, ends=(low, high), found=first, energy=level, cut=self.cut)
+        self.region = level_set.box(self._relaxation.kernel)
         self._enter(replace(Box.around(*self.region, first.x), bound=first.bound))
 
     def resume(self, boxes: Iterable[OpenBox], point: Array) -> None:
@@ -124,11 +105,15 @@ class LowestSearch:
         for bound, _, box, _ in self.waiting:
             yield box.low, box.high, bound - self.problem.error
 
-    def progress(self) -> Progress:
-        """How far the search is."""
-        lower = min(self.waiting[0][0], self.upper) if self.waiting else self.upper - self._allowed
-        gap = max(self.upper - lower, 0.0) / self._size
-        return Progress(lower=lower, upper=self.upper, gap=gap, boxes=self.boxes, waiting=len(self.waiting))
+    @property
+    def lower(self) -> float:
+        """No point has a lower energy."""
+        return min(self.waiting[0][0], self.upper) if self.waiting else self.upper - self._allowed
+
+    @property
+    def open_gap(self) -> float:
+        """What is open between the lowest energy found and the bound, relative to the energy."""
+        return max(self.upper - self.lower, 0.0) / self._size
 
     @property
     def proven(self) -> bool:
@@ -142,7 +127,7 @@ class LowestSearch:
     @property
     def _allowed(self) -> float:
         """The gap as an energy; a little less, so that rounding lifts no told gap above it."""
-        return max(self._thresholds.share_used * self.gap * self._size, ROUNDING * self._parts)
+        return max(LIMITS.nearly * self.gap * self._size, LIMITS.rounding * self._parts)
 
     @property
     def _parts(self) -> float:
@@ -150,7 +135,7 @@ class LowestSearch:
         reach = np.max(np.abs(self.region), axis=0)[: self.problem.size]
         return self.problem.energy_size(self.x) or float(np.abs(self.problem.force) @ reach)
 
-    def run(self, stop: Callable[[], bool], report: Callable[[Progress], None]) -> bool:
+    def run(self, stop: Callable[[], bool], report: Callable[[LowestSearch], None]) -> bool:
         """Divide boxes until the proof is there; whether it is.
 
         Args:
@@ -165,22 +150,22 @@ class LowestSearch:
             left[found.argument] = right[found.argument] = found.place
             self._enter(replace(box, high=left))
             self._enter(replace(box, low=right))
-            report(self.progress())
+            report(self)
         return True
 
     def _enter(self, box: Box) -> None:
         """Tighten and bound a box; it waits if it is still open."""
         self.boxes += 1
         found = None
-        for _ in range(self._thresholds.most_rounds):
+        for _ in range(LIMITS.most_rounds):
             before = box.bound
-            found = self._relaxation.solve(box, self._thresholds.lost * (self.upper - before))
+            found = self._relaxation.solve(box, LIMITS.worthwhile * (self.upper - before))
             weights = 0.5 * (box.weights + found.spread) if box.weights.any() else found.spread
             box = replace(box, x=found.x, bound=max(before, found.bound), weights=weights)
             self._try(found.x)
             if box.bound >= self.upper - self._allowed or np.any((box := self._smaller(box, found)).low > box.high):
                 return
-            if not found.gap or box.bound - before < self._thresholds.worthwhile * (self.upper - box.bound):
+            if not found.gap or box.bound - before < LIMITS.worthwhile * (self.upper - box.bound):
                 break
             if self.cut():
                 break
@@ -192,12 +177,8 @@ class LowestSearch:
 
     def _smaller(self, box: Box, found: Minimum) -> Box:
         """What strong convexity leaves of a box below the lowest energy found."""
-        reach = (
-            found.curvature.radii
-            * math.sqrt(2.0 * max(self.upper - found.bound, 0.0))
-            * (1.0 + self.problem.thresholds.points.accuracy)
-        )
-        at, n, wide = self.problem.arguments(found.x), self.problem.size, self.problem.thresholds.cells.widened
+        reach = found.curvature.radii * math.sqrt(2.0 * max(self.upper - found.bound, 0.0)) * (1.0 + LIMITS.accuracy)
+        at, n, wide = self.problem.arguments(found.x), self.problem.size, LIMITS.rounding
         low, high = np.maximum(box.low, at - reach), np.minimum(box.high, at + reach)
         least, most = self.problem.lengths.within(low[:n], high[:n])
         low[n:], high[n:] = np.maximum(low[n:], least * (1.0 - wide)), np.minimum(high[n:], most * (1.0 + wide))
@@ -215,74 +196,64 @@ class Cut(Exception):
     """The search stops before there is a first box."""
 
 
-def level_set(
-    relaxation: Relaxation, ends: tuple[Array, Array], found: Minimum, level: float, cut: Callable[[], bool]
-) -> tuple[Array, Array]:
-    """The ends of a box (n + m,) with all points of at most an energy.
+@dataclass(frozen=True, kw_only=True)
+class LevelSet:
+    """All points of at most an energy.
 
-    Args:
-        relaxation: of the problem.
+    Attributes:
+        problem: the problem.
         ends: of a box that is far larger, (n + m,) each.
-        found: the relaxation's minimum there.
-        level: the energy.
+        found: the minimum of the relaxation there.
+        energy: the energy.
         cut: whether to give up, since the search stops.
-
-    Raises:
-        SolverError: no finite box was found.
-        Cut: the search stops.
     """
-    problem, n = relaxation.problem, relaxation.problem.size
-    energy = level + problem.thresholds.bounds.slack * problem.energy_size(found.x)
-    root = np.sqrt(2.0 * max(energy - found.bound, 0.0))
-    reach = root * found.curvature.radii[:n]
-    free = ~np.isfinite(reach)
-    if free.any():
-        motions = _separated(problem, relaxation.kernel)
-        ways = [_reach(problem, ends, found, motion, energy, cut) for motion in motions.T]
-        reach[free] = root * found.curvature.range_radii[:n][free] + np.abs(motions[free]) @ np.array(ways)
-    low, high = np.maximum(found.x - reach, ends[0][:n]), np.minimum(found.x + reach, ends[1][:n])
-    return problem.with_lengths(low, high)
 
+    problem: ScalarProblem
+    ends: tuple[Array, Array]
+    found: Minimum
+    energy: float
+    cut: Callable[[], bool]
 
-def _separated(problem: ScalarProblem, motions: Array) -> Array:
-    """The same motions, those that bounds cannot hold apart from others, as these may have no limit."""
-    bounded = np.isfinite(problem.lower) | np.isfinite(problem.upper)
-    return np.asarray(motions @ np.linalg.svd(motions[bounded])[2].T) if bounded.any() else motions
+    def box(self, kernel: Array) -> tuple[Array, Array]:
+        """The ends of a box (n + m,) that holds them.
 
+        Args:
+            kernel: orthonormal columns of rigid motions, (n, k).
 
-def _reach(
-    problem: ScalarProblem,
-    ends: tuple[Array, Array],
-    found: Minimum,
-    motion: Array,
-    energy: float,
-    cut: Callable[[], bool],
-) -> float:
-    """How far the share of a rigid motion can be from that of the minimiser."""
-    here = float(motion @ found.x)
-    return max(_farthest(problem, ends, found, sign * motion, energy, cut) - sign * here for sign in (1.0, -1.0))
+        Raises:
+            SolverError: no finite box was found.
+            Cut: the search stops.
+        """
+        found, n = self.found, self.problem.size
+        root = np.sqrt(2.0 * max(self.energy - found.bound, 0.0))
+        reach = root * found.curvature.radii[:n]
+        free = ~np.isfinite(reach)
+        if free.any():
+            motions = self._separated(kernel)
+            ways = np.array([max(self._way(c), self._way(-c)) for c in motions.T])
+            reach[free] = root * found.curvature.range_radii[:n][free] + np.abs(motions[free]) @ ways
+        low, high = np.maximum(found.x - reach, self.ends[0][:n]), np.minimum(found.x + reach, self.ends[1][:n])
+        return self.problem.with_lengths(low, high)
 
+    def _separated(self, motions: Array) -> Array:
+        """The same motions, those that bounds cannot hold apart from others, as these may have no limit."""
+        bounded = np.isfinite(self.problem.lower) | np.isfinite(self.problem.upper)
+        return np.asarray(motions @ np.linalg.svd(motions[bounded])[2].T) if bounded.any() else motions
 
-def _farthest(
-    problem: ScalarProblem,
-    ends: tuple[Array, Array],
-    found: Minimum,
-    c: Array,
-    energy: float,
-    cut: Callable[[], bool],
-) -> float:
-    """A bound of c·x from above, by forces each a quarter of the one before."""
-    best, tau = np.inf, float(np.max(np.abs(problem.force), initial=1e-300))
-    for _ in range(problem.thresholds.programmes.most_steps):
-        pulled = Relaxation(problem.under(problem.force + tau * c), cut).solve(Box.around(*ends, found.x))
-        if cut():
-            raise Cut
-        if not problem.is_far(pulled.x):
-            bound = (energy - pulled.bound) / tau
-            if bound >= best:
-                break
-            best = bound
-        tau *= 0.25
-    if not np.isfinite(best):
-        raise SolverError("no lowest energy: a body can move away without end for all that can be shown")
-    return best
+    def _way(self, c: Array) -> float:
+        """How much larger c·x can be than at the minimiser, by forces each a quarter of the one before."""
+        problem, best, tau = self.problem, np.inf, float(np.max(np.abs(self.problem.force), initial=1e-300))
+        for _ in range(LIMITS.most_steps):
+            pulled = Relaxation(problem.under(problem.force + tau * c), self.cut)
+            least = pulled.solve(Box.around(*self.ends, self.found.x))
+            if self.cut():
+                raise Cut
+            if not problem.is_far(least.x):
+                bound = (self.energy - least.bound) / tau
+                if bound >= best:
+                    break
+                best = bound
+            tau *= 0.25
+        if not np.isfinite(best):
+            raise SolverError("no lowest energy: a body can move away without end for all that can be shown")
+        return float(best - c @ self.found.x)

@@ -15,6 +15,7 @@ from .convex_programme import Optimum, minimise, never
 from .curvature import Curvature, CurvatureShare
 from .length_programme import LengthProgramme
 from .scalar_problem import Box, ScalarProblem
+from .thresholds import LIMITS
 
 
 def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> ArcTable:
@@ -83,7 +84,7 @@ class Relaxation:
     """
 
     def __init__(self, problem: ScalarProblem, cut: Callable[[], bool] = never) -> None:
-        self.problem, self._thresholds, self._cut = problem, problem.thresholds.bounds, cut
+        self.problem, self._cut = problem, cut
         self._share = CurvatureShare(problem)
 
     def undecided(self, low: Array, high: Array) -> Integers:
@@ -133,7 +134,7 @@ class Relaxation:
         if not shapes.size:
             return None
         ends = np.sort(np.stack([shapes * low[:n, None], shapes * high[:n, None]]), axis=0)
-        slack = self.problem.thresholds.cells.widened * np.abs(ends).sum(axis=(0, 1))
+        slack = LIMITS.rounding * np.abs(ends).sum(axis=(0, 1))
         first, last = ends.sum(axis=1)
         return _Lent(shapes=shapes, stiffness=self._share.lent, low=first - slack, high=last + slack)
 
@@ -149,13 +150,13 @@ class Relaxation:
             )
             found = programme.bound(programme.minimiser(box.x))
         else:
-            found = minimise(a, b, stack, box.x, problem.thresholds.programmes, self._cut)
+            found = minimise(a, b, stack, box.x, self._cut)
         return Optimum(x=found.x, bound=found.bound + constant)
 
     def _examined(self, box: Box, found: Optimum, stack: ArcTable, curvature: Curvature, lent: _Lent | None) -> Minimum:
         """Where envelopes are not tight, and chords take something off."""
         problem, x, at = self.problem, found.x, self.problem.arguments(found.x)
-        tight = self._thresholds.tight * problem.energy_size(x)
+        tight = LIMITS.rounding * problem.energy_size(x)
         gaps = problem.arcs.energy(at) + 0.5 * curvature.added * at * at - stack.energy(at)
         gaps = np.where((gaps > tight) & (box.high > box.low), gaps, 0.0)
         i = int(np.argmax(gaps))

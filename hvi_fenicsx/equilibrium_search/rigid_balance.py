@@ -16,6 +16,7 @@ import numpy as np
 from ..typing import Array, Integers
 from .rigid_motions import RigidMotions
 from .scalar_problem import ScalarProblem
+from .thresholds import LIMITS
 from .tightening import GraphClip, clipped_again
 
 EPSILON = float(np.finfo(float).eps)
@@ -34,9 +35,8 @@ class RigidBalance:
 
     def __init__(self, problem: ScalarProblem) -> None:
         self._problem, n = problem, problem.size
-        self._widened = problem.thresholds.cells.widened
         self._graphs = GraphClip(problem, np.zeros(n))
-        motions = problem.motions or RigidMotions.of(problem.stiffness, problem.thresholds.cells)
+        motions = problem.motions or RigidMotions.of(problem.stiffness)
         self.pivots: Integers = motions.pivots
         self.motions: Array = motions.shapes
         others = np.ix_(motions.others, motions.others)
@@ -63,12 +63,12 @@ class RigidBalance:
             low: of the cell, (n,), finite.
             high: of the cell, (n,), finite.
         """
-        return clipped_again(self._once, low, high, self._problem.thresholds.cells)
+        return clipped_again(self._once, low, high)
 
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         if (forces := self._balanced(*self._forces(low, high), low, high)) is None:
             return None
-        rounding = self._widened * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
+        rounding = LIMITS.rounding * sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in forces)
         ends = self._graphs.clipped(low, high, forces[0] - rounding, forces[1] + rounding)
         if ends is None or not np.all(np.isfinite(forces)):
             return ends
@@ -83,7 +83,7 @@ class RigidBalance:
             ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
         least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
         most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
-        wide = self._widened * (np.abs(least) + np.abs(most))
+        wide = LIMITS.rounding * (np.abs(least) + np.abs(most))
         least, most = least - wide, most + wide
         return np.where(low <= problem.lower, -np.inf, least), np.where(high >= problem.upper, np.inf, most)
 
@@ -112,12 +112,12 @@ class RigidBalance:
             others = np.delete(np.arange(len(begin)), j)
             rest_low, rest_high = _product(self.motions[np.ix_(i, others)], begin[others], end[others])
             ways = np.sort(np.stack([low[i] - last[i] - rest_high, high[i] - first[i] - rest_low]) / motion[i], axis=0)
-            slack = self._widened * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
+            slack = LIMITS.rounding * np.abs(np.stack([low[i], high[i], first[i], last[i]]) / motion[i]).max()
             begin[j], end[j] = max(begin[j], ways[0].max() - slack), min(end[j], ways[1].min() + slack)
         if np.any(begin > end):
             return None
         moved_low, moved_high = _product(self.motions, begin, end)
-        slack = self._widened * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
+        slack = LIMITS.rounding * (np.abs(moved_low) + np.abs(moved_high) + np.abs(first) + np.abs(last))
         low, high = np.maximum(low, moved_low + first - slack), np.minimum(high, moved_high + last + slack)
         return None if np.any(low > high) else (low, high)
 

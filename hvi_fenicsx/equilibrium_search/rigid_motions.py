@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from ..typing import Array, Integers
-from .thresholds import CellThresholds
+from .thresholds import LIMITS
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -34,15 +34,14 @@ class RigidMotions:
     shapes: Array
 
     @classmethod
-    def of(cls, stiffness: Array, limits: CellThresholds) -> RigidMotions:
+    def of(cls, stiffness: Array) -> RigidMotions:
         """The motions of a stiffness.
 
         Args:
             stiffness: S, (n, n).
-            limits: what is rigid, and what is zero or one.
         """
         values, vectors = np.linalg.eigh(stiffness)
-        rigid = vectors[:, values <= limits.rigid * np.max(values, initial=0.0)]
+        rigid = vectors[:, values <= LIMITS.zero * np.max(values, initial=0.0)]
         n, k = rigid.shape
         pivots = np.asarray(qr(rigid.T, pivoting=True, mode="r")[1][:k], dtype=np.int64)
         others = np.setdiff1d(np.arange(n), pivots)
@@ -51,14 +50,10 @@ class RigidMotions:
         shapes[others] = -np.linalg.solve(stiffness[np.ix_(others, others)], stiffness[np.ix_(others, pivots)])
         return cls(pivots=pivots, others=others, shapes=shapes)
 
-    def rounded(self, near: float) -> RigidMotions:
-        """The motions whose shares that are next to 0, 1 or -1 are these numbers.
-
-        Args:
-            near: how near.
-        """
+    def rounded(self) -> RigidMotions:
+        """The motions whose shares that are next to 0, 1 or -1 are these numbers."""
         whole = np.round(self.shapes)
-        shapes = np.where(np.abs(self.shapes - whole) < near, whole, self.shapes)
+        shapes = np.where(np.abs(self.shapes - whole) < LIMITS.accuracy, whole, self.shapes)
         return RigidMotions(pivots=self.pivots, others=self.others, shapes=shapes)
 
     def resistance(self, stiffness: Array) -> tuple[Array, Array]:
@@ -68,23 +63,22 @@ class RigidMotions:
             stiffness: S, (n, n).
         """
         size = np.abs(stiffness) @ np.abs(self.shapes)
-        return np.abs(stiffness @ self.shapes), len(stiffness) * EPSILON * size
+        return np.abs(stiffness @ self.shapes), len(stiffness) * LIMITS.rounding * size
 
 
-def with_motions(stiffness: Array, limits: CellThresholds) -> tuple[Array, RigidMotions]:
+def with_motions(stiffness: Array) -> tuple[Array, RigidMotions]:
     """A stiffness that does not resist its rigid motions, and these; the given one where they may be deformations.
 
     Args:
         stiffness: S, symmetric, (n, n).
-        limits: what is rigid, and by how much S may be changed.
     """
-    motions = RigidMotions.of(stiffness, limits)
+    motions = RigidMotions.of(stiffness)
     resistance, rounding = motions.resistance(stiffness)
-    if np.any(resistance > limits.roundings * rounding):
+    if np.any(resistance > rounding):
         return stiffness, motions
-    rounded = motions.rounded(limits.same_share)
+    rounded = motions.rounded()
     changed, scale = _changed(stiffness, rounded), np.sqrt(np.diag(stiffness))
-    near = np.all(np.abs(changed - stiffness) <= limits.rigid * np.outer(scale, scale))
+    near = np.all(np.abs(changed - stiffness) <= LIMITS.zero * np.outer(scale, scale))
     return (changed, rounded) if near else (stiffness, motions)
 
 

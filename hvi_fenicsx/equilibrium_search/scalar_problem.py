@@ -15,7 +15,7 @@ from ..typing import Array
 from .arcs import INF, ArcTable, Chain
 from .lengths import Lengths
 from .rigid_motions import RigidMotions
-from .thresholds import DEFAULT, Thresholds
+from .thresholds import LIMITS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,6 @@ class ScalarProblem:
         error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
         farthest: displacements up to which this is known.
         motions: the rigid motions, which S does not resist; None where they are not told.
-        thresholds: the numbers that tune the search.
     """
 
     stiffness: Array
@@ -46,12 +45,11 @@ class ScalarProblem:
     error: float = 0.0
     farthest: float = INF
     motions: RigidMotions | None = None
-    thresholds: Thresholds = DEFAULT
 
     @property
     def far(self) -> float:
         """A displacement far beyond all joints of the chains: the end of what is searched."""
-        return min(self.thresholds.polylines.far * self.reach, self.farthest)
+        return min(LIMITS.far * self.reach, self.farthest)
 
     @cached_property
     def reach(self) -> float:
@@ -65,7 +63,7 @@ class ScalarProblem:
         Args:
             x: the point, (n,).
         """
-        return bool(np.max(np.abs(x), initial=0.0) >= (1.0 - self.thresholds.points.accuracy) * self.far)
+        return bool(np.max(np.abs(x), initial=0.0) >= (1.0 - LIMITS.accuracy) * self.far)
 
     @cached_property
     def force_size(self) -> float:
@@ -80,7 +78,7 @@ class ScalarProblem:
         places = np.where(np.isfinite(at), np.abs(at), 0.0)
         bends = rises + np.abs(np.diff(arcs.slopes, axis=1)) * places
         peaks = np.maximum(np.abs(arcs.before), np.abs(arcs.after)).max(axis=1)
-        seen = places[np.isfinite(at) & (places > 0.0) & (bends > self.thresholds.polylines.bent * peaks[:, None])]
+        seen = places[np.isfinite(at) & (places > 0.0) & (bends > LIMITS.bent * peaks[:, None])]
         return float(seen.max(initial=0.0)) or 1.0
 
     @property

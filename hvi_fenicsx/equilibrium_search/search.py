@@ -1,25 +1,151 @@
-"""The searches behind one face: all stationary points, the lowest energy, and what can be found without a proof."""
+"""The searches behind one face: what is asked, and what all stationary points or the lowest energy are found to be."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, SolverError
 from ..typing import Array
-from . import stationarity, systematic
+from . import descent, stationarity
 from .enumeration import Enumeration
-from .found import Found, Saved, Task, counted
-from .lowest import Cut, LowestSearch, Progress
+from .lowest import Cut, LowestSearch
 from .scalar_problem import Box, ScalarProblem
 from .stationarity import Kind, PointList, StationaryPoint
+from .thresholds import LIMITS
 
+Saved = Mapping[str, Array]
+"""What is left of an unfinished search: arrays, by name."""
+Keep = Callable[[Callable[[], Saved]], None]
+"""Is given, after each box, what makes the state to go on from."""
+Refined = Callable[[float, Array], ScalarProblem]
+"""A problem with polylines nearer to curved laws: by the difference of the energies and where it counts, (n,)."""
 NO_POINT = "no equilibrium, proven"
 STOPPED = "stopped before a first bound of the energy was known"
 """What is told where there was no time for more."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A search to be made.
+
+    Attributes:
+        problem: the problem.
+        lowest: the lowest energy with a proof; else all equilibria.
+        gap: relative gap that the proof of the lowest may leave.
+        stop: asked before each box, and inside long steps.
+        report: told how far it is, in words.
+        saved: what an earlier search of the same problem left.
+        keep: keeps what is left while the search goes on.
+        bounded: whether the energy is known to be bounded from below.
+        has_potential: whether all laws are derivatives of an energy.
+        no_lowest: why there is no lowest energy; empty where there may be one.
+        known: points near which equilibria are known to be, (n,) each.
+        exact: makes a point near an equilibrium exact; None where there is none near it.
+        refined: follows curved laws more closely.
+    """
+
+    problem: ScalarProblem
+    lowest: bool = False
+    gap: float = 1e-8
+    stop: Callable[[], bool] = lambda: False
+    report: Callable[[str], None] = lambda _: None
+    saved: Saved | None = None
+    keep: Keep = lambda _: None
+    bounded: bool = True
+    has_potential: bool = True
+    no_lowest: str = ""
+    known: tuple[Array, ...] = ()
+    exact: Callable[[Array], StationaryPoint | None] | None = None
+    refined: Refined | None = None
+
+    @property
+    def unproven(self) -> str:
+        """The laws of which it cannot be proven that all equilibria are found; empty where there are none."""
+        if not self.has_potential:
+            return "laws whose energy of separation depends on the mode"
+        if len(self.problem.lengths):
+            return "laws that act on a length"
+        return "curved laws" if self.problem.error else ""
+
+    def made_exact(self, places: Iterable[Array]) -> tuple[StationaryPoint, ...]:
+        """Different stationary points near places, by energy.
+
+        Args:
+            places: each (n,).
+        """
+        points, tried = (PointList(LIMITS.accuracy**0.5) for _ in range(2))
+        for x in places:
+            near = StationaryPoint(x=x, energy=self.problem.energy(x), kind=Kind.UNDECIDED)
+            if tried.add(near):
+                points.add(near if self.exact is None else self.exact(x))
+        return by_energy(points)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        points: by energy.
+        complete: whether these are all stationary points.
+        lower_bound: no point has a lower energy; None where none is known.
+        proven: whether what was asked for is proven.
+        nodes: boxes that were bounded or tested.
+        reason: how it ended, for people.
+        left: what is needed to go on; empty if there is nothing left.
+    """
+
+    points: tuple[StationaryPoint, ...] = ()
+    complete: bool = False
+    lower_bound: float | None = None
+    proven: bool = False
+    nodes: int = 0
+    reason: str
+    left: Saved = field(default_factory=dict)
+
+    @classmethod
+    def only(cls, x: Array, energy: float, reason: str) -> Found:
+        """The only equilibrium, proven.
+
+        Args:
+            x: where it is, (n,).
+            energy: there.
+            reason: how it is proven.
+        """
+        point = StationaryPoint(x=x, energy=energy, kind=Kind.MINIMISER)
+        return cls(points=(point,), complete=True, lower_bound=energy, proven=True, reason=reason)
+
+    @property
+    def gap(self) -> float | None:
+        """Lowest energy found minus lower bound, relative to that energy; None where there is no bound."""
+        if self.lower_bound is None or not self.points:
+            return None
+        lowest = self.points[0].energy
+        return max(lowest - self.lower_bound, 0.0) / (abs(lowest) or 1.0)
+
+
+def counted(count: int, one: str, several: str) -> str:
+    """A number with the words for what is counted.
+
+    Args:
+        count: the number.
+        one: words for one.
+        several: words for another number.
+    """
+    return f"{count} {one if count == 1 else several}"
+
+
+def by_energy(points: Iterable[StationaryPoint]) -> tuple[StationaryPoint, ...]:
+    """Points, the lowest first.
+
+    Args:
+        points: in any order.
+    """
+    return tuple(sorted(points, key=lambda p: p.energy))
 
 
 def find(task: Task) -> Found:
@@ -40,53 +166,60 @@ def find(task: Task) -> Found:
         )
     if task.lowest:
         return lowest(task)
-    return _without_proof(task) if task.unproven else _all(task)
+    return _of_lengths(task) if len(task.problem.lengths) else _all(task)
 
 
 def _all(task: Task) -> Found:
-    search = Enumeration(problem=task.problem, cut=task.stop)
+    """All points of polylines, proven; those of curved laws are near them."""
+    problem, search, below = task.problem, Enumeration(problem=task.problem, cut=task.stop), None
+    known = list(task.known if task.saved is None else task.saved["x"])
 
     def tell(_: Enumeration) -> None:
         found = f"{len(search.points)} found, {counted(search.cells, 'cell', 'cells')}, {len(search.waiting)} open"
         task.report(f"all equilibria: {found}")
-        task.keep(lambda: _left_of_all(search))
+        task.keep(lambda: _left_of_all(search, known))
 
-    below = None
-    for x in task.known if task.saved is None else task.saved["x"]:
+    for x in known:
         search.enter(x)
     if task.saved is not None:
-        boxes = list[Array](np.stack([task.saved["low"], task.saved["high"]], axis=1))
-        search.waiting = [Box.around(low=box[0], high=box[1], x=box.mean(axis=0)) for box in boxes]
+        boxes = zip(task.saved["low"], task.saved["high"], strict=True)
+        search.waiting = [Box.around(low=low, high=high, x=0.5 * (low + high)) for low, high in boxes]
     else:
         search.start()
-        limit = task.problem.thresholds.systematic.first_boxes
-        if not search.run(lambda: search.cells >= limit or task.stop(), tell):
-            if (below := _bounded(task, [p.x for p in search.points])) is not None:
-                search.enter(below.x)
-            for x in systematic.candidates(task.problem, search.points, task.stop):
-                search.enter(x)
+        if (
+            not search.run(lambda: search.cells >= LIMITS.first_boxes or task.stop(), tell)
+            and (below := _bounded(task)) is not None
+        ):
+            search.enter(below.x)
     complete = search.run(task.stop, tell)
-    points = tuple(sorted(search.points, key=lambda p: p.energy))
-    bound = None if below is None else below.progress().lower
-    open_cells = counted(len(search.waiting), "cell is", "cells are")
+    points = by_energy(search.points)
+    bound = None if below is None else below.lower - problem.error
+    if complete and points and task.bounded:
+        bound = points[0].energy - problem.error
+    if task.unproven:
+        points = task.made_exact([*known, *(p.x for p in points)])
     return Found(
         points=points,
-        complete=complete,
-        lower_bound=points[0].energy if complete and points and task.bounded else bound,
-        proven=complete,
+        complete=complete and not task.unproven,
+        lower_bound=bound,
+        proven=complete and not task.unproven,
         nodes=search.cells,
-        reason=_in_words(points) if complete else f"{len(points)} found, and {open_cells} open",
-        left={} if complete else _left_of_all(search),
+        reason=_in_words(task, points, len(search.waiting)),
+        left={} if complete else _left_of_all(search, known),
     )
 
 
-def _left_of_all(search: Enumeration) -> Saved:
+def _left_of_all(search: Enumeration, known: Iterable[Array]) -> Saved:
     boxes = {name: np.array([getattr(cell, name) for cell in search.waiting]) for name in ("low", "high")}
-    x = np.array([p.x for p in search.points]).reshape(-1, search.problem.size)
+    x = np.array([*known, *(p.x for p in search.points)]).reshape(-1, search.problem.size)
     return {"lowest": np.array(False), "x": x, **boxes}
 
 
-def _in_words(points: tuple[StationaryPoint, ...]) -> str:
+def _in_words(task: Task, points: tuple[StationaryPoint, ...], waiting: int) -> str:
+    if task.unproven:
+        return f"{len(points)} found, and there may be more: {task.unproven} are searched without a proof"
+    if waiting:
+        return f"{len(points)} found, and {counted(waiting, 'cell is', 'cells are')} open"
     if not points:
         return NO_POINT
     continua = sum(not p.isolated for p in points)
@@ -94,42 +227,30 @@ def _in_words(points: tuple[StationaryPoint, ...]) -> str:
     return f"all equilibria, proven: {len(points)}{told}"
 
 
-def _without_proof(task: Task) -> Found:
-    """What is found where it cannot be proven that these are all."""
-    problem, limits = task.problem, task.problem.thresholds.systematic
+def _of_lengths(task: Task) -> Found:
+    """What is found from several loads, where it cannot be proven that these are all."""
     task.report("a search without a proof that nothing is missed")
-    below = _bounded(task, [])
-    points, tried = PointList(limits.same), PointList(limits.same)
-
-    def enter(x: Array) -> None:
-        if not tried.has(x):
-            near = StationaryPoint(x=x, energy=problem.energy(x), kind=Kind.UNDECIDED)
-            tried.add(near)
-            points.add(near if task.exact is None else task.exact(x))
-
-    for x in (*task.known, *([] if below is None else [below.x])):
-        enter(x)
-    for x in systematic.candidates(problem, points, task.stop):
-        enter(x)
+    below = _bounded(task)
+    starts = [*task.known, *([] if below is None else [below.x])]
+    points = task.made_exact([*starts, *descent.loaded_states(task.problem, task.stop)])
     return Found(
-        points=tuple(sorted(points, key=lambda p: p.energy)),
-        lower_bound=None if below is None else below.progress().lower - problem.error,
+        points=points,
+        lower_bound=None if below is None else below.lower - task.problem.error,
         nodes=0 if below is None else below.boxes,
-        reason=f"{len(points)} found, and there may be more: {task.unproven} are searched without a proof",
+        reason=_in_words(task, points, 0),
     )
 
 
-def _bounded(task: Task, points: list[Array]) -> LowestSearch | None:
+def _bounded(task: Task) -> LowestSearch | None:
     """A search for the lowest energy of a few boxes, for its bound; None where there is none."""
     if task.no_lowest:
         return None
     search = LowestSearch(problem=task.problem, gap=task.gap, cut=task.stop)
     try:
-        search.start(points)
+        search.start()
     except (SolverError, Cut):
         return None
-    limit = task.problem.thresholds.systematic.first_boxes
-    search.run(lambda: search.boxes > limit or task.stop(), lambda _: None)
+    search.run(lambda: search.boxes > LIMITS.first_boxes or task.stop(), lambda _: None)
     return search
 
 
@@ -155,10 +276,9 @@ def lowest(task: Task) -> Found:
     except Cut:
         return Found(reason=STOPPED)
 
-    def tell(now: Progress) -> None:
-        low, high = (f"{bound * task.unit.size:.8g}" for bound in (now.lower, now.upper))
-        boxes = f"{counted(now.boxes, 'box', 'boxes')}, {now.waiting} open"
-        task.report(f"lowest: between {low} and {high} {task.unit.name}, gap {now.gap:.1e}, {boxes}")
+    def tell(_: LowestSearch) -> None:
+        boxes = f"{counted(search.boxes, 'box', 'boxes')}, {len(search.waiting)} open"
+        task.report(f"lowest energy: gap {search.open_gap:.1e}, {boxes}")
         if not search.proven:
             task.keep(lambda: _left_of_lowest(search))
 
@@ -166,19 +286,17 @@ def lowest(task: Task) -> Found:
     return _proof(task, search)
 
 
-def _refined(task: Task, refined: Callable[[float, Array], ScalarProblem]) -> LowestSearch:
+def _refined(task: Task, refined: Refined) -> LowestSearch:
     """The search with polylines as near to curved laws as the gap needs, begun where a coarse search has ended."""
-    limits = task.problem.thresholds.bounds
-    first = LowestSearch(problem=task.problem, gap=limits.coarse_gap, cut=task.stop)
-    first.start()
-    first.run(task.stop, lambda now: task.report(f"first search: gap {now.gap:.1e}"))
-    size = max(abs(first.upper), 1e-6 * task.problem.energy_size(first.x))
     n = task.problem.size
-    problem = refined(limits.error_share * task.gap * size, np.max(np.abs(first.region), axis=0)[:n])
-    left = (
-        task.gap - 2.0 * (1.0 + limits.error_share) * problem.error / size
-    )  # what the polylines differ on both sides, and some more
-    search = LowestSearch(problem=problem, gap=max(left, limits.error_share * task.gap), cut=task.stop)
+    first = LowestSearch(problem=task.problem, gap=LIMITS.enough, cut=task.stop)
+    first.start()
+    first.run(task.stop, lambda _: task.report(f"first search: gap {first.open_gap:.1e}"))
+    size = max(abs(first.upper), 1e-6 * task.problem.energy_size(first.x))
+    problem = refined(LIMITS.error_share * task.gap * size, np.max(np.abs(first.region), axis=0)[:n])
+    # what the polylines differ on both sides, and some more
+    left = task.gap - 2.0 * (1.0 + LIMITS.error_share) * problem.error / size
+    search = LowestSearch(problem=problem, gap=max(left, LIMITS.error_share * task.gap), cut=task.stop)
     if task.saved is None:
         search.start([first.x], first.region)
     return search
@@ -186,26 +304,23 @@ def _refined(task: Task, refined: Callable[[float, Array], ScalarProblem]) -> Lo
 
 def _proof(task: Task, search: LowestSearch) -> Found:
     """What a search for the lowest energy knows; curved laws are worse by what their polylines may differ."""
-    problem, now = search.problem, search.progress()
+    problem = search.problem
     kind = Kind.UNDECIDED if len(problem.lengths) else stationarity.kind(problem, search.x)
     point = StationaryPoint(x=search.x, energy=search.upper + problem.error, kind=kind)
     if (exact := None if task.exact is None else task.exact(search.x)) is not None:
-        same = (
-            abs(exact.energy - search.upper) <= problem.thresholds.points.zero * problem.energy_size(search.x)
-            and not problem.error
-        )
-        point = exact if same else replace(point, kind=exact.kind)
-    lower = now.lower - problem.error
+        near = abs(exact.energy - search.upper) <= LIMITS.zero * problem.energy_size(search.x)
+        point = exact if near and not problem.error else replace(point, kind=exact.kind)
+    lower = search.lower - problem.error
     open_gap = max(point.energy - lower, 0.0) / (abs(point.energy) or 1.0)
     proven = search.proven and 2.0 * problem.error <= (task.gap - search.gap) * abs(search.upper)
     reason = f"a gap of {open_gap:.1e} is left: the curved laws are known no better than this"
     if not search.proven:
-        reason = f"a gap of {open_gap:.1e} is open in {counted(now.waiting, 'box', 'boxes')}"
+        reason = f"a gap of {open_gap:.1e} is open in {counted(len(search.waiting), 'box', 'boxes')}"
     return Found(
         points=(point,),
         lower_bound=lower,
         proven=proven,
-        nodes=now.boxes,
+        nodes=search.boxes,
         reason="the lowest energy, proven" if proven else reason,
         left={} if search.proven else _left_of_lowest(search),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from ..typing import Array, Integers, Mask
 from .scalar_problem import ScalarProblem
+from .thresholds import LIMITS
 
 
 class Kind(StrEnum):
@@ -46,7 +46,7 @@ def subdifferential(problem: ScalarProblem, x: Array) -> Subdifferential:
         problem: the problem, without laws of lengths.
         x: the point, (n,).
     """
-    arcs, accuracy = problem.arcs, problem.thresholds.points.accuracy
+    arcs, accuracy = problem.arcs, LIMITS.accuracy
     near = accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
     here = (arcs.low <= x[:, None] + near) & (arcs.high >= x[:, None] - near)
     at = np.clip(x[:, None], np.where(here, arcs.low, -np.inf), np.where(here, arcs.high, np.inf))
@@ -70,7 +70,7 @@ def with_bounds(problem: ScalarProblem, x: Array, laws: Subdifferential) -> Subd
         x: the point, (n,).
         laws: what the laws allow there.
     """
-    near = problem.thresholds.points.accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
+    near = LIMITS.accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
     force = problem.force - problem.stiffness @ x
     below, above = x <= problem.lower + near, x >= problem.upper - near
     kept = (below & above) | (below & (force <= laws.low)) | (above & (force >= laws.high))
@@ -105,7 +105,7 @@ def kind(problem: ScalarProblem, x: Array, here: Subdifferential | None = None) 
     if here.falls.any():
         return Kind.SADDLE
     force = problem.force - problem.stiffness @ x
-    near = problem.thresholds.points.accuracy * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
+    near = LIMITS.accuracy * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
     jumps = here.high - here.low > near
     inside = jumps & (force > here.low + near) & (force < here.high - near)
     surely, perhaps = np.flatnonzero(~jumps), np.flatnonzero(~inside)
@@ -120,7 +120,7 @@ def _definite(problem: ScalarProblem, free: Integers, slopes: Array) -> int:
         return 1
     values = np.linalg.eigvalsh(problem.stiffness[np.ix_(free, free)] + np.diag(slopes))
     size = max(abs(float(values[-1])), float(np.trace(problem.stiffness)) / problem.size)
-    limit = problem.thresholds.points.zero * size
+    limit = LIMITS.zero * size
     return int(values[0] > limit) - int(values[0] < -limit)
 
 
@@ -141,7 +141,7 @@ class StationaryPoint:
     isolated: bool = True
 
 
-class PointList:
+class PointList(list[StationaryPoint]):
     """Different points.
 
     Args:
@@ -150,31 +150,17 @@ class PointList:
 
     def __init__(self, same: float) -> None:
         self._same = same
-        self._listed: list[StationaryPoint] = []
 
-    def __len__(self) -> int:
-        return len(self._listed)
-
-    def __iter__(self) -> Iterator[StationaryPoint]:
-        return iter(self._listed)
-
-    def __getitem__(self, i: int) -> StationaryPoint:
-        return self._listed[i]
-
-    def has(self, x: Array) -> bool:
-        """Whether a point is in the list.
-
-        Args:
-            x: the point, (n,).
-        """
-        near = self._same * (1.0 + float(np.max(np.abs(x), initial=0.0)))
-        return any(np.max(np.abs(p.x - x), initial=0.0) < near for p in self._listed)
-
-    def add(self, point: StationaryPoint | None) -> None:
-        """Put a point at the end, if there is one and it is new.
+    def add(self, point: StationaryPoint | None) -> bool:
+        """Put a point at the end, if there is one and it is new; whether it is.
 
         Args:
             point: the point.
         """
-        if point is not None and not self.has(point.x):
-            self._listed.append(point)
+        if point is None:
+            return False
+        near = self._same * (1.0 + float(np.max(np.abs(point.x), initial=0.0)))
+        new = all(np.max(np.abs(p.x - point.x), initial=0.0) >= near for p in self)
+        if new:
+            self.append(point)
+        return new

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..typing import Array, Mask
 from .scalar_problem import ScalarProblem
-from .thresholds import CellThresholds
+from .thresholds import LIMITS
 
 
 class ForceIntervals:
@@ -31,13 +31,13 @@ class ForceIntervals:
             low: of the cell, (n,), finite.
             high: of the cell, (n,), finite.
         """
-        return clipped_again(self._once, low, high, self._problem.thresholds.cells)
+        return clipped_again(self._once, low, high)
 
     def _once(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         force = self._problem.force
         least = force - self._positive @ high - self._negative @ low
         most = force - self._positive @ low - self._negative @ high
-        slack = self._problem.thresholds.cells.widened * (np.abs(least) + np.abs(most) + np.abs(force))
+        slack = LIMITS.rounding * (np.abs(least) + np.abs(most) + np.abs(force))
         return self._graphs.clipped(low, high, least - slack, most + slack)
 
 
@@ -45,26 +45,37 @@ Clip = Callable[[Array, Array], tuple[Array, Array] | None]
 """A pass over intervals: smaller ones, or None if one is empty."""
 
 
-def clipped_again(once: Clip, low: Array, high: Array, limits: CellThresholds) -> tuple[Array, Array] | None:
+def clipped_again(once: Clip, low: Array, high: Array) -> tuple[Array, Array] | None:
     """What passes leave of intervals, as long as they make some of them shorter; None if one is empty.
 
     Args:
         once: a pass.
         low: of the intervals, (n,), finite.
         high: of the intervals, (n,), finite.
-        limits: how many passes, and what is shorter.
     """
-    for _ in range(limits.most_rounds):
+    for _ in range(LIMITS.most_rounds):
         if (ends := once(low, high)) is None:
             return None
-        shorter = (ends[1] - ends[0]) < limits.shorter * (high - low)
+        gained = shorter(low, high, *ends).any()
         low, high = ends
-        if not shorter.any():
+        if not gained:
             break
     return low, high
 
 
-def widened(low: Array, high: Array, first: Array, last: Array, thresholds: CellThresholds) -> tuple[Array, Array]:
+def shorter(low: Array, high: Array, begin: Array, end: Array) -> Mask:
+    """Which intervals are made shorter by more than a little, (n,).
+
+    Args:
+        low: where they began, (n,).
+        high: where they ended, (n,).
+        begin: where they begin now, (n,).
+        end: where they end now, (n,).
+    """
+    return np.asarray(end - begin < (1.0 - LIMITS.worthwhile) * (high - low))
+
+
+def widened(low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array]:
     """The part of intervals between two places each, and a little more.
 
     Args:
@@ -72,9 +83,8 @@ def widened(low: Array, high: Array, first: Array, last: Array, thresholds: Cell
         high: of the intervals, (n,), finite.
         first: the first place, (n,).
         last: the last place, (n,).
-        thresholds: by how much more.
     """
-    wide = np.maximum(thresholds.widened * (np.abs(first) + np.abs(last) + (high - low)), thresholds.least_widened)
+    wide = np.maximum(LIMITS.rounding * (np.abs(first) + np.abs(last) + (high - low)), np.finfo(float).tiny)
     return np.maximum(low, first - wide), np.minimum(high, last + wide)
 
 
@@ -88,7 +98,6 @@ class GraphClip:
 
     def __init__(self, problem: ScalarProblem, springs: Array) -> None:
         self._problem, self._springs, self._arcs = problem, springs, problem.arcs
-        self._cells = problem.thresholds.cells
 
     def clipped(self, low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array] | None:
         """Smaller intervals that hold all x for which d x + ∂φ(x), and what bounds bear, meets the forces.
@@ -111,7 +120,7 @@ class GraphClip:
         first, last = self._at_bounds(low, high, least, most, first, last)
         if np.any(first > last):
             return None
-        return widened(low, high, first, last, self._cells)
+        return widened(low, high, first, last)
 
     def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
         """The ends of what is left of each arc; (inf, -inf) of those that are lost."""
@@ -153,9 +162,7 @@ class GraphClip:
             k = arcs.at(at)
             pull = arcs.tractions[rows, k] + arcs.slopes[rows, k] * (at - arcs.anchors[rows, k]) + self._springs * at
             sizes = sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in (pull, least, most))
-            pushes = (
-                (most >= pull - self._cells.widened * sizes) if upper else (least <= pull + self._cells.widened * sizes)
-            )
+            pushes = (most >= pull - LIMITS.rounding * sizes) if upper else (least <= pull + LIMITS.rounding * sizes)
             stays = (at == bound) & pushes
             first, last = np.where(stays, np.minimum(first, at), first), np.where(stays, np.maximum(last, at), last)
         return first, last

@@ -19,7 +19,7 @@ from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Mask
 from .scalar_problem import ScalarProblem
-from .thresholds import CellThresholds
+from .thresholds import LIMITS
 from .tightening import widened
 
 EPSILON = float(np.finfo(float).eps)
@@ -110,7 +110,6 @@ class Weighed:
         least: the least of each h, (n,).
         total: the sum of all least values, less what it may be at a stationary point, and less its rounding.
         rounding: what was taken off for it.
-        thresholds: by how much what is left is widened for rounding.
     """
 
     graphs: Graphs
@@ -120,7 +119,6 @@ class Weighed:
     least: Array
     total: float
     rounding: float
-    thresholds: CellThresholds
 
     @property
     def excludes(self) -> bool:
@@ -139,7 +137,7 @@ class Weighed:
         first, last = first.min(axis=1), last.max(axis=1)
         if np.any(first > last):
             return None
-        return widened(low, high, first, last, self.thresholds)
+        return widened(low, high, first, last)
 
     def _below(self, most: Array) -> tuple[Array, Array]:
         """The first and the last place on each arc where h is at most this; (inf, -inf) where it is nowhere."""
@@ -173,8 +171,7 @@ def weighed(problem: ScalarProblem, split: Split, ends: tuple[Array, Array], wei
     least = _least(graphs, a, b, c)
     off = _rounding(problem, split, graphs, (low, high), y, point)
     total = float(least.sum() - point @ bent - y @ problem.force) - off
-    cells = problem.thresholds.cells
-    return Weighed(graphs=graphs, a=a, b=b, c=c, least=least, total=total, rounding=off, thresholds=cells)
+    return Weighed(graphs=graphs, a=a, b=b, c=c, least=least, total=total, rounding=off)
 
 
 def allowed(problem: ScalarProblem, low: Array, high: Array, weights: Array) -> Array:
@@ -207,4 +204,4 @@ def _rounding(
     weight, bent = np.abs(y), np.abs(split.matrix) @ np.abs(point)
     size = (3.0 * np.abs(point) + 2.0 * far) @ bent + far @ (np.abs(problem.stiffness) @ weight)
     size += (far + weight) @ (np.abs(problem.force) + graphs.size()) + np.abs(split.diagonal) @ far**2
-    return problem.thresholds.cells.roundings * len(y) * EPSILON * float(size) + split.short * float(apart @ apart)
+    return LIMITS.rounding * float(size) + split.short * float(apart @ apart)

@@ -12,8 +12,7 @@ import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.curved_laws import stationary_point
-from hvi_fenicsx.equilibrium_search.found import Task
-from hvi_fenicsx.equilibrium_search.search import find
+from hvi_fenicsx.equilibrium_search.search import Task, find
 from hvi_fenicsx.equilibrium_search.stationarity import Kind, StationaryPoint
 from hvi_fenicsx.laws.smoothing import registered
 from hvi_fenicsx.reduced.condensed_problem import CondensedProblem

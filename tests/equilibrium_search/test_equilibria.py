@@ -17,7 +17,7 @@ from scenes import DELTA, Table, model, quadratic_linear
 import hvi_fenicsx as hvi
 from hvi_fenicsx.commands import equilibria as command
 from hvi_fenicsx.commands.cli import main
-from hvi_fenicsx.equilibrium_search.found import Saved
+from hvi_fenicsx.equilibrium_search.search import Saved
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, PALE, VERMILION
 
 GAMMA = 3e6

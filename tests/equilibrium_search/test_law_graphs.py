@@ -64,7 +64,7 @@ def test_the_lowest_energy_of_curved_laws_is_that_of_a_fine_grid(law: laws.Super
     search.start()
     assert search.run(lambda: False, lambda _: None)
     assert search.upper == pytest.approx(wanted, rel=1e-8)
-    assert search.progress().lower - polylines.error <= wanted + 1e-12 * abs(wanted)
+    assert search.lower - polylines.error <= wanted + 1e-12 * abs(wanted)
 
 
 SMOOTHED = {"smoothing": "quadratic", "epsilon": 0.01}

@@ -11,10 +11,8 @@ from test_lengths import random_problem
 from test_stationary_points import FAST, problem_of
 
 from hvi_fenicsx.equilibrium_search import convex_programme
-from hvi_fenicsx.equilibrium_search.found import Found, Task
-from hvi_fenicsx.equilibrium_search.search import find
-from hvi_fenicsx.equilibrium_search.stationarity import PointList
-from hvi_fenicsx.equilibrium_search.systematic import candidates
+from hvi_fenicsx.equilibrium_search.descent import loaded_states
+from hvi_fenicsx.equilibrium_search.search import Found, Task, find
 
 LENGTHS = random_problem(0, 6, 3, opening=True)
 COMPONENTS = problem_of(FAST[0])[0]
@@ -47,6 +45,6 @@ def stopped(task: Task, solves: int) -> tuple[Found, int]:
 def test_a_search_stops_within_a_few_linear_systems_and_its_bound_holds(task: Task, solves: int) -> None:
     found, further = stopped(task, solves)
     assert further <= 3
-    ends = itertools.islice(candidates(task.problem, PointList(1e-4), lambda: False), 3)
+    ends = itertools.islice(loaded_states(task.problem, lambda: False), 3)
     least = min(map(task.problem.energy, ends))
     assert found.lower_bound is None or found.lower_bound <= least + 1e-9 * abs(least)

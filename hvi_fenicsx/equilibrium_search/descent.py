@@ -1,9 +1,4 @@
-"""A systematic search without a proof: loading from several loads, and deflation from each state.
-
-The starts are the ends of loading in steps from no load, from twice and four times the load, and from the opposite one,
-and multiples of the first. From each the energy is lowered, and Newton's method looks for further points until it
-finds none, then from each point that is known (:mod:`.deflation`).
-"""
+"""Descent of the energy by convex steps, and the states that several loads lead to in this way."""
 
 from __future__ import annotations
 
@@ -13,12 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ..typing import Array
-from .arcs import ROUNDING
 from .convex_programme import minimise, never
-from .deflation import DeflatedNewton
 from .length_programme import LengthProgramme
 from .scalar_problem import ScalarProblem
-from .stationarity import PointList
+from .thresholds import LIMITS
 
 PROGRAMMES: list[list[float]] = [[k / 8 for k in range(1, 9)], [2, 1.5, 1], [4, 2, 1], [-1, 0, 1]]
 """Load factors, one after the other; each programme begins at rest."""
@@ -26,39 +19,18 @@ MULTIPLES = (0, 0.5, 2, 5, 20)
 """They multiply the state that the first programme leads to."""
 
 
-def candidates(problem: ScalarProblem, known: PointList, stop: Callable[[], bool]) -> Iterator[Array]:
-    """Points that may be stationary, one after the other.
+def loaded_states(problem: ScalarProblem, stop: Callable[[], bool]) -> Iterator[Array]:
+    """States that no convex step makes lower: at the end of programmes of loads, and below multiples of the first.
 
     Args:
         problem: the problem.
-        known: the points found, to which the caller adds those that are.
-        stop: asked before each attempt, and inside long ones.
+        stop: asked before each, and inside long descents.
     """
-    newton = None if len(problem.lengths) else DeflatedNewton(problem)
     for start in _starts(problem, stop):
         if stop():
             return
         if not problem.is_far(x := _descended(problem, start, stop)):
             yield x
-        if newton is not None and not problem.is_far(start):
-            yield from _deflated(newton, start, known, stop)
-    tried = 0
-    while newton is not None and tried < min(len(known), problem.thresholds.systematic.most_points):
-        yield from _deflated(newton, known[tried].x, known, stop)
-        tried += 1
-
-
-def _deflated(newton: DeflatedNewton, start: Array, known: PointList, stop: Callable[[], bool]) -> Iterator[Array]:
-    """Points from near one start, for each reach until several attempts find no new one."""
-    limits = newton.problem.thresholds.systematic
-    for reach in limits.reaches:
-        failures = attempt = 0
-        while failures < limits.failures and not stop():
-            before, attempt = len(known), attempt + 1
-            found = newton.root(start, [p.x for p in known], reach, attempt)
-            if found is not None and not newton.problem.is_far(found):
-                yield found
-            failures += len(known) == before
 
 
 def _starts(problem: ScalarProblem, stop: Callable[[], bool]) -> Iterator[Array]:
@@ -100,17 +72,17 @@ def descend(
         goal: a descent that comes down too slowly to reach this energy is given up.
         cut: whether to end where it is, since the search stops.
     """
-    energy, slow = problem.energy(x), problem.thresholds.programmes.slow if len(problem.lengths) else ROUNDING
-    for _ in range(problem.thresholds.programmes.most_steps):
+    energy = problem.energy(x)
+    for _ in range(LIMITS.most_steps):
         if cut():
             break
         found = _minimiser(problem, low, high, x, cut)
         after = problem.energy(found)
         fall, size = energy - after, problem.energy_size(x)
-        if not fall > ROUNDING * size:
+        if not fall > LIMITS.rounding * size:
             break
         x, energy = found, after
-        if energy - goal > problem.thresholds.programmes.reach * fall or fall <= slow * size:
+        if energy - goal > LIMITS.most_steps * fall:
             break
     return np.asarray(x), energy
 
@@ -124,7 +96,7 @@ def _minimiser(problem: ScalarProblem, low: Array, high: Array, x: Array, cut: C
     begin = np.concatenate([np.minimum(low, at)[:n], np.zeros(len(lengths))])
     chains = rising.on(begin, np.maximum(high, at))
     if not len(lengths):
-        return minimise(problem.stiffness, force, chains, x, problem.thresholds.programmes, cut).x
+        return minimise(problem.stiffness, force, chains, x, cut=cut).x
     size, felt = at[n:], lengths.felt(lengths.vectors(x)) * lengths.factors
     along = np.divide(pull[n:], size, out=np.zeros_like(size), where=size > 0.0)[:, None] * felt
     force[lengths.members] += along[lengths.there]
