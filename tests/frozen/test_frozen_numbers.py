@@ -20,7 +20,6 @@ KNOWN = {
     "curved: energies that differ by mode": "a path that was lost at a fold jumps, and is followed to its end",
     "demos: run ball_on_block": "the estimate differs by 8e-4: gaps between vertices are seen by one rule",
     "demos: run peeling_moment": "the forces of a moment alone are what a solve leaves",
-    "searched: smoothed support": "without a proof two minimisers and a saddle are not found",
 }
 """Cases that differ from 3dad66c7, and how."""
 LEFT_TO_OTHERS = ("verification",)
