@@ -1,4 +1,4 @@
-"""Equilibria of curved laws by the systematic search: against a scan of one unknown, and on whole bodies."""
+"""Equilibria of curved laws by the cells of their polylines: against a scan of one unknown, and on whole bodies."""
 
 from __future__ import annotations
 
