@@ -128,14 +128,14 @@ def unknown(kind: str, name: Any, allowed: Iterable[str]) -> str:
     return f"unknown {kind} {shown(name)}; {hint}allowed: {', '.join(known) or 'none'}"
 
 
-def _message(error: ErrorDetails, table: type[BaseModel]) -> str:
+def _message(error: ErrorDetails, table: type[Table]) -> str:
     """What is allowed and what is there, without pydantic's own terms."""
     kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
     if kind == "missing":
         known = descriptions(table).get(str(error["loc"][-1]))
         return "is missing" + (f": {known}" if known else "")
     if kind == "extra_forbidden":
-        return unknown("key", str(error["loc"][-1]), table.model_fields)
+        return unknown("key", str(error["loc"][-1]), table.allowed_keys())
     if kind == "literal_error":
         return _not_among(value, context.get("expected", ""))
     if kind == "value_error":
@@ -208,7 +208,7 @@ def validation_error(mistakes: Iterable[Mistake]) -> ValidationError:
     return ValidationError.from_exception_data("scene", details)
 
 
-def mistakes_of(error: ValidationError, table: type[BaseModel]) -> list[Mistake]:
+def mistakes_of(error: ValidationError, table: type[Table]) -> list[Mistake]:
     """What pydantic found, in plain words.
 
     Args:
@@ -216,7 +216,7 @@ def mistakes_of(error: ValidationError, table: type[BaseModel]) -> list[Mistake]
         table: the table that was read, for its allowed keys.
     """
     found = error.errors(include_url=False)
-    keys = list(table.model_fields)
+    keys = table.allowed_keys()
     meant = {closest(str(e["loc"][-1]), keys) for e in found if e["type"] == "extra_forbidden"}
     # A misspelt key is one mistake: that the right one is missing then goes without saying.
     found = [e for e in found if e["type"] != "missing" or e["loc"][-1] not in meant]
@@ -235,6 +235,11 @@ class Table(BaseModel):
             return handler(data)
         except ValidationError as error:
             raise validation_error(mistakes_of(error, cls)) from None
+
+    @classmethod
+    def allowed_keys(cls) -> list[str]:
+        """All keys that it may have."""
+        return list(cls.model_fields)
 
     @classmethod
     def made(cls, keys: Mapping[str, Any]) -> Self:

@@ -31,8 +31,8 @@ class LawThresholds:
     """Limits of laws, and of the search for extreme tractions.
 
     Attributes:
-        resolution: relative sharpness of the bounds, and the least displacement sampled, over the law's length scale;
-            its inverse, squared, is the largest one, over the largest of 1, the length scale and the kinks.
+        resolution: relative sharpness of the bounds, and of jumps; the least displacement sampled, over the length
+            scale; its inverse, squared, is the largest one, over the largest of 1, the length scale and the kinks.
         samples: displacements of the first grid, in geometric progression; bisection goes on up to the square of it.
         most_drops: drops of a sawtooth: each is a piece of the law, which is looked at at every vertex.
     """

@@ -14,9 +14,8 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from ..errors import InputError
-from ..geometry import ROUNDING
 from ..typing import Array, Integers
-from .base import Superpotential
+from .base import DEFAULT, Superpotential
 from .convex_parts import ConvexPart, Directional
 from .traction_graph import TractionGraph
 
@@ -296,10 +295,10 @@ def sample_traction(
         )
     pieces = [_sample_piece(traction, a, b, samples) for a, b in itertools.pairwise(stops)]
     size = max(float(np.abs(t).max()) for _, t in pieces)
-    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > ROUNDING * size else 0.0)]
+    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > DEFAULT.resolution * size else 0.0)]
     for (x, t), follower in zip(pieces, [*pieces[1:], None], strict=True):
         points += [(float(a), float(b)) for a, b in zip(x[1:], t[1:], strict=True)]
-        if follower is not None and abs(follower[1][0] - t[-1]) > ROUNDING * size:
+        if follower is not None and abs(follower[1][0] - t[-1]) > DEFAULT.resolution * size:
             points.append((float(x[-1]), float(follower[1][0])))
     return tuple(points)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copyreg
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -17,7 +17,6 @@ from pydantic import (
     PrivateAttr,
     ValidationError,
     ValidationInfo,
-    create_model,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
@@ -26,7 +25,19 @@ from ..effects import Effect, Place
 from ..errors import InputError
 from ..mesh.boundary_part import BoundaryPart, Inequalities, InterfaceSides
 from ..mesh.shapes import DomainShape, SeveralBodies
-from ..schema import Keys, Mistake, Names, Table, choose, refusal, shown, unknown, validation_error, vector
+from ..schema import (
+    Keys,
+    Mistake,
+    Names,
+    Table,
+    choose,
+    mistakes_of,
+    refusal,
+    shown,
+    unknown,
+    validation_error,
+    vector,
+)
 from . import plugins
 from .body import Body
 from .content import WHOLE
@@ -53,21 +64,33 @@ class _EffectTable(Table):
     """A table of a place, with the effects that act there."""
 
     place: ClassVar[Place]
-    _written: tuple[str, ...] = PrivateAttr(default=())
+    _acting: tuple[Effect, ...] = PrivateAttr(default=())
 
     @model_validator(mode="wrap")
     @classmethod
-    def _with_order(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Keep the order of the keys: effects are told in that of the file."""
-        table = handler(data)
-        table._written = tuple(data) if isinstance(data, dict) else table._written
+    def _with_effects(cls, data: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
+        """The effects are read by their classes, in the order of the file."""
+        if not isinstance(data, dict):
+            return handler(data)
+        found, wrong, known = [], list[Mistake](), cls.known()
+        for key in (key for key in data if key in known):
+            try:
+                found.append(known[key].model_validate(data[key], context=info.context))
+            except ValidationError as error:
+                wrong += [Mistake((key, *m.where), m.text) for m in mistakes_of(error, known[key])]
+        try:
+            table = handler({key: value for key, value in data.items() if key not in known})
+        except ValidationError as error:
+            raise validation_error([*mistakes_of(error, cls), *wrong]) from None
+        if wrong:
+            raise validation_error(wrong)
+        table._acting = tuple(found)
         return table
 
     @classmethod
-    def with_effects(cls) -> type[Self]:
-        """The same table with the effects as keys that are known now."""
-        fields: dict[str, Any] = {key: (kind | None, None) for key, kind in cls.known().items()}
-        return create_model(cls.__name__, __base__=cls, **fields)
+    def allowed_keys(cls) -> list[str]:
+        """Its own and those of the effects."""
+        return [*cls.model_fields, *cls.known()]
 
     @classmethod
     def known(cls) -> dict[str, type[Effect]]:
@@ -80,9 +103,7 @@ class _EffectTable(Table):
 
     def effects(self, name: str) -> Iterator[Effect]:
         """Its effects at their place, where its name is this."""
-        for value in (getattr(self, key) for key in self._written):
-            if isinstance(value, Effect):
-                yield value.at(self.stands(name), name)
+        return (effect.at(self.stands(name), name) for effect in self._acting)
 
 
 class BoundaryTable(_EffectTable):
@@ -171,15 +192,19 @@ def _shape(value: Any, info: ValidationInfo) -> Any:
     return choose(value, "shape", DomainShape.registry, info.context)
 
 
-def _named(own_keys: Iterable[str]) -> BeforeValidator:
+def _material_keys() -> list[str]:
+    elastic = Effect.registry[Place.MATERIAL].values()
+    return [*MaterialTable.model_fields, *(key for kind in elastic for key in kind.model_fields)]
+
+
+def _named(own_keys: Callable[[], Iterable[str]]) -> BeforeValidator:
     """A table as it stands, with keys of its own, has the name WHOLE among tables by name."""
-    keys = set(own_keys)
 
     def read(given: Any) -> Any:
         if not isinstance(given, dict):
             return given
         named = given and all(isinstance(value, dict) for value in given.values())
-        return given if named and not keys & set(given) else {WHOLE: given}
+        return given if named and not set(own_keys()) & set(given) else {WHOLE: given}
 
     return BeforeValidator(read)
 
@@ -199,9 +224,9 @@ class _SceneTables(TopLevel):
 
     domain: Annotated[DomainShape, BeforeValidator(_shape)]
     """the body's shape"""
-    material: dict[str, Annotated[Effect, BeforeValidator(_material)]]
+    material: Annotated[dict[str, Annotated[Effect, BeforeValidator(_material)]], _named(_material_keys)]
     """what the body is made of"""
-    body: dict[str, BodyTable] = {}  # noqa: RUF012
+    body: Annotated[dict[str, BodyTable], _named(BodyTable.allowed_keys)] = {}  # noqa: RUF012
     boundary: dict[str, BoundaryTable] = {}  # noqa: RUF012
     interface: dict[str, InterfaceTable] = {}  # noqa: RUF012
     solver: SolverTable = SolverTable()
@@ -242,21 +267,6 @@ KEYS = tuple(_SceneTables.model_fields)
 """All that a scene file may have."""
 
 
-def _scene_tables() -> type[_SceneTables]:
-    """The tables of a scene file with all effects that are registered now."""
-    by_name: Any = dict
-    body, elastic = BodyTable.with_effects(), Effect.registry[Place.MATERIAL].values()
-    of_material = [*MaterialTable.model_fields, *(key for kind in elastic for key in kind.model_fields)]
-    material = Annotated[Effect, BeforeValidator(_material)]
-    fields: dict[str, Any] = {
-        "material": (Annotated[by_name[str, material], _named(of_material)], ...),
-        "body": (Annotated[by_name[str, body], _named(body.model_fields)], {}),
-        "boundary": (by_name[str, BoundaryTable.with_effects()], {}),
-        "interface": (by_name[str, InterfaceTable.with_effects()], {}),
-    }
-    return create_model("SceneTables", __base__=_SceneTables, **fields)
-
-
 def read_tables(tables: Any, folder: Path | None = None) -> Model:
     """The model of tables as a scene file has them, or with objects in their place. Not collective.
 
@@ -272,7 +282,7 @@ def read_tables(tables: Any, folder: Path | None = None) -> Model:
     folder = folder or Path.cwd()
     try:
         loaded = plugins.load(tables["plugins"], folder) if tables.get("plugins") else None
-        found = _scene_tables().model_validate(tables, context={"folder": folder})
+        found = _SceneTables.model_validate(tables, context={"folder": folder})
     except PydanticCustomError as error:
         raise Mistakes([Mistake(("plugins",), error.message())]) from None
     except ValidationError as error:
