@@ -146,7 +146,7 @@ class NormalBounds:
     force: ObstacleForce | None = None
 
 
-ONE = Formula(1.0)
+ONE = Formula(1)
 
 
 @dataclass(frozen=True, slots=True)

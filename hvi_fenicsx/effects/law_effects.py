@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -24,14 +24,114 @@ from typing_extensions import override
 
 from .. import laws
 from ..errors import InputError
-from ..formula import SpatialValue
+from ..formula import Formula, SpatialValue
+from ..geometry import ROUNDING, spot
 from ..laws import Mixity, mixities
 from ..schema import Mistake, OneOf, refusal, shown, validation_error
-from . import law_formulas
+from ..typing import Array
 from .base import BodySizes, Effect, Evaluate, FormContext, Place, Sides, from_python
 from .contribution import ONE, BoundaryLaw, Contribution, Direction
-from .law_formulas import FormulaLaw, times
 from .values import FormulaField, Value
+
+_PLACES = np.outer([0, 1, -1], np.ones(3))
+"""Where formulas are evaluated, m, until the law takes the numbers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormulaLaw:
+    """A law some of whose numbers are formulas: a law of numbers, and what it is multiplied by from place to place.
+
+    A law j of numbers gives the laws c m j(· / c) of all places, with m for the tractions and c for the lengths: one
+    formula of each kind tells them, and all others must agree.
+
+    Attributes:
+        law: the law of numbers.
+        multipliers: of its tractions and of its lengths, by these words.
+        numbers: its numbers by the keys of its table: what each grows with, what it is, and its formula, or None.
+    """
+
+    law: laws.Superpotential
+    multipliers: Mapping[str, SpatialValue]
+    numbers: Mapping[str, tuple[str, float, Formula | None]]
+
+    def contradictions(self, points: Array) -> list[str]:
+        """What keeps the formulas from being one law, in words.
+
+        Args:
+            points: the vertices, m, (n, 3).
+        """
+        factors = {unit: value.at(points) for unit, value in self.multipliers.items()}
+        found = []
+        for key, (unit, number, formula) in self.numbers.items():
+            value = Formula(number).at(points) if formula is None else formula.at(points)
+            for i in np.flatnonzero(~np.isclose(value, number * factors[unit], rtol=ROUNDING, atol=0.0))[:1]:
+                found.append(
+                    f"{key} is {value[i]:.6g} at {spot(points[i])}, where the other parameters multiply the {unit}s by "
+                    f"{factors[unit][i]:.6g}: the law would have another shape there. State all tractions, and all "
+                    "lengths, with one formula each, or make pieces with laws of their own: `where`"
+                )
+        return found
+
+
+def _formula_law(name: str, table: Mapping[str, Any]) -> FormulaLaw | None:
+    """A law some of whose numbers are formulas; None where none is."""
+    formulas = {key: formula for key, value in _leaves(table) if (formula := _formula(value)) is not None}
+    if not formulas:
+        return None
+    law = _at_some_place(name, table)
+    numbers = {
+        key: (unit, float(number), formulas.get(key))
+        for key, number in _leaves(laws.describe(law))
+        if (unit := law.units.get(re.sub(r"\[\d+\]", "[]", key, count=1))) is not None and number
+    }
+    if missing := formulas.keys() - numbers.keys():
+        raise InputError(
+            f"law {name!r}: {min(missing)}: no formula can stand here, as it is not known how this number grows with "
+            'lengths and tractions; state a number, and multiplier = "1 + x" or length_multiplier = "1 + x"'
+        )
+    multipliers: dict[str, SpatialValue] = {"traction": ONE, "length": ONE}
+    for unit, number, formula in reversed(numbers.values()):
+        if formula is not None:
+            multipliers[unit] = Formula(f"({formula.source})/{number!r}")
+    return FormulaLaw(law=law, multipliers=multipliers, numbers=numbers)
+
+
+def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """The entries of nested tables and lists."""
+    if isinstance(value, Mapping):
+        for name, entry in value.items():
+            yield from _leaves(entry, str(name))
+    elif isinstance(value, list | tuple):
+        for i, entry in enumerate(value):
+            yield from _leaves(entry, f"{key}[{i}]")
+    else:
+        yield key, value
+
+
+def _formula(value: Any) -> Formula | None:
+    """A text as a formula; None where it is none, or a number in quotes."""
+    return Formula(value) if isinstance(value, str) and re.search(r"\b[xyz]\b", value) else None
+
+
+def _at(value: Any, point: Array) -> Any:
+    """A table with numbers in the place of formulas."""
+    if isinstance(value, Mapping):
+        return {key: _at(entry, point) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_at(entry, point) for entry in value]
+    formula = _formula(value)
+    return value if formula is None else float(formula.at(point[None])[0])
+
+
+def _at_some_place(name: str, table: Mapping[str, Any]) -> laws.Superpotential:
+    """The law at the first place where all formulas are numbers that it can have."""
+    refused = []
+    for point in _PLACES:
+        try:
+            return laws.create(name, _at(table, point))
+        except InputError as error:
+            refused.append(error)
+    raise refused[0]
 
 
 def _law(value: Any) -> laws.Superpotential | FormulaLaw:
@@ -45,7 +145,7 @@ def _law(value: Any) -> laws.Superpotential | FormulaLaw:
     if not isinstance(name, str):
         raise refusal(f'the law\'s name is missing: law = "name"; allowed: {", ".join(laws.available())}')
     try:
-        return law_formulas.create(name, parameters) or laws.create(name, parameters)
+        return _formula_law(name, parameters) or laws.create(name, parameters)
     except InputError as error:
         if isinstance(error.__cause__, ValidationError):
             raise error.__cause__ from None  # it knows the place of each wrong parameter
@@ -75,6 +175,13 @@ def _positive(value: SpatialValue) -> SpatialValue:
 
 
 Multiplier = Annotated[FormulaField, AfterValidator(_positive)]
+
+
+def _times(one: SpatialValue, other: SpatialValue) -> SpatialValue:
+    """The product of a multiplier and one of formulas."""
+    if ONE in (one, other):
+        return one if other == ONE else other
+    return Formula(f"({one.source})*({other.source})")
 
 
 class LawEffect(Effect):
@@ -115,8 +222,9 @@ class LawEffect(Effect):
         if not isinstance(law, FormulaLaw):
             return handler({**own, "law": law})
         effect = handler({**own, "law": law.law})
-        both = {key: times(getattr(effect, key), getattr(law, key)) for key in ("multiplier", "length_multiplier")}
-        placed = effect.model_copy(update=both)
+        own = {"multiplier": effect.multiplier, "length_multiplier": effect.length_multiplier}
+        told = zip(own.items(), law.multipliers.values(), strict=True)
+        placed = effect.model_copy(update={key: _times(value, formula) for (key, value), formula in told})
         placed._formulas = law
         return placed
 

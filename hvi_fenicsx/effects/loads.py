@@ -40,10 +40,6 @@ class Traction(Listed):
 
     values: tuple[FormulaField, ...]
 
-    @from_python
-    def __init__(self, side: Sides, values: Vector) -> None:
-        self._make(side, values=values)
-
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its part."""
@@ -121,10 +117,6 @@ class Displacement(Listed):
 
     values: tuple[Component, ...]
 
-    @from_python
-    def __init__(self, side: Sides, values: Vector) -> None:
-        self._make(side, values=values)
-
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The conditions of its components that are not free."""
@@ -148,10 +140,6 @@ class Pressure(OneValue):
     place: ClassVar[Place] = Place.BOUNDARY
     drive: ClassVar[Drive] = Drive.LOAD
     term: ClassVar[str] = "<g, v> += -∫ p v·n ds"
-
-    @from_python
-    def __init__(self, side: Sides, value: Value) -> None:
-        self._make(side, value=value)
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -202,10 +190,6 @@ class Force(_Total):
     key: ClassVar[str] = "force"
     label: ClassVar[str] = "a force on the whole part"
     term: ClassVar[str] = "<g, v> += ∫ F/|part| · v ds"
-
-    @from_python
-    def __init__(self, side: Sides, values: Sequence[float]) -> None:
-        self._make(side, values=values)
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:

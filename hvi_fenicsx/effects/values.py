@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..formula import Formula, SpatialValue
 from ..schema import refusal
 from ..typing import Array
-from .base import Effect
+from .base import Effect, Sides, from_python
 
 if TYPE_CHECKING:
     from dolfinx import fem
@@ -275,11 +275,19 @@ class OneValue(Bare):
 
     value: FormulaField
 
+    @from_python
+    def __init__(self, side: Sides, value: Value) -> None:
+        self._make(side, value=value)
+
 
 class Listed(Bare):
     """An effect that is a list, one entry for each component: ``traction = [1e6, 0]``."""
 
     values: tuple[Any, ...]
+
+    @from_python
+    def __init__(self, side: Sides, values: Vector) -> None:
+        self._make(side, values=values)
 
     @override
     @classmethod

@@ -43,7 +43,7 @@ class LawThresholds:
 
 
 DEFAULT = LawThresholds()
-Powers = Mapping[str, tuple[int, int]]
+Units = Mapping[str, str]
 _REGISTRY: dict[str, type] = {}
 
 
@@ -56,8 +56,8 @@ class Superpotential(ABC):
     """
 
     name: ClassVar[str]
-    powers: ClassVar[Powers] = {}
-    """The powers of length and traction in the units of parameters, for which formulas may then stand."""
+    units: ClassVar[Units] = {}
+    """Whether parameters grow with the law's lengths or its tractions; formulas may then stand for them."""
 
     def __init_subclass__(cls, *, register: bool = True, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -247,7 +247,7 @@ _KEYS_BESIDE = {"multiplier", "length_multiplier"}
 def _refuse_hidden_properties(cls: type[Superpotential]) -> None:
     """A parameter called `peak`, say, would silently replace the property of that name."""
     known = {key for base in Superpotential.__mro__ for key in vars(base) if not key.startswith("_")}
-    hidden = sorted((known | _KEYS_BESIDE) & (inspect.get_annotations(cls).keys() - {"name", "powers"}))
+    hidden = sorted((known | _KEYS_BESIDE) & (inspect.get_annotations(cls).keys() - {"name", "units"}))
     if hidden:
         raise InputError(
             f"law class {cls.__name__}: the parameter name {hidden[0]!r} is taken by a property that "

@@ -18,7 +18,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..typing import Array
-from .base import DEFAULT, Powers, Superpotential
+from .base import DEFAULT, Superpotential, Units
 from .convex_parts import ConvexPart, DifferentiablePart, Directional
 from .polyline import PolylineLaw, PolylinePart
 from .registry import require_number, require_ordered, require_positive
@@ -34,7 +34,7 @@ class QuadraticLinear(PolylineLaw):
     """
 
     name = "quadratic_linear"
-    powers: ClassVar[Powers] = {"gamma1": (0, 1), "gamma2": (0, 1), "delta": (1, 0)}
+    units: ClassVar[Units] = {"gamma1": "traction", "gamma2": "traction", "delta": "length"}
     gamma1: float
     gamma2: float
     delta: float
@@ -62,7 +62,7 @@ class QuadraticLinearLiteral(PolylineLaw):
     """
 
     name = "quadratic_linear_literal"
-    powers: ClassVar[Powers] = {"gamma1": (0, 1), "gamma2": (0, 1), "delta": (1, 0)}
+    units: ClassVar[Units] = {"gamma1": "traction", "gamma2": "traction", "delta": "length"}
     gamma1: float
     gamma2: float
     delta: float
@@ -90,7 +90,7 @@ class Tresca(PolylineLaw):
     """
 
     name = "tresca"
-    powers: ClassVar[Powers] = {"yield_traction": (0, 1)}
+    units: ClassVar[Units] = {"yield_traction": "traction"}
     yield_traction: float
     reference_slip: float = 1e-6
 
@@ -112,7 +112,7 @@ class LinearSpring(PolylineLaw):
     """j(x) = ½ stiffness x², stiffness in N/m³. There is no kink; `reference_slip` (m) gives the energy scale only."""
 
     name = "linear_spring"
-    powers: ClassVar[Powers] = {"stiffness": (-1, 1)}
+    units: ClassVar[Units] = {"stiffness": "traction"}
     stiffness: float
     reference_slip: float = 1e-6
 
@@ -140,7 +140,7 @@ class Sawtooth(PolylineLaw):
     """
 
     name = "sawtooth"
-    powers: ClassVar[Powers] = {"peak_traction": (0, 1), "residual_traction": (0, 1), "delta": (1, 0)}
+    units: ClassVar[Units] = {"peak_traction": "traction", "residual_traction": "traction", "delta": "length"}
     peak_traction: float
     residual_traction: float
     delta: float
@@ -178,7 +178,7 @@ class Graph(PolylineLaw):
     """
 
     name = "graph"
-    powers: ClassVar[Powers] = {"points[][0]": (1, 0), "points[][1]": (0, 1)}
+    units: ClassVar[Units] = {"points[][0]": "length", "points[][1]": "traction"}
     points: tuple[tuple[float, float], ...]
     one_sided: bool = False
 
@@ -245,7 +245,7 @@ class WeakeningLaw(Superpotential):
     Tractions in N/m², delta in m; InputError unless 0 ≤ residual ≤ peak, peak > 0 and delta > 0.
     """
 
-    powers: ClassVar[Powers] = {"peak_traction": (0, 1), "residual_traction": (0, 1), "delta": (1, 0)}
+    units: ClassVar[Units] = {"peak_traction": "traction", "residual_traction": "traction", "delta": "length"}
     peak_traction: float
     residual_traction: float
     delta: float
