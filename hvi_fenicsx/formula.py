@@ -83,41 +83,47 @@ class SpatialValue(ABC):
     def at(self, points: Array) -> Array:
         """Values at points of shape (n, 3), m; shape (n,). Not checked for finiteness."""
 
-    @abstractmethod
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
-        """The value in UFL.
+        """The value in UFL, where forms are made of it.
 
         Args:
             mesh: the dolfinx mesh on which a form is made, m.
             number: wraps a number, so that its value is not compiled into the form.
         """
+        raise NotImplementedError(f"{self.source}: no form is made of it")
 
     def negative(self) -> SpatialValue:
         """The value with the other sign."""
-        return _Mapped(self, f"-({self.source})", np.negative)
+        return Computed(f"-({self.source})", lambda points: -self.at(points), everywhere=self.everywhere)
 
     def positive_part(self) -> SpatialValue:
         """The value where it is positive, else 0."""
-        return _Mapped(self, f"max(0, {self.source})", lambda values: np.maximum(values, 0.0))
+        text = f"max(0, {self.source})"
+        return Computed(text, lambda points: np.maximum(self.at(points), 0.0), everywhere=self.everywhere)
 
 
-class _Mapped(SpatialValue):
-    """A value that is computed from another one at each point; no form is made of it."""
+class Computed(SpatialValue):
+    """A value that is computed at each point; no form is made of it.
 
-    __slots__ = ("_change", "_value", "source")
+    Args:
+        source: what it is, in a few words.
+        at: its values at points.
+        everywhere: whether it is known at all points.
+    """
 
-    def __init__(self, value: SpatialValue, source: str, change: Callable[[Array], Array]) -> None:
-        self._value, self.source, self._change = value, source, change
+    __slots__ = ("_at", "_everywhere", "source")
+
+    def __init__(self, source: str, at: Callable[[Array], Array], *, everywhere: bool = True) -> None:
+        self.source, self._at, self._everywhere = source, at, everywhere
 
     @property
+    @override
     def everywhere(self) -> bool:
-        return self._value.everywhere
+        return self._everywhere
 
+    @override
     def at(self, points: Array) -> Array:
-        return self._change(self._value.at(points))
-
-    def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
-        raise NotImplementedError("bounds are evaluated at vertices")
+        return self._at(points)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,24 +1,366 @@
-"""Contact: unilateral with a gap (paper: K), or bilateral within a slot."""
+"""Contact, unilateral with a gap (paper: K) or bilateral within a slot, and the rigid obstacles that a body may touch.
+
+A new obstacle is a new subclass of :class:`Obstacle`; it registers itself under its ``shape``.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, PlainSerializer, model_validator
+from pydantic import AfterValidator, BeforeValidator, PlainSerializer, ValidationInfo, model_validator
 from typing_extensions import override
 
-from ..formula import Formula, SpatialValue
-from ..schema import refusal
+from ..class_registry import enter
+from ..errors import InputError
+from ..formula import Computed, Formula, SpatialValue
+from ..geometry import ROUNDING
+from ..schema import ExistingFile, Finite, Positive, Table, refusal, unknown
 from ..typing import Array
 from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, Sides, from_python
 from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
-from .obstacles import NonzeroVector, Obstacle, ObstacleField, ObstacleGap, unit
 from .values import FormulaField, Value, as_value, require_components
+
+Vector = Annotated[
+    tuple[Finite, ...], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+]
+"""Components, as many as the scene has dimensions."""
+
+
+def _not_zero(vector: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(vector):
+        raise refusal("is zero; give a direction")
+    return vector
+
+
+NonzeroVector = Annotated[Vector, AfterValidator(_not_zero)]
+"""A vector that is not zero."""
+
+
+def unit(vector: Vector) -> Array:
+    """The unit vector of a direction, (d,)."""
+    return np.asarray(vector, dtype=np.float64) / math.hypot(*vector) + 0.0
+
+
+class Obstacle(Table):
+    """A rigid obstacle. Points are given as (m, d), distances as (m,), in m.
+
+    A field of the type :data:`Vector` must have as many components as the scene has dimensions.
+
+    Class attributes:
+        shape: the name in scenes.
+        dimensions: of space, in which it makes sense.
+    """
+
+    shape: ClassVar[str]
+    dimensions: ClassVar[tuple[int, ...]] = (2, 3)
+    registry: ClassVar[dict[str, type[Obstacle]]] = {}
+
+    direction: NonzeroVector | None = None
+    """from the body towards the obstacle, of any length: gaps are measured along it; by default to the nearest point"""
+    displacement: Vector | None = None
+    """by which the obstacle is moved from where it is described, m"""
+    force: NonzeroVector | None = None
+    """instead of a displacement: the force that presses it, N/m in 2D, N in 3D; it slides along it until contact bears
+    it, and does not turn"""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        if "shape" in cls.__dict__:
+            enter(Obstacle.registry, cls, cls.shape, "obstacle")
+
+    @model_validator(mode="after")
+    def _moved_in_one_way(self) -> Obstacle:
+        if self.force is not None and self.displacement is not None:
+            raise refusal("an obstacle is moved by a displacement or pressed by a force; give one of them")
+        return self
+
+    def check(self, dimension: int) -> None:
+        """Refuse vectors of the wrong length.
+
+        Raises:
+            InputError: with what is wanted.
+        """
+        if dimension not in self.dimensions:
+            raise InputError(f'contact.obstacle: shape = "{self.shape}" needs {self.dimensions[0]}D')
+        for key, vector in self._vectors().items():
+            require_components(vector, dimension, f"contact.obstacle.{key}")
+
+    def _vectors(self) -> dict[str, tuple[float, ...]]:
+        """Its vectors by key."""
+        return {key: value for key, value in self if isinstance(value, tuple)}
+
+    @property
+    def dimension(self) -> int:
+        """The number of components of its vectors."""
+        return len(next(iter(self._vectors().values())))
+
+    def moved(self, way: float) -> Obstacle:
+        """The obstacle that a force presses, moved along it, and held there.
+
+        Args:
+            way: m.
+        """
+        assert self.force is not None
+        along = tuple(map(float, way * unit(self.force)))
+        return self.model_copy(update={"force": None, "displacement": along})
+
+    @property
+    def moves_straight(self) -> bool:
+        """Whether gaps change in proportion to the way it is moved, and no direction changes."""
+        moves = self.displacement or self.force
+        if moves is None or self.direction is None:
+            return moves is None
+        move, way = np.asarray(moves), unit(self.direction)
+        return bool(np.linalg.norm(move - (move @ way) * way) <= ROUNDING * np.linalg.norm(move))
+
+    @abstractmethod
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        """The distances to the nearest points, negative inside, and the unit vectors towards these, (m, d)."""
+
+    @abstractmethod
+    def ahead(self, points: Array, direction: Array) -> Array:
+        """The distances along a direction; NaN where the obstacle is not met.
+
+        Args:
+            points: (m, d).
+            direction: unit vector, (d,).
+        """
+
+    @property
+    def constant(self) -> tuple[float, ...] | None:
+        """The unit vector towards it, where that is the same for all points."""
+        return None if self.direction is None else tuple(map(float, unit(self.direction)))
+
+    def files(self) -> tuple[Path, ...]:
+        """The files that it reads."""
+        return ()
+
+    def gap(self, points: Array) -> Array:
+        """The distances of points from where it has been moved."""
+        points = self._seen(points)
+        return self.nearest(points)[0] if self.direction is None else self.ahead(points, unit(self.direction))
+
+    def towards(self, points: Array) -> Array:
+        """The unit vectors along which gaps are measured, (m, d)."""
+        if self.constant is not None:
+            return np.tile(self.constant, (len(points), 1))
+        return self.nearest(self._seen(points))[1]
+
+    def _seen(self, points: Array) -> Array:
+        return points if self.displacement is None else np.asarray(points - np.asarray(self.displacement), np.float64)
+
+    def lower(self) -> SpatialValue:
+        """The lower bound of the opening that it makes: its distance, with the other sign."""
+        text = f"-(distance from the obstacle ({self.shape}))"
+        return Computed(text, lambda points: -self.gap(points[:, : self.dimension]))
+
+    def bounds(self) -> NormalBounds:
+        """The bounds that it makes, with what moves or presses it."""
+        move = force = None
+        if self.displacement is not None:
+            before = self.model_copy(update={"displacement": None}).lower()
+            move = ObstacleMove(vector=self.displacement, before=before, straight=self.moves_straight)
+        if self.force is not None:
+            force = ObstacleForce(vector=self.force, ahead=self.moved(1.0).lower(), straight=self.moves_straight)
+        return NormalBounds(lower=self.lower(), upper=None, towards=self, move=move, force=force)
+
+    def table(self, context: Any = None) -> dict[str, Any]:
+        """What a scene would write.
+
+        Args:
+            context: has the folder that the scene is written into.
+        """
+        keys = self.model_dump(mode="json", exclude_none=True, exclude_defaults=True, context=context)
+        return {"shape": self.shape, **keys}
+
+
+class Plane(Obstacle):
+    """A plane, behind which the obstacle is."""
+
+    shape: ClassVar[str] = "plane"
+    point: Vector
+    """a point of its surface, m"""
+    normal: NonzeroVector
+    """its normal, towards the body; of any length"""
+
+    @override
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        normal = unit(self.normal)
+        distance = (points - np.asarray(self.point)) @ normal
+        return distance, np.asarray(np.broadcast_to(0.0 - normal, points.shape), np.float64)
+
+    @override
+    def ahead(self, points: Array, direction: Array) -> Array:
+        steep = float(-unit(self.normal) @ direction)
+        return np.asarray(self.nearest(points)[0] / (steep if steep > 0.0 else math.nan), np.float64)
+
+    @property
+    @override
+    def moves_straight(self) -> bool:
+        return True
+
+    @property
+    @override
+    def constant(self) -> tuple[float, ...] | None:
+        return super().constant or tuple(map(float, 0.0 - unit(self.normal)))
+
+
+class _Round(Obstacle):
+    """All points up to a distance from a centre, or beyond it."""
+
+    center: Vector
+    """its centre, m"""
+    radius: Positive
+    """m"""
+    hollow: bool = False
+    """whether the body is inside of it, as in a bearing"""
+
+    @abstractmethod
+    def across(self, vectors: Array) -> Array:
+        """The components of vectors (m, d) that count for the distance from the centre."""
+
+    @override
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        away = self.across(points - np.asarray(self.center))
+        length = np.linalg.norm(away, axis=1)
+        out = np.divide(away, length[:, None], out=np.full_like(away, np.nan), where=length[:, None] > 0.0)
+        return (self.radius - length, out) if self.hollow else (length - self.radius, -out)
+
+    @override
+    def ahead(self, points: Array, direction: Array) -> Array:
+        away, along = self.across(points - np.asarray(self.center)), self.across(direction[None])[0]
+        square, middle = float(along @ along), away @ along
+        with np.errstate(all="ignore"):
+            length = np.linalg.norm(away, axis=1)
+            root = np.sqrt(middle**2 - square * (length - self.radius) * (length + self.radius))
+            return np.asarray((-middle + (root if self.hollow else -root)) / square)
+
+
+class Sphere(_Round):
+    """A ball; in the plane a cylinder across it."""
+
+    shape: ClassVar[str] = "sphere"
+
+    @override
+    def across(self, vectors: Array) -> Array:
+        return vectors
+
+
+class Cylinder(_Round):
+    """A cylinder without ends, in space."""
+
+    shape: ClassVar[str] = "cylinder"
+    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    axis: NonzeroVector
+    """along it; of any length"""
+
+    @override
+    def across(self, vectors: Array) -> Array:
+        axis = unit(self.axis)
+        return np.asarray(vectors - (vectors @ axis)[:, None] * axis)
+
+
+class TriangulatedSurface(Obstacle):
+    """A surface of triangles from a file, in space; the gap is measured along `direction`, which it needs."""
+
+    shape: ClassVar[str] = "surface"
+    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    file: ExistingFile
+    """an STL file, relative to the scene file; its triangles face the body"""
+    scale: Positive = 1.0
+    """length in m of one unit of the coordinates in the file: 1e-3 for a surface in mm"""
+
+    @model_validator(mode="after")
+    def _along(self) -> TriangulatedSurface:
+        if self.direction is None:
+            raise refusal('shape = "surface" needs a direction, from the body towards it: direction = [0, 0, -1]')
+        return self
+
+    @override
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        raise NotImplementedError("it has a direction")
+
+    @override
+    def files(self) -> tuple[Path, ...]:
+        return (self.file,)
+
+    @override
+    def ahead(self, points: Array, direction: Array) -> Array:
+        return self.scale * _distances_along(self.file, np.asarray(points / self.scale, np.float64), direction)
+
+
+def _obstacle(value: Any, info: ValidationInfo) -> Obstacle:
+    """The obstacle of a table, or of a point and a normal.
+
+    Args:
+        value: what a scene has, or an obstacle.
+        info: its context has the folder of the scene.
+    """
+    if isinstance(value, Obstacle):
+        return value
+    if isinstance(value, list) and len(value) == 2:
+        value = {"point": value[0], "normal": value[1]}
+    if not isinstance(value, dict):
+        raise refusal("must be a table, like { point = [0, 0], normal = [0, 1] }")
+    keys = dict(value)
+    name = keys.pop("shape", Plane.shape)
+    if not isinstance(name, str) or name not in Obstacle.registry:
+        raise refusal(unknown("shape", name, Obstacle.registry))
+    return Obstacle.registry[name].model_validate(keys, context=info.context)
+
+
+ObstacleField = Annotated[Obstacle, BeforeValidator(_obstacle), PlainSerializer(lambda o, info: o.table(info.context))]
+"""An obstacle as a field of a scene."""
+
+
+@lru_cache(maxsize=8)
+def _triangles(file: Path, changed: int) -> Array:
+    """The triangles of an STL file, (n, 3, 3), in the file's unit of length; one that has not changed is read once."""
+    import pyvista  # here: most scenes need none
+
+    surface = pyvista.STLReader(str(file)).read()
+    if surface.n_cells == 0:
+        raise InputError(f"{file}: is no STL file with triangles")
+    return np.asarray(surface.points[surface.regular_faces], dtype=np.float64)
+
+
+def _distances_along(file: Path, points: Array, direction: Array) -> Array:
+    """How far points are from the nearest triangle that faces them, negative behind it; NaN where there is none, (m,).
+
+    All lengths are in the file's unit.
+
+    Args:
+        file: STL; the normals of its triangles, by their order of corners, look out of the obstacle.
+        points: (m, 3).
+        direction: unit vector towards the surface, (3,).
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    from shapely import STRtree, polygons
+    from shapely import points as shapely_points
+
+    corners = _triangles(file, file.stat().st_mtime_ns)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = normals @ direction < -ROUNDING * np.linalg.norm(normals, axis=1)
+    corners, normals = corners[facing], normals[facing]
+    across = np.linalg.svd(direction[None])[2][1:]
+    tree = STRtree(polygons(corners @ across.T))
+    at, met = tree.query(shapely_points(points @ across.T), predicate="intersects")
+    lengths = np.sum((corners[met, 0] - points[at]) * normals[met], axis=1) / (normals[met] @ direction)
+    found = np.full(len(points), np.inf)
+    order = np.argsort(-np.abs(lengths), kind="stable")
+    found[at[order]] = lengths[order]
+    return np.where(np.isinf(found), np.nan, found)
+
 
 MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""
@@ -28,22 +370,6 @@ Gap = Annotated[
     PlainSerializer(lambda gap: gap if isinstance(gap, str) else gap.source),
 ]
 """A number, a formula in x, y, z (SI), or "measured"."""
-
-
-def _move(obstacle: Obstacle) -> ObstacleMove | None:
-    """The displacement of an obstacle, where it has one."""
-    if obstacle.displacement is None:
-        return None
-    before = ObstacleGap(obstacle.unmoved).negative()
-    return ObstacleMove(vector=obstacle.displacement, before=before, straight=obstacle.moves_straight)
-
-
-def _force(obstacle: Obstacle) -> ObstacleForce | None:
-    """The force that presses an obstacle, where there is one."""
-    if obstacle.force is None:
-        return None
-    ahead = ObstacleGap(obstacle.moved(1.0)).negative()
-    return ObstacleForce(vector=obstacle.force, ahead=ahead, straight=obstacle.moves_straight)
 
 
 @dataclass(frozen=True)
@@ -142,9 +468,7 @@ class Contact(Effect):
 
     def _bounds(self) -> NormalBounds:
         if self.obstacle is not None:
-            least = ObstacleGap(self.obstacle).negative()
-            move, force = _move(self.obstacle), _force(self.obstacle)
-            return NormalBounds(lower=least, upper=None, towards=self.obstacle, move=move, force=force)
+            return self.obstacle.bounds()
         if isinstance(self.gap, str):
             return NormalBounds(lower=Formula(0.0), upper=None, measured=True)
         towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction is not None else None

@@ -11,7 +11,7 @@ from scenes import E, Table, model
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx.effects import Contact
-from hvi_fenicsx.effects.obstacles import Obstacle
+from hvi_fenicsx.effects.contact import Obstacle
 
 BALL = {"shape": "sphere", "center": [0.3, -1.0, 0.2], "radius": 0.7}
 TUBE = {"shape": "cylinder", "center": [0.3, -1.0, 0.2], "axis": [1.0, 2.0, -0.5], "radius": 0.7}
