@@ -141,7 +141,7 @@ class Result(Finished):
         for entry in self.summary.get("effects") or []:
             role, part, key = entry.get("role") or {}, entry["where"], entry["effect"]
             value = self.scene.get("boundary", {}).get(part, {}).get(key)
-            if role.get("place") != "boundary" or value is None or part in self.arrays.loads:
+            if role.get("place") != "boundary" or value is None:
                 continue
             total = role["drive"] == "load" and not role["traction"] and role["pressure"] is None
             moved = role["prescribed"] and isinstance(value, list) and any(v not in (0, "free") for v in value)

@@ -9,7 +9,7 @@ This module alone knows the keys of the file. With n vertices and c cells in d d
   another
 - ``region:NAME`` (k,), the cells of a region of the mesh
 - ``side:NAME`` (k, d), the vertices of each facet of a boundary table of the scene
-- ``load:NAME:KEY``, a load there that no formula of the scene tells, at m vertices: ``vertices`` (m,), ``traction``
+- ``load:NAME:KEY``, a load there, at m vertices: ``vertices`` (m,), ``traction``
   (m, d) and ``pressure`` (m,) against the boundary in N/m²
 - ``part:NAME:KEY``, a part of Γc with m vertices: ``vertices`` (m,), ``facets`` (k, d), ``weights`` (m,), ``normals``
   (m, d), ``drops`` (m, j), and the columns of ``contact.csv`` by their names, (m,) each
@@ -222,7 +222,7 @@ class SolutionArrays:
         von_mises: the von Mises stress of each cell, N/m², (c,); None where it was not computed.
         sides: the facets of each boundary table of the scene, (k, d), each row ascending.
         regions: the cells of each region of the mesh, (k,).
-        loads: by boundary table, the loads that no formula of the scene tells.
+        loads: by boundary table.
         parts: the parts of Γc by name.
     """
 

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ..effects import SurfaceLoad
-from ..formula import Formula
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
@@ -92,11 +91,11 @@ def _regions(problem: Problem) -> dict[str, Integers]:
 
 
 def _loads(problem: Problem) -> dict[str, LoadArrays]:
-    """The loads that are no formulas, which a reader cannot evaluate, by part; on rank 0. Collective."""
+    """The loads by part; on rank 0. Collective."""
     found: dict[str, list[SurfaceLoad]] = {}
     for where, effect, _ in problem.contributions:
         load = effect.surface_load()
-        if where is not None and load is not None and not all(isinstance(v, Formula) for v in load.values):
+        if where is not None and load is not None:
             found.setdefault(where, []).append(load)
     return {name: _load(problem, problem.part_facets[name], loads) for name, loads in found.items()}
 

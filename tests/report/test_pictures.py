@@ -32,7 +32,7 @@ from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
 from hvi_fenicsx.report.pictures import bodies, draw, sides
-from hvi_fenicsx.report.solution_arrays import FILE, ContactPart, SolutionArrays, load, save
+from hvi_fenicsx.report.solution_arrays import FILE, ContactPart, LoadArrays, SolutionArrays, load, save
 from hvi_fenicsx.runtime import processes
 
 Array = npt.NDArray[np.float64]
@@ -222,8 +222,11 @@ def test_an_escape_is_drawn_as_a_motion(
 
 
 def write_sides(folder: Path, body: mesh.Mesh, **on: Callable[[Array], npt.NDArray[np.bool_]]) -> None:
-    x = body.geometry.x
-    change(folder, sides={name: facets_on(plain(body), where(x.T)) for name, where in on.items()})
+    x, d = body.geometry.x, body.geometry.dim
+    at = np.flatnonzero(x[:, 0] == 1)
+    push = LoadArrays(vertices=at, traction=np.outer(1e6 * (1 - x[at, 1]), np.eye(d)[0]), pressure=np.zeros(len(at)))
+    found = {name: facets_on(plain(body), where(x.T)) for name, where in on.items()}
+    change(folder, sides=found, loads={"pull": push} if "pull" in on else {})
 
 
 ON = {"wall": lambda x: x[0] == 0, "pull": lambda x: x[0] == 1}

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HviError
-from ...formula import Formula
 from ...geometry import chains
 from ...typing import Array, Integers, Mask
 from ..body_mesh import BodyMesh
@@ -131,10 +129,8 @@ def loaded_sides(result: Result, factor: float = 1.0) -> list[LoadedSide]:
         factor: by which they are multiplied.
     """
     found, forces = [], {part: np.array([*value, 0.0][:3]) for part, key, value in result.driven if key == "force"}
-    for side, roles in roles_by_side(result):
-        points = result.body.points[side.vertices]
-        traction = sum((_traction(role, points, side.normals) for role in roles), np.zeros(points.shape))
-        traction = traction + _given(result.arrays.loads.get(side.part), side)
+    for side, _ in roles_by_side(result):
+        traction = _traction(result.arrays.loads.get(side.part), side)
         if np.any(traction):
             found.append(LoadedSide(side, factor * traction))
         if np.any(force := forces.get(side.part, np.zeros(3))):
@@ -171,8 +167,8 @@ def _side(name: str, body: BodyMesh, facets: Integers) -> Side:
     return Side(name, vertices, facets, body.normals(facets)[vertices])
 
 
-def _given(load: LoadArrays | None, side: Side) -> Array:
-    """A load that the result has at vertices, N/m², (m, 3); it is zero at vertices that it does not have."""
+def _traction(load: LoadArrays | None, side: Side) -> Array:
+    """A load at the vertices of a side, N/m², (m, 3)."""
     traction = np.zeros((len(side.vertices), 3))
     if load is not None:
         at = np.flatnonzero(np.isin(side.vertices, load.vertices))
@@ -180,20 +176,3 @@ def _given(load: LoadArrays | None, side: Side) -> Array:
         traction[at, : load.traction.shape[1]] = load.traction[own]
         traction[at] -= load.pressure[own, None] * side.normals[at]
     return np.asarray(np.nan_to_num(traction))
-
-
-def _traction(role: Mapping[str, Any], points: Array, normals: Array) -> Array:
-    """The load of one effect at points (m, 3), N/m², (m, 3); what cannot be read is not drawn."""
-    traction = np.zeros((len(points), 3))
-    try:
-        for i, component in enumerate(role["traction"][:3]):
-            traction[:, i] = _values(component, points)
-        if role["pressure"] is not None:
-            traction -= _values(role["pressure"], points)[:, None] * normals
-    except HviError:
-        return np.zeros((len(points), 3))
-    return traction
-
-
-def _values(formula: float | str, points: Array) -> Array:
-    return np.nan_to_num(Formula(formula).at(points.astype(np.float64)))
