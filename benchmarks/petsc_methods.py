@@ -23,8 +23,8 @@ from hvi_fenicsx.solvers.condensed import onto_bounds
 from hvi_fenicsx.solvers.convergence import Counts
 from hvi_fenicsx.solvers.method import Method, SolveContext, SolveResult
 from hvi_fenicsx.solvers.resting_start import resting_start
+from hvi_fenicsx.system.equations import VertexModel
 from hvi_fenicsx.system.held_solver import HeldPreconditioner
-from hvi_fenicsx.system.law_models import VertexModel
 from hvi_fenicsx.system.petsc_options import configure, raise_python_error
 from hvi_fenicsx.system.system import System
 

@@ -9,8 +9,8 @@ from petsc4py import PETSc
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.resting_start import resting_start
+from hvi_fenicsx.system.equations import Cells, VertexModel
 from hvi_fenicsx.system.held_solver import LinearSettings
-from hvi_fenicsx.system.law_models import Cells, VertexModel
 from hvi_fenicsx.system.system import System
 
 _MOST = 100

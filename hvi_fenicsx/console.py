@@ -220,7 +220,7 @@ def history(prepared: Preparation) -> Iterator[str]:
     if any(not term.is_linear for term in prepared.problem.terms):
         yield f"history: {NO_HISTORY}"
     if (wanted := prepared.scene.path) is not None:
-        yield from path_wanted(wanted, wanted.scaled or loading.names(prepared.system))
+        yield from path_wanted(wanted, wanted.scaled or loading.load_names(prepared.system))
 
 
 def path_wanted(wanted: PathTable, scaled: Sequence[str]) -> Iterator[str]:

@@ -19,9 +19,8 @@ from ..problem.problem import Problem
 from ..problem.references import References
 from ..problem.vectors import NodalForces
 from ..runtime.mpi import largest
-from ..system import net_forces as rigid_balance
-from ..system.free_motions import SupportedBody
-from ..system.net_forces import ActingForces, Holder
+from ..system import rigid_motions as rigid_balance
+from ..system.rigid_motions import ActingForces, Holder, SupportedBody
 from ..typing import Array, Mask
 from .contact_state import ContactState, Forces
 

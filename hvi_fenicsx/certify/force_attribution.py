@@ -17,7 +17,7 @@ from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..system import local_frames
-from ..system.net_forces import SUMMATION
+from ..system.rigid_motions import SUMMATION
 from ..typing import Array, Integers, Mask
 from .thresholds import DEFAULT, CertificateThresholds
 

@@ -24,8 +24,8 @@ from ..problem.problem import Bounds, Problem
 from ..problem.references import References
 from ..runtime.cost import Timer
 from ..system import local_frames
+from ..system.equations import Cells, VertexModel
 from ..system.factorisation import Factorisation, form_of
-from ..system.law_models import Cells, VertexModel
 from ..system.system import System
 from ..typing import Array, Entities, Integers, Mask
 from . import force_attribution

@@ -30,7 +30,7 @@ from ..problem import references
 from ..problem.law_term import LawTerm
 from ..rigid import Mode
 from ..runtime.mpi import agree, largest, total
-from ..system import existence, free_motions
+from ..system import existence, rigid_motions
 from ..system.system import System
 from ..typing import Array
 from .certificate import Examination
@@ -164,7 +164,7 @@ def uniqueness(
 
 def _motions(system: System, modes: Sequence[Mode]) -> list[Array]:
     """Rigid motions in this rank's unknowns, (n,) each. Collective."""
-    return [system.unknowns(field).array_r.copy() for field in free_motions.fields(system.problem, modes)]
+    return [system.unknowns(field).array_r.copy() for field in rigid_motions.fields(system.problem, modes)]
 
 
 def _doubt(
@@ -256,8 +256,8 @@ def _size(values: Sequence[Array]) -> float:
 
 def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[Array], thresholds: UniquenessThresholds) -> bool:
     """Whether A less C, a little enlarged, is positive but for the motions, which C does not feel. Collective."""
-    vectors = [system.unknowns(field) for field in free_motions.fields(system.problem, modes)]
-    pins = free_motions.create(vectors, modes).pins.astype(np.int64) if modes else np.empty(0, np.int64)
+    vectors = [system.unknowns(field) for field in rigid_motions.fields(system.problem, modes)]
+    pins = rigid_motions.create(vectors, modes).pins.astype(np.int64) if modes else np.empty(0, np.int64)
     enlarged = 1.0 + thresholds.enlarged
     system.jacobian.set_rates([_rate(t, -enlarged * c) for t, c in zip(system.terms, falls, strict=True)])
     with negative_eigenvalues(system) as negative:

@@ -68,7 +68,7 @@ class PathRun:
         self.prepared, self.wanted = prepared, wanted
         system = prepared.system
         obstacle_force.refuse(system.problem, "no path is followed")
-        known = loading.names(system)
+        known = loading.load_names(system)
         self.scaled = known if wanted.scaled is None else wanted.scaled
         if not known:
             raise InputError("path: nothing drives the body; add a load or a prescribed displacement")

@@ -41,7 +41,7 @@ def in_place_of(prepared: Preparation, failed: Solution, interrupted: Callable[[
     assert failed.solve_result is not None
     moved = any(bounds.move is not None for bounds in prepared.problem.bounds)  # which `auto` does not scale
     if (known := failed.solve_result.borne) is not None and not moved:
-        factored = FactoredProblem(prepared.problem, loading.names(prepared.system))
+        factored = FactoredProblem(prepared.problem, loading.load_names(prepared.system))
         return _shown(prepared, factored.at(known.factor), known, failed)
     _LOG.info("no equilibrium found under the whole load: the load is followed from 0 to the last state that is borne")
     try:

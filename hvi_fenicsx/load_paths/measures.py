@@ -59,7 +59,7 @@ class Measures:
         # each in one piece, since each row of the path is multiplied
         self._affine = [(constants[i::2], np.ascontiguousarray(rows[i::2])) for i in range(2)]
         numbers = {dof: number for number, part in enumerate(self.parts) for dof in map(int, held[part])}
-        prescribed = loading.make(system, scaled).prescribed
+        prescribed = loading.loading_of(system, scaled).prescribed
         self._held = [law.remembering() if remember else law for law in find(system.problem, numbers, prescribed)]
 
     def forces(self, x: Array, factor: float, reached: tuple[float, float] = (0.0, 0.0)) -> dict[str, Array]:

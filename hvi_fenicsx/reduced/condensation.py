@@ -23,12 +23,12 @@ from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
 from ..system.system import System
 from ..typing import Array, Integers
-from . import condensed_laws, loading
-from .condensed_laws import Carriers
+from . import loading
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
 from .elimination import CondensedMotions, Elimination
 from .factorised_stiffness import FactorisedStiffness
+from .loading import Carriers
 
 
 class Condensation:
@@ -59,12 +59,12 @@ class Condensation:
         largest_dense: int | None = None,
         interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._system, self._loading = system, loading.make(system, scaled)
+        self._system, self._loading = system, loading.loading_of(system, scaled)
         kept = np.setdiff1d(system.jacobian.rows.dofs, np.union1d(system.problem.fixed, system.pins))
         self._form = form_of(system, PREFIX)
         self._interior = interior = Interior(self._form, kept)
-        laws = condensed_laws.make(system, interior, self._loading.prescribed)
-        found = condensed_laws.find(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
+        laws = loading.laws_of(system, interior, self._loading.prescribed)
+        found = loading.carriers_of(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
         if largest_dense is not None and self._is_large(largest_dense, len(found.carrying)):
             chosen = self._reduce(found.carrying)
             found, laws = found.of(chosen), laws.renumbered(chosen, interior.size)
@@ -102,9 +102,7 @@ class Condensation:
         self._elimination = Elimination.of(whole, carrying, self._system.thresholds.rounding)
         return DenseStiffness(self._elimination.stiffness(whole))
 
-    def _condensed(
-        self, elastic: CondensedStiffness, found: Carriers, laws: condensed_laws.CondensedLaws
-    ) -> CondensedProblem:
+    def _condensed(self, elastic: CondensedStiffness, found: Carriers, laws: loading.CondensedLaws) -> CondensedProblem:
         """The problem on the unknowns that stay. Collective."""
         stay = self._elimination.stay
         self._shift = found.shift[stay]

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpstrf
 
-from ..system.free_motions import SupportedBody
 from ..system.interior import Interior
+from ..system.rigid_motions import SupportedBody
 from ..system.system import System
 from ..typing import Array, Integers
 

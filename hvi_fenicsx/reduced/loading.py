@@ -1,19 +1,25 @@
-"""Loads and prescribed displacements of a system as functions of one factor: constant ones, and λ times the rest."""
+"""What acts on the unknowns of Γc that are kept: loads, prescribed displacements, bounds and laws.
+
+Loads and prescribed displacements are functions of one factor: constant ones, and λ times the rest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx.fem.petsc import set_bc
 
 from ..effects.base import load_name
 from ..errors import InputError
+from ..problem.law_term import LawTerm
 from ..problem.vectors import new_vector, turn
 from ..runtime.mpi import agree
+from ..system.interior import Interior
 from ..system.system import System
-from ..typing import Array
+from ..typing import Array, Integers, Mask
+from .condensed_problem import Bonds, PrescribedBonds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +39,7 @@ class Loading:
     pulled: Array
 
 
-def names(system: System) -> tuple[str, ...]:
+def load_names(system: System) -> tuple[str, ...]:
     """All that a factor can scale: ``part.effect`` of each load, prescribed displacement and moved obstacle."""
     moved = [bounds.move.name for bounds in system.bounds if bounds.move is not None]
     return tuple(dict.fromkeys([*system.forces, *_conditions(system), *moved]))
@@ -72,7 +78,7 @@ def obstacle_shift(system: System, scaled: Collection[str]) -> Array:
     return shift
 
 
-def make(system: System, scaled: Collection[str] | None) -> Loading:
+def loading_of(system: System, scaled: Collection[str] | None) -> Loading:
     """The loading of a system. Collective.
 
     Args:
@@ -82,7 +88,7 @@ def make(system: System, scaled: Collection[str] | None) -> Loading:
     Raises:
         InputError: on all ranks alike: a name that is none, or a constant and a scaled displacement of one unknown.
     """
-    known = names(system)
+    known = load_names(system)
     chosen = set(known if scaled is None else scaled)
     for name in sorted(chosen - set(known)):
         raise InputError(f"path.scaled: there is no load {name!r}; there are: {', '.join(known) or 'none'}")
@@ -128,3 +134,215 @@ def _check_overlap(system: System, prescribed: Array, chosen: Collection[str]) -
             "path.scaled: two boundary parts meet and prescribe the same displacement, one scaled and the other not; "
             "scale both or none"
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CondensedLaws:
+    """The laws on some unknowns.
+
+    Attributes:
+        bonds: where displacements are free.
+        prescribed: where they are prescribed.
+    """
+
+    bonds: tuple[Bonds, ...]
+    prescribed: tuple[PrescribedBonds, ...]
+
+    def renumbered(self, stay: Integers, size: int) -> CondensedLaws:
+        """The laws on fewer unknowns.
+
+        Args:
+            stay: numbers of the unknowns that stay.
+            size: number of all.
+        """
+        number = np.full(size, -1)
+        number[stay] = np.arange(len(stay))
+        return replace(self, bonds=tuple(replace(b, unknowns=number[b.unknowns]) for b in self.bonds))
+
+
+def laws_of(system: System, interior: Interior, prescribed: Array) -> CondensedLaws:
+    """The laws of a system. Collective.
+
+    Args:
+        system: the system.
+        interior: which unknowns are kept.
+        prescribed: prescribed displacements, constant and scaled, (local unknowns, 2).
+
+    Raises:
+        InputError: on all ranks alike: a law of a length where one component has a prescribed value that is not zero.
+    """
+    number = np.full(system.load.local_size, -1)
+    number[interior.kept] = np.arange(interior.size)[interior.here]
+    found = [_Term(system, term, number, prescribed) for term in system.terms]
+    bonds = [b for term in found for b in term.bonds()]
+    held = [b for term in found for b in term.prescribed_bonds()]
+    return CondensedLaws(bonds=tuple(bonds), prescribed=tuple(held))
+
+
+class _Term:
+    """One law, its directions along the axes of the vertices' unknowns. Creation is collective."""
+
+    def __init__(self, system: System, term: LawTerm, number: Integers, prescribed: Array) -> None:
+        self._comm, self._term = system.comm, term
+        dofs, along = term.surface.dofs, np.any(term.directions != 0.0, axis=1)
+        self._unknowns, values = number[dofs], prescribed[dofs]
+        self._free = along & (self._unknowns >= 0)
+        constant = np.einsum("mkd,mdc->mkc", term.directions, values)
+        self._components = np.count_nonzero(self._free, axis=1)
+        self._arguments = constant[:, 0].T / term.stretch
+        moved = np.any(constant != 0.0, axis=(1, 2)) & ((self._components > 0) | term.radial)
+        if any(agree(system.comm, bool(np.any(moved)))):
+            raise InputError(
+                f"boundary.{term.surface.part}: a law acts on the length of a vector of which one component is "
+                "prescribed and not zero; such a scene has no condensed form"
+            )
+
+    def bonds(self) -> list[Bonds]:
+        """The vertices by the number of free components and whether one is an opening, of all ranks. Collective."""
+        opening = self._opening
+        kinds = [(k, opens) for k in (1, 2, 3) for opens in (False, True)]
+        return [b for k, opens in kinds for b in self._bonds((self._components == k) & (opening == opens), k, opens)]
+
+    @property
+    def _opening(self) -> Mask:
+        """Where an opening that counts only while it is positive is free, (m,)."""
+        term = self._term
+        if term.length is None or not term.length.opens:
+            return np.zeros(len(self._components), dtype=bool)
+        return np.asarray(np.any((term.directions[:, 0] != 0.0) & self._free, axis=1))
+
+    def _bonds(self, here: Mask, components: int, opens: bool) -> Sequence[Bonds]:
+        """The vertices of one kind, by what the lengths of their law are multiplied by. Collective."""
+        stretch = self._term.stretch
+        known = np.unique(np.concatenate(agree(self._comm, stretch[here])))
+        return [b for one in known for b in self._alike(here & (stretch == one), components, opens, float(one))]
+
+    def _alike(self, here: Mask, components: int, opens: bool, stretch: float) -> Sequence[Bonds]:
+        """The vertices of one kind and stretch. Collective."""
+        term, surface = self._term, self._term.surface
+        unknowns, signs = self._felt(here, components, opens)
+        parts = (unknowns, signs, (surface.weights * term.placed)[here], surface.points[here])
+        unknowns, signs, weights, points = (np.concatenate(agree(self._comm, p)) for p in parts)
+        if not len(weights):
+            return []
+        law = term.law if stretch == 1.0 else term.law.scaled(1.0 / stretch, 1.0)
+        if term.length is not None and components == 1 and not opens:  # a slip alone: its law has the factor
+            factor = term.length.factors[-1]
+            law = law if factor == 1.0 else law.scaled(factor, 1.0 / factor)
+            signs = np.asarray(signs / factor, dtype=np.float64)
+        if term.is_linear and not opens:  # the energy of a spring on a length is that of springs on its components
+            weights, points = (np.repeat(part, components, axis=0) for part in (weights, points))
+            unknowns, signs = unknowns.reshape(-1, 1), signs.reshape(-1, 1)
+        found = Bonds(
+            law=law,
+            unknowns=unknowns,
+            signs=signs,
+            weights=weights,
+            part=surface.part,
+            direction=term.direction,
+            points=points,
+            opens=opens,
+            mixity=term.mixity,
+        )
+        return [found]
+
+    def _felt(self, here: Mask, components: int, opens: bool) -> tuple[Integers, Array]:
+        """The unknowns, an opening first, and what they are multiplied by, (m, k) each."""
+        term, free = self._term, self._free[here]
+        unknowns = self._unknowns[here][free].reshape(-1, components)
+        columns = np.swapaxes(term.directions[here], 1, 2)[free].reshape(-1, components, term.directions.shape[1])
+        if term.length is None:
+            return unknowns, columns[:, :, 0]
+        signs = np.linalg.norm(columns * np.array(term.length.factors), axis=2)
+        if not opens:
+            return unknowns, signs
+        signs = np.where(columns[:, :, 0] != 0.0, columns[:, :, 0] * term.length.factors[0], signs)
+        order = np.argsort(columns[:, :, 0] == 0.0, axis=1, kind="stable")
+        return np.take_along_axis(unknowns, order, axis=1), np.take_along_axis(signs, order, axis=1)
+
+    def prescribed_bonds(self) -> Sequence[PrescribedBonds]:
+        """The vertices where no component is free, and the energy is not always zero, of all ranks. Collective."""
+        at_rest = float(self._term.law.value(np.zeros(1))[0])
+        here = (self._components == 0) & (np.any(self._arguments != 0.0, axis=0) | (at_rest != 0.0))
+        weights = np.concatenate(agree(self._comm, self._term.energy_weights[here]))
+        arguments = np.concatenate(agree(self._comm, self._arguments[:, here]), axis=1)
+        if not len(weights):
+            return []
+        return [PrescribedBonds(law=self._term.law, weights=weights, arguments=arguments)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Carriers:
+    """The vertices' unknowns, the same on all ranks.
+
+    Attributes:
+        lower: bounds, (n,).
+        upper: bounds, (n,).
+        points: vertices, m, (n, 3).
+        parts: the part whose contact bounds the unknown, (n,).
+        carrying: numbers of those that carry a bound or a law.
+        shift: by how much obstacles that the factor moves have moved the bounds, which are those without, (n,).
+    """
+
+    lower: Array
+    upper: Array
+    shift: Array
+    points: Array
+    parts: tuple[str, ...]
+    carrying: Integers
+
+    def of(self, chosen: Integers) -> Carriers:
+        """Those of some unknowns, among which are all that carry.
+
+        Args:
+            chosen: their numbers, ascending, (m,).
+        """
+        return replace(
+            self,
+            lower=self.lower[chosen],
+            upper=self.upper[chosen],
+            shift=self.shift[chosen],
+            points=self.points[chosen],
+            parts=tuple(self.parts[i] for i in chosen),
+            carrying=np.searchsorted(chosen, self.carrying),
+        )
+
+
+def carriers_of(system: System, interior: Interior, laws: CondensedLaws, moved: Array) -> Carriers:
+    """What the kept unknowns carry. Collective.
+
+    Args:
+        system: the system.
+        interior: which unknowns are kept.
+        laws: on them.
+        moved: by how much obstacles that the factor moves have moved the bounds, (local unknowns,).
+
+    Raises:
+        InputError: on all ranks alike: a law acts along a displacement along which an obstacle is moved.
+    """
+    lower, upper, shift = (interior.gathered(v) for v in (system.lower.array_r, system.upper.array_r, moved))
+    bounded = np.isfinite(lower) | np.isfinite(upper)
+    with_law = [b.unknowns.ravel() for b in laws.bonds]
+    d = system.problem.scales.dimension
+    named = np.full(system.load.local_size, "", dtype=object)
+    for bounds in system.bounds:
+        named[bounds.component()[0]] = bounds.surface.part
+    _refuse_laws(laws, shift)
+    return Carriers(
+        lower=lower - shift,
+        upper=upper - shift,
+        shift=shift,
+        points=np.concatenate(agree(system.comm, system.problem.points[interior.kept // d])),
+        parts=tuple(str(p) if b else "" for p, b in zip(interior.gathered(named), bounded, strict=True)),
+        carrying=np.unique(np.concatenate([np.flatnonzero(bounded), *with_law])).astype(np.int64),
+    )
+
+
+def _refuse_laws(laws: CondensedLaws, shift: Array) -> None:
+    """Laws act on the body's own displacement, which is not that relative to an obstacle."""
+    for bonds in laws.bonds:
+        if np.any(shift[bonds.unknowns] != 0.0):
+            raise InputError(
+                f"boundary.{bonds.part}: the path moves an obstacle along the displacement that this "
+                "law acts on; leave the vertices that both parts share out of one of them (where)"
+            )

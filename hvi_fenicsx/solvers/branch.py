@@ -10,7 +10,7 @@ Newton step with the true curvature is tried and kept if the energy does not ris
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,10 +20,9 @@ from ..effects import Direction
 from ..errors import SolverError
 from ..formula import Formula
 from ..laws import Superpotential
-from ..laws.smoothing import QUADRATIC
 from ..model.options import Start
 from ..problem.law_term import LawTerm
-from ..system.law_models import Cells
+from ..system.equations import Cells
 from ..system.system import System
 from ..typing import Array
 from .convergence import Counts, Outcome
@@ -221,43 +220,3 @@ def _broken(term: LawTerm, slip: Array, far: float) -> Array:
     """A large slip in the direction of the slip at rest; positive for laws of an opening or a penetration."""
     sign = np.where(slip < 0, -1.0, 1.0) if term.direction is Direction.SLIP else np.ones_like(slip)
     return np.asarray(sign * far * np.maximum(np.abs(slip), term.exact.length_scale))
-
-
-class Continuation(Method):
-    """The continuation on one system; call :meth:`solve` once."""
-
-    name = "snes_vi"
-    description = "a continuation in the smoothing over branch iterations"
-    takes_pieces = False
-
-    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
-        """A stationary point of the wanted law. Collective.
-
-        Args:
-            start: not used; each width starts from the solution of the width before.
-        """
-        counts, start, context = Counts(), None, self.context
-        thresholds = self.system.thresholds
-        loose = context.with_options(tolerance=max(thresholds.coarse_tolerance, self.options.tolerance))
-        for width in widths(context, 1.0):
-            laws = [QUADRATIC.relative(t.exact, width) for t in self.system.terms]
-            found = BranchIteration(loose, laws, width, check_bounded=True).solve(start)
-            counts.add(found.counts)
-            if found.converged:
-                start = self.system.unknowns(found.u)
-        last = BranchIteration(context, check_bounded=True).solve(start)
-        counts.add(last.counts)
-        return replace(last, method=self.name, counts=counts)
-
-
-def widths(context: SolveContext, first: float) -> Iterator[float]:
-    """Relative widths of the smoothing that a continuation goes through, down to the wanted one.
-
-    Args:
-        context: with the wanted width.
-        first: the widest.
-    """
-    width, thresholds = first, context.system.thresholds
-    while width > max(thresholds.narrowest, context.epsilon or 0.0):
-        yield width
-        width /= 2.0

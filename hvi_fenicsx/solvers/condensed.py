@@ -17,10 +17,9 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 
 from ..errors import InputError
-from ..system.equations import LawModel
+from ..system.equations import LawModel, VertexModel
 from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
-from ..system.law_models import VertexModel
 from ..system.system import System
 from ..typing import Array, Integers
 from .convergence import Counts

@@ -9,9 +9,8 @@ from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
 from ..problem.vectors import NodalForces
-from ..system import net_forces
-from ..system.free_motions import Motions, SupportedBody
-from ..system.net_forces import ActingForces, Holder
+from ..system import rigid_motions
+from ..system.rigid_motions import ActingForces, Holder, Motions, SupportedBody
 from ..system.system import System
 from ..typing import Array, Mask
 
@@ -205,7 +204,7 @@ class NetForceTest:
         self._d = system.problem.scales.dimension
         self._contact = (system.jacobian.rows.dofs[:: self._d] // self._d).astype(np.int32)
         self._loads = NodalForces.of(self._local(system.pushing))
-        self._capable = [self._local_part(force) for force in net_forces.capable(system.problem)]
+        self._capable = [self._local_part(force) for force in rigid_motions.capable(system.problem)]
         bodies = (SupportedBody.of(system.problem, body) for body in system.problem.bodies)
         self._bodies = [body.in_components(self._local) for body in bodies]
         self._masks: list[Mask] | None = None
@@ -231,7 +230,7 @@ class NetForceTest:
             holders=self._holders(residual[at] - projected[at], *on),
             capable=self._capable,
         )
-        nets = [net_forces.along(system.references, y, acting) for y in self._motions]
+        nets = [rigid_motions.along(system.references, y, acting) for y in self._motions]
         return np.array([net.relative for net in nets]).T
 
     def _holders(self, reactions: Array, on_lower: Mask, on_upper: Mask) -> list[Holder]:

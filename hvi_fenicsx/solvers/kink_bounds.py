@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from ..laws import ConvexPart
 from ..problem.contact_surface import component_dofs
 from ..problem.law_term import LawTerm
-from ..system.law_models import Cells, VertexModel
+from ..system.equations import Cells, VertexModel
 from ..system.system import System
 from ..typing import Array, Integers, Mask
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from petsc4py import PETSc
 
-from ..system.law_models import VertexModel
+from ..system.equations import VertexModel
 from ..system.system import System
 from .active_set import ENERGY, EXACT, FULL_STEPS
 from .attempts import Attempt, first_success

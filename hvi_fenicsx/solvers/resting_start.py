@@ -14,9 +14,8 @@ from ..problem.law_term import LawTerm
 from ..rigid import OneSidedSupports, RestingPosition, least_energy
 from ..rigid.thresholds import DEFAULT as RIGID
 from ..runtime.mpi import agree
-from ..system import existence, free_motions
-from ..system.equations import LawModel
-from ..system.law_models import Cells, TangentAtRest, VertexModel
+from ..system import existence, rigid_motions
+from ..system.equations import Cells, LawModel, TangentAtRest, VertexModel
 from ..system.system import System
 from ..typing import Array, Integers
 from .active_set import ActiveSetSolver
@@ -175,7 +174,7 @@ def motions(system: System, *, contact_closed: bool) -> list[PETSc.Vec]:
     """
     free = system.free_motions.modes if system.free_motions else ()
     modes = existence.motions(system.problem, contact_closed=contact_closed, without=free)
-    return [system.unknowns(field) for field in free_motions.fields(system.problem, modes)]
+    return [system.unknowns(field) for field in rigid_motions.fields(system.problem, modes)]
 
 
 def models(solver: ActiveSetSolver, laws: Sequence[Superpotential], x: PETSc.Vec) -> list[LawModel]:

@@ -1,20 +1,25 @@
-"""The equations of a system: residual, tangent and energy for what takes the place of the laws, and their rounding."""
+"""The equations of a system, and what takes the place of a law j = H - G in them, vertex by vertex.
+
+H's kinks (Tresca, |u_t| at zero, upward jumps) stay in the convex step: bounds on its slip keep each vertex in the cell
+between two kinks, where H is smooth up to the ends. A vertex on a kink that cannot carry its force moves on to the next
+cell.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..laws import ConvexPart, Superpotential
 from ..problem.law_term import LawTerm
-from ..problem.problem import Bounds
-from ..typing import Array, Entities
-from .contact_rows import ContactRows
+from ..typing import Array, Integers
+from .jacobian import Jacobian
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -181,84 +186,138 @@ class LawModel(Protocol):
         """Tangent stiffness."""
 
 
-class Jacobian:
-    """J = A + W K + H of one system. Creation is collective; it owns the matrix.
+@dataclass(frozen=True)
+class Cells:
+    """For each of m vertices, the cell [lower, upper] between two kinks of H in which it stays.
 
-    Args:
-        stiffness: A, which becomes J.
-        terms: the laws.
-        bounds: the contact bounds.
+    For a law of |u_t| in 3D there is one kink, at zero, and two cells: stuck (0) and free (1).
 
     Attributes:
-        matrix: J; Dirichlet rows and columns are those of the identity; block size d.
-        rows: the rows of Γc.
-        held: the unknowns of Γc (local, owned, sorted) that J holds.
+        kinks: the kinks of H, ascending.
+        index: number of each vertex's cell, (m,).
+        ramp: for a law of |u_t|, the slip up to which the traction of a free vertex grows from zero, so that its
+            direction may still turn; a vertex whose slip remains smaller is stuck. 0 for laws of a signed slip.
     """
 
-    def __init__(self, stiffness: PETSc.Mat, terms: Sequence[LawTerm], bounds: Sequence[Bounds]) -> None:
-        self.matrix, self._terms = stiffness, tuple(terms)
-        surfaces = [*(t.surface for t in terms), *(b.surface for b in bounds)]
-        self.rows = ContactRows(stiffness, surfaces)
-        self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
-        self.held: Entities = np.empty(0, np.int32)
-        self._comm = stiffness.comm.tompi4py()
+    kinks: Array
+    index: Integers
+    ramp: float = 0.0
+
+    @classmethod
+    def around(cls, part: ConvexPart, x: Array, *, radial: bool = False) -> Cells:
+        """The cells that hold x; on a kink the cell to its right, for a law of |u_t| the stuck one.
+
+        Args:
+            part: H.
+            x: arguments, (m,).
+            radial: whether it is a law of |u_t|.
+        """
+        side: Literal["left", "right"] = "left" if radial else "right"
+        ramp = 0.0
+        if radial and len(part.kinks):
+            ramp = DEFAULT.first_ramp * max(float(np.max(x, initial=0.0)), DEFAULT.coarse_tolerance)
+        return cls(part.kinks, np.searchsorted(part.kinks, x, side=side), ramp)
 
     @property
-    def rates(self) -> list[Array]:
-        """A copy of the present K, (m, d, d) by term."""
-        return [k.copy() for k in self._rates]
+    def lower(self) -> Array:
+        """Lower ends; -inf where there is none."""
+        return np.concatenate([[-np.inf], self.kinks])[self.index]
 
-    def set_rates(self, rates: Sequence[Array]) -> None:
-        """Set the tangent K, (m, d, d) by term; nothing is held then. Collective."""
-        changed = any(bool(np.any(new != old)) for new, old in zip(rates, self._rates, strict=True))
-        if self._comm.allreduce(changed, op=MPI.LOR):
-            self._rates = [k.copy() for k in rates]
-            self.rows.set_tangent(self._terms, rates)
-            self._write(np.empty(0, np.int32))
-        else:
-            self.hold(np.empty(0, np.int32))
+    @property
+    def upper(self) -> Array:
+        """Upper ends; inf where there is none."""
+        return np.concatenate([self.kinks, [np.inf]])[self.index]
 
-    def hold(self, held: Entities) -> None:
-        """Hold these unknowns of Γc (local, owned, sorted), and no others, as they are in a solve. Collective."""
-        if self._comm.allreduce(not np.array_equal(held, self.held), op=MPI.LOR):
-            self._write(held)
-
-    def set_restricted(self, tangent: Array, held: Entities) -> None:
-        """Set the tangent of a finer level, restricted to this one, and hold unknowns. Collective.
+    def moved(self, step: Integers) -> Cells:
+        """The cells after each vertex moved to a neighbouring one, or stayed; if any moved to the right, half the ramp.
 
         Args:
-            tangent: W K at the vertices of Γc, (m, d, d).
-            held: unknowns to hold (local, owned, sorted).
+            step: -1, 0 or 1, (m,).
         """
-        changed = not (np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held))
-        if self._comm.allreduce(changed, op=MPI.LOR):
-            self.rows.tangent[:] = tangent
-            self._rates = [np.full_like(k, np.nan) for k in self._rates]  # they say nothing about J now
-            self._write(held)
+        return Cells(self.kinks, self.index + step, self.ramp / 2.0 if np.any(step > 0) else self.ramp)
 
-    def _write(self, held: Entities) -> None:
-        self.rows.write(self.matrix, held)
-        self.held = held.copy()
 
-    def drift(self, rates: Sequence[Array]) -> float:
-        """Largest nodal stiffness (an elastic one is about 1) by which this rank's K differs from ``rates``."""
-        changes = (
-            float(np.max(np.abs(new - old) * term.weights[:, None, None], initial=0.0))
-            for term, new, old in zip(self._terms, self._rates, rates, strict=True)
-        )
-        return max(changes, default=0.0)
+UNDIVIDED = Cells(np.empty(0), np.zeros(1, dtype=np.int64))
+"""The whole line as one cell."""
 
-    def elastic_product(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """The product A x: by J, and by A's own rows where the two differ. Collective.
 
-        Args:
-            x: the vector.
-            out: where the product is written.
-        """
-        self.matrix.mult(x, out)
-        self.rows.overwrite(x, out)
+@dataclass(frozen=True)
+class VertexModel:
+    """What takes the place of a law j = H - G at its vertices: j itself, or with ξ ∈ ∂G its majorant H - ξ.
 
-    def free(self) -> None:
-        """Free the PETSc objects. Collective."""
-        self.matrix.destroy()
-        self.rows.free()
+    Attributes:
+        law: j.
+        cells: where each vertex stays; undivided, the mean of both sides counts at kinks, as in the paper's formula.
+        xi: ξ, (m,): the majorant is nowhere less than j, and equal at the arguments of ξ, up to a constant; None: j.
+        secant_from: the stiffness is the secant's H'/x, of slips of this at least, where it exceeds the tangent's.
+            Where H'/x falls with |x| that parabola is greater than H, so that full steps lower the energy
+            (iteratively reweighted least squares; Kačanov); None: the tangent's.
+    """
+
+    law: Superpotential
+    cells: Cells = UNDIVIDED
+    xi: Array | None = None
+    secant_from: float | None = None
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+        return self.law.value(x) if self.xi is None else self.law.convex.value(x) - self.xi * x
+
+    def derivative(self, x: Array) -> Array:
+        """H' less ξ, or less the middle of G's interval."""
+        concave = self.law.concave
+        falling = (concave.left(x) + concave.right(x)) / 2 if self.xi is None else self.xi
+        return self._inside(x) - falling
+
+    def second(self, x: Array) -> Array:
+        """H'', of j less G''."""
+        if self.xi is None:
+            return self._curvature(x) - self.law.concave.second(x)
+        if self.secant_from is None:
+            return self._curvature(x)
+        secant = np.abs(self._inside(x)) / np.maximum(np.abs(x), self.secant_from)
+        return np.maximum(self._curvature(x), secant)
+
+    def _inside(self, x: Array) -> Array:
+        """Derivative of H, continued from inside of the cell to its ends."""
+        part, cells = self.law.convex, self.cells
+        if cells is UNDIVIDED:
+            return (part.left(x) + part.right(x)) / 2
+        if cells.ramp > 0:
+            return part.right(np.maximum(x, cells.ramp)) * np.minimum(x / cells.ramp, 1.0)
+        at_lower, at_upper = x <= cells.lower, x >= cells.upper
+        lower, upper = np.where(at_lower, cells.lower, x), np.where(at_upper, cells.upper, x)
+        return np.where(at_lower, part.right(lower), np.where(at_upper, part.left(upper), part.right(x)))
+
+    def _curvature(self, x: Array) -> Array:
+        """Second derivative of H; on the ramp, that of the ramp."""
+        part, ramp = self.law.convex, self.cells.ramp
+        if ramp > 0:
+            steep = part.right(np.array([ramp])) / ramp
+            return np.where(x < ramp, steep, part.second(np.maximum(x, ramp)))
+        return part.second(x)
+
+
+@dataclass(frozen=True)
+class TangentAtRest:
+    """The law's tangent at zero slip, x ↦ H'(0)x + ½ H''(0) x²: it holds a body at the start.
+
+    Attributes:
+        law: j.
+    """
+
+    law: Superpotential
+
+    def value(self, x: Array) -> Array:
+        """Energy per area."""
+        return self.derivative(np.zeros_like(x)) * x + self.second(x) * x**2 / 2
+
+    def derivative(self, x: Array) -> Array:
+        """The middle of ∂j(0) plus H''(0) x."""
+        zero = np.zeros_like(x)
+        lo, hi = self.law.interval(zero)
+        return (lo + hi) / 2 + self.second(x) * x
+
+    def second(self, x: Array) -> Array:
+        """H''(0)."""
+        return self.law.convex.second(np.zeros_like(x))

@@ -17,7 +17,7 @@ from ..mesh import nodes
 from ..problem.spaces import Dilatation
 from ..runtime.cost import Timer
 from ..typing import Array, Entities, Integers
-from .contact_rows import ContactRows
+from .jacobian import ContactRows
 from .petsc_options import CHOLESKY, applied_by, default_options, prefix
 from .system import System
 

@@ -28,10 +28,10 @@ from ..problem.vectors import assembled, new_vector, product, turn
 from ..rigid import Mode
 from ..runtime.cost import Timer
 from ..typing import Array, Entities
-from . import existence, free_motions, local_frames
-from .contact_rows import HoldingForces
-from .equations import Base, Equations, Jacobian
-from .free_motions import FreeMotions
+from . import existence, local_frames, rigid_motions
+from .equations import Base, Equations
+from .jacobian import HoldingForces, Jacobian
+from .rigid_motions import FreeMotions
 from .thresholds import DEFAULT, Thresholds
 
 
@@ -97,8 +97,8 @@ class System:
         """Make rigid motions the matrix's null space, and remove what rounding left of them in the load. Collective."""
         if not modes:
             return
-        vectors = [self.unknowns(field) for field in free_motions.fields(self.problem, modes)]
-        self.free_motions = free_motions.create(vectors, modes)
+        vectors = [self.unknowns(field) for field in rigid_motions.fields(self.problem, modes)]
+        self.free_motions = rigid_motions.create(vectors, modes)
         self.jacobian.matrix.setNullSpace(self.free_motions.null_space)
         residual = self.load.duplicate()
         residual.array[:] = self.equations.base.residual

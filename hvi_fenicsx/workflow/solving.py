@@ -21,7 +21,7 @@ from ..solvers import frozen_mixity, nested_iteration, obstacle_force
 from ..solvers.method import Progress, SolveResult, SolveTask, decides_stability, never, relative_width
 from ..solvers.nested_iteration import CoarseStart, LevelSolution
 from ..solvers.obstacle_force import ObstacleBalance
-from ..system import free_motions
+from ..system import rigid_motions
 from ..system.multigrid import Levels
 from ..system.thresholds import DEFAULT, Thresholds
 from .preparation import Preparation, prepare
@@ -244,7 +244,7 @@ def _solved(
             found = nested_iteration.solve(task, system)
         found = frozen_mixity.settled(task, found)
         if system.free_motions is not None:
-            free_motions.remove_free_motions(prepared.problem, prepared.solvability.free, found.result.u)
+            rigid_motions.remove_free_motions(prepared.problem, prepared.solvability.free, found.result.u)
         return found, balance
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")

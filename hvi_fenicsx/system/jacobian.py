@@ -1,4 +1,4 @@
-"""The rows of Γc in a system's matrix: the only ones that laws, active sets and branches change.
+"""A system's matrix, and its rows of Γc: the only ones that laws, active sets and branches change.
 
 J = A + W K + H. A is the bulk stiffness. W K is block-diagonal, the laws' tangents times lumped areas: ∫ (K du)·v ds by
 vertex quadrature. H holds unknowns: its diagonal is so large that a solve leaves them as they are. W K and H are zero
@@ -11,12 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
-from ..problem.problem import Problem
-from ..typing import Array, Integers
+from ..problem.problem import Bounds, Problem
+from ..typing import Array, Entities, Integers
 from .thresholds import DEFAULT
 
 
@@ -159,3 +160,86 @@ class HoldingForces:
         """Free the PETSc objects. Collective."""
         self._rows.destroy()
         self._product.destroy()
+
+
+class Jacobian:
+    """J = A + W K + H of one system. Creation is collective; it owns the matrix.
+
+    Args:
+        stiffness: A, which becomes J.
+        terms: the laws.
+        bounds: the contact bounds.
+
+    Attributes:
+        matrix: J; Dirichlet rows and columns are those of the identity; block size d.
+        rows: the rows of Γc.
+        held: the unknowns of Γc (local, owned, sorted) that J holds.
+    """
+
+    def __init__(self, stiffness: PETSc.Mat, terms: Sequence[LawTerm], bounds: Sequence[Bounds]) -> None:
+        self.matrix, self._terms = stiffness, tuple(terms)
+        surfaces = [*(t.surface for t in terms), *(b.surface for b in bounds)]
+        self.rows = ContactRows(stiffness, surfaces)
+        self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
+        self.held: Entities = np.empty(0, np.int32)
+        self._comm = stiffness.comm.tompi4py()
+
+    @property
+    def rates(self) -> list[Array]:
+        """A copy of the present K, (m, d, d) by term."""
+        return [k.copy() for k in self._rates]
+
+    def set_rates(self, rates: Sequence[Array]) -> None:
+        """Set the tangent K, (m, d, d) by term; nothing is held then. Collective."""
+        changed = any(bool(np.any(new != old)) for new, old in zip(rates, self._rates, strict=True))
+        if self._comm.allreduce(changed, op=MPI.LOR):
+            self._rates = [k.copy() for k in rates]
+            self.rows.set_tangent(self._terms, rates)
+            self._write(np.empty(0, np.int32))
+        else:
+            self.hold(np.empty(0, np.int32))
+
+    def hold(self, held: Entities) -> None:
+        """Hold these unknowns of Γc (local, owned, sorted), and no others, as they are in a solve. Collective."""
+        if self._comm.allreduce(not np.array_equal(held, self.held), op=MPI.LOR):
+            self._write(held)
+
+    def set_restricted(self, tangent: Array, held: Entities) -> None:
+        """Set the tangent of a finer level, restricted to this one, and hold unknowns. Collective.
+
+        Args:
+            tangent: W K at the vertices of Γc, (m, d, d).
+            held: unknowns to hold (local, owned, sorted).
+        """
+        changed = not (np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held))
+        if self._comm.allreduce(changed, op=MPI.LOR):
+            self.rows.tangent[:] = tangent
+            self._rates = [np.full_like(k, np.nan) for k in self._rates]  # they say nothing about J now
+            self._write(held)
+
+    def _write(self, held: Entities) -> None:
+        self.rows.write(self.matrix, held)
+        self.held = held.copy()
+
+    def drift(self, rates: Sequence[Array]) -> float:
+        """Largest nodal stiffness (an elastic one is about 1) by which this rank's K differs from ``rates``."""
+        changes = (
+            float(np.max(np.abs(new - old) * term.weights[:, None, None], initial=0.0))
+            for term, new, old in zip(self._terms, self._rates, rates, strict=True)
+        )
+        return max(changes, default=0.0)
+
+    def elastic_product(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """The product A x: by J, and by A's own rows where the two differ. Collective.
+
+        Args:
+            x: the vector.
+            out: where the product is written.
+        """
+        self.matrix.mult(x, out)
+        self.rows.overwrite(x, out)
+
+    def free(self) -> None:
+        """Free the PETSc objects. Collective."""
+        self.matrix.destroy()
+        self.rows.free()

@@ -1,14 +1,14 @@
-"""Newton's method through narrowing smoothings: equilibria that are no minimum, also on a drop.
+"""Narrowing smoothings: over branch iterations; and over Newton steps, for equilibria that are no minimum.
 
-A descent leads away from these. Smoothed widely, a law that pushes at once is nearly straight: its equation has a
-solution, and Newton's method finds it from where springs would hold the body, if not at one width then at a narrower
-one. As the width narrows, vertices that stay within it are on the drop. At each width they are held there, as by a
-support, until the drop carries what they take up.
+A descent leads away from these, which may be on a drop. Smoothed widely, a law that pushes at once is nearly straight:
+its equation has a solution, and Newton's method finds it from where springs would hold the body, if not at one width
+then at a narrower one. As the width narrows, vertices that stay within it are on the drop. At each width they are held
+there, as by a support, until the drop carries what they take up.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,9 +18,9 @@ from ..laws import Superpotential
 from ..laws.catalogue import LinearSpring
 from ..laws.smoothing import QUADRATIC
 from ..typing import Array
-from .branch import BranchIteration, widths
+from .branch import BranchIteration
 from .convergence import Counts
-from .method import SolveContext, SolveResult
+from .method import Method, SolveContext, SolveResult
 
 
 def solve(context: SolveContext) -> SolveResult:
@@ -77,3 +77,43 @@ def _drop(law: Superpotential, smooth: Superpotential, argument: Array) -> Array
     for kink, low, high in zip(kinks, law.concave.left(kinks), law.concave.right(kinks), strict=True):
         found[(between > low) & (between < high)] = kink
     return found
+
+
+class Continuation(Method):
+    """The continuation on one system; call :meth:`solve` once."""
+
+    name = "snes_vi"
+    description = "a continuation in the smoothing over branch iterations"
+    takes_pieces = False
+
+    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
+        """A stationary point of the wanted law. Collective.
+
+        Args:
+            start: not used; each width starts from the solution of the width before.
+        """
+        counts, start, context = Counts(), None, self.context
+        thresholds = self.system.thresholds
+        loose = context.with_options(tolerance=max(thresholds.coarse_tolerance, self.options.tolerance))
+        for width in widths(context, 1.0):
+            laws = [QUADRATIC.relative(t.exact, width) for t in self.system.terms]
+            found = BranchIteration(loose, laws, width, check_bounded=True).solve(start)
+            counts.add(found.counts)
+            if found.converged:
+                start = self.system.unknowns(found.u)
+        last = BranchIteration(context, check_bounded=True).solve(start)
+        counts.add(last.counts)
+        return replace(last, method=self.name, counts=counts)
+
+
+def widths(context: SolveContext, first: float) -> Iterator[float]:
+    """Relative widths of the smoothing that a continuation goes through, down to the wanted one.
+
+    Args:
+        context: with the wanted width.
+        first: the widest.
+    """
+    width, thresholds = first, context.system.thresholds
+    while width > max(thresholds.narrowest, context.epsilon or 0.0):
+        yield width
+        width /= 2.0
