@@ -14,7 +14,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..estimate import bubbles, data_errors
-from ..estimate.estimator import Estimate
 from ..mesh import nodes, refinement
 from ..mesh.domain import DEFAULT as MESH
 from ..mesh.domain import Domain
@@ -22,12 +21,11 @@ from ..mesh.refinement import Refinement
 from ..model import Model
 from ..problem.problem import Problem
 from ..runtime.cost import Timer
-from ..runtime.log import newton_step
-from ..runtime.mpi import agree, total
-from ..solvers.method import Progress, never
+from ..runtime.mpi import agree, largest, total
+from ..solvers.method import never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.multigrid import Level, Levels
-from ..typing import Array, Entities
+from ..typing import Entities
 from ..workflow import Preparation, Solution, find_solution, prepare
 
 _ROUNDING = float(np.sqrt(np.finfo(float).eps))
@@ -40,7 +38,6 @@ class ControlThresholds:
 
     Attributes:
         bulk: share of the squared error that one step refines in 2D; its square in 3D, and for errors on Γc.
-        aim: part of the accuracy asked for at which the last step aims.
         smoothing: part of the accuracy asked for that smoothing may take, and the factor on ε in one step.
         failures: meshes in a row without a certified solution after which no equilibrium is expected.
         unresolved: root mean square deviation of a value on the boundary from its linear interpolation, as a part of
@@ -49,7 +46,6 @@ class ControlThresholds:
     """
 
     bulk: float = 0.7
-    aim: float = 0.9
     smoothing: float = 0.3
     failures: int = 3
     unresolved: float = 0.1
@@ -92,49 +88,35 @@ class AdaptiveSolver:
 
     Attributes:
         timer: where time goes.
-        progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
         existence: whether existence is analysed on each mesh, and not on the first only.
     """
 
     timer: Timer
-    progress: Progress = newton_step
     interrupted: Callable[[], bool] = never
     existence: bool = False
 
-    def first_domain(self, scene: Model, comm: MPI.Comm) -> Domain:
-        """The body on the mesh to begin with. Collective.
+    def begin(self, scene: Model, comm: MPI.Comm) -> AdaptiveLevel:
+        """Solve a scene on a coarse mesh, which is refined where the data on the boundary ask for it. Collective.
 
         Args:
-            scene: what to solve.
+            scene: what to solve; its mesh is made coarser as far as its shape allows.
             comm: the ranks.
 
         Raises:
             InputError: the scene does not fit its mesh, on all ranks alike.
         """
+        scene = scene.changed(domain=scene.domain.coarsest())
         with self.timer("mesh"):
-            return coarsest(scene).domain.build_hierarchy(comm, scene.dimension, MESH)
-
-    def begin(self, scene: Model, domain: Domain, thresholds: ControlThresholds = CONTROL) -> AdaptiveLevel:
-        """Solve a scene on a first mesh, which is refined where the data on the boundary ask for it. Collective.
-
-        Args:
-            scene: what to solve.
-            domain: the body on its first mesh.
-            thresholds: what is fine enough, and up to which size the mesh is refined.
-
-        Raises:
-            InputError: the scene does not fit its mesh, on all ranks alike.
-        """
-        comm = domain.mesh.comm
+            domain = scene.domain.build_hierarchy(comm, scene.dimension, MESH)
         prepared = prepare(scene, comm, self.timer, domain)
-        while prepared.system.dofs < thresholds.small:
-            cells = unresolved(prepared.problem, thresholds)
+        while prepared.system.dofs < CONTROL.small:
+            cells = _unresolved(prepared.problem)
             if not comm.allreduce(len(cells)):
                 break
             domain = refinement.marked(prepared.problem.domain, cells).domain
             prepared = prepare(scene, comm, self.timer, domain)
-        found = find_solution(prepared, self.progress, self.interrupted)
+        found = find_solution(prepared, interrupted=self.interrupted)
         return AdaptiveLevel(prepared=prepared, solution=found.estimated(), levels=found.levels, step=None)
 
     def refine(
@@ -152,14 +134,7 @@ class AdaptiveSolver:
         """
         prepared, coarse = self._prepared(level, scene, refined.domain), level.prepared.system
         with self.timer("setup"):
-            found = refined_levels(
-                prepared.task(),
-                prepared.system,
-                coarse,
-                level.levels,
-                refined.transfer,
-            )
-        step, levels = found
+            step, levels = refined_levels(prepared.task(), prepared.system, coarse, level.levels, refined.transfer)
         return self._solved(level, prepared, levels, step, ahead)
 
     def again(self, level: AdaptiveLevel, scene: Model) -> AdaptiveLevel:
@@ -171,7 +146,9 @@ class AdaptiveSolver:
         """
         prepared, before = self._prepared(level, scene, level.prepared.problem.domain), level.prepared.system
         first = [Level(prepared.system, one.system, one.prolongation) for one in level.levels[:1]]
-        return self._solved(level, prepared, (*first, *level.levels[1:]), _identity(before.load))
+        sizes = before.load.getSizes()
+        identity = PETSc.Mat().createConstantDiagonal((sizes, sizes), 1.0, comm=level.comm)
+        return self._solved(level, prepared, (*first, *level.levels[1:]), identity)
 
     def _prepared(self, level: AdaptiveLevel, scene: Model, domain: Domain) -> Preparation:
         known = None if self.existence else level.solution.solvability
@@ -196,13 +173,8 @@ class AdaptiveSolver:
                 levels=levels,
                 way=None if balance is None else balance.way * level.prepared.problem.scales.displacement,
             )
-        finer = find_solution(prepared, self.progress, self.interrupted, start)
+        finer = find_solution(prepared, interrupted=self.interrupted, start=start)
         return AdaptiveLevel(prepared=prepared, solution=finer.estimated(), levels=finer.levels, step=step)
-
-
-def _identity(like: PETSc.Vec) -> PETSc.Mat:
-    sizes = like.getSizes()
-    return PETSc.Mat().createConstantDiagonal((sizes, sizes), 1.0, comm=like.comm)
 
 
 def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
@@ -216,58 +188,31 @@ def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
     with level.prepared.timer("mesh"):
         if estimate is None or bulk >= 1.0 or estimate.discretisation == 0.0:
             return refinement.uniform(domain)
-        return refinement.marked(domain, marked(level.comm, estimate, bulk))
+        # Cells whose error equals the last one's are marked too, which keeps symmetry; alike on all ranks.
+        squares = estimate.cells**2
+        everything = np.sort(np.concatenate(agree(level.comm, squares)))[::-1]
+        running = np.cumsum(everything)
+        last = min(int(np.searchsorted(running, bulk * running[-1])), len(everything) - 1)
+        cells = np.flatnonzero(squares >= everything[last] * (1 - 1e-9)).astype(np.int32)
+        return refinement.marked(domain, cells)
 
 
-def marked(comm: MPI.Comm, estimate: Estimate, bulk: float) -> Entities:
-    """The cells (local, owned) of the largest errors, which together are a part of the squared error. Collective.
-
-    The limit is the same on all ranks; cells whose error equals the last one's are marked too, which keeps symmetry.
-
-    Args:
-        comm: the ranks.
-        estimate: with the error of each cell.
-        bulk: part of the squared error.
-    """
-    squares = estimate.cells**2
-    everything = np.sort(np.concatenate(agree(comm, squares)))[::-1]
-    running = np.cumsum(everything)
-    last = min(int(np.searchsorted(running, bulk * running[-1])), len(everything) - 1)
-    return np.flatnonzero(squares >= everything[last] * (1 - 1e-9)).astype(np.int32)
-
-
-def coarsest(scene: Model) -> Model:
-    """The scene on the mesh to begin with: its own, made coarser as far as its shape allows."""
-    return scene.changed(domain=scene.domain.coarsest())
-
-
-def unresolved(problem: Problem, thresholds: ControlThresholds = CONTROL) -> Entities:
+def _unresolved(problem: Problem) -> Entities:
     """The owned cells at whose facets data vary otherwise than linearly, while on the part they do so. Collective.
 
     What no mesh has seen no estimate is sure of: a gap is first of all known at vertices. A load that jumps at one
     place does so within one facet of any mesh: it is the part as a whole that decides.
-
-    Args:
-        problem: the data and the mesh.
-        thresholds: which deviation is too much.
     """
-    space = bubbles.space(problem.space.mesh, nodes.degree(problem.space))
+    space, comm = bubbles.space(problem.space.mesh, nodes.degree(problem.space)), problem.domain.mesh.comm
     found: list[Entities] = [np.empty(0, dtype=np.int32)]
     for facets, value in data_errors.everything(problem):
         at = data_errors.sample(problem, space, facets)
-        squares, area = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas
-        allowed = _allowed(problem.domain.mesh.comm, at.of(value), thresholds) ** 2
-        whole, deviation = (total(problem.domain.mesh.comm, float(np.sum(x))) for x in (area, area * squares))
-        if deviation > allowed * whole:
+        squares, area, values = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas, at.of(value)
+        low, high = -largest(comm, np.max(-values, initial=-np.inf)), largest(comm, np.max(values, initial=-np.inf))
+        allowed = max(CONTROL.unresolved * (high - low), _ROUNDING * max(abs(low), abs(high))) ** 2
+        if total(comm, float(area @ squares)) > allowed * total(comm, float(np.sum(area))):
             found.append(at.facets.cells[squares > allowed])
     return np.unique(np.concatenate(found)).astype(np.int32)
-
-
-def _allowed(comm: MPI.Comm, values: Array, thresholds: ControlThresholds) -> float:
-    """The root mean square deviation that sampled values of a part may have. Collective."""
-    low = comm.allreduce(float(np.min(values, initial=np.inf)), op=MPI.MIN)
-    high = comm.allreduce(float(np.max(values, initial=-np.inf)), op=MPI.MAX)
-    return max(thresholds.unresolved * (high - low), _ROUNDING * max(abs(low), abs(high)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,191 +5,156 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from ..errors import ExitCode
+from ..estimate.estimator import Estimate
 from ..mesh import nodes
-from ..mesh.domain import Domain
 from ..model import Model
 from ..runtime import cost
 from ..runtime.mpi import largest
 from ..workflow import Solution
 from . import adaptive, quantities
-from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, AdaptiveStep, ControlThresholds
+from .adaptive import CONTROL, AdaptiveLevel, AdaptiveSolver, AdaptiveStep
 from .quantity_base import Quantity
 
 _INTERRUPTED = "interrupted"
 _LARGEST = 2**31 - 1
 """Unknowns that PETSc's default integers can number."""
+_AIM = math.sqrt(1 - CONTROL.smoothing**2)
+"""Part of the accuracy asked for at which a step of the mesh aims: what smoothing's largest part leaves."""
+
+
+class _EndedError(Exception):
+    """A run ends without having reached its goal, for the reason that this says; on all ranks alike."""
 
 
 def solve_to_goal(
-    scene: Model,
-    comm: MPI.Comm,
-    goal: Goal,
-    solver: AdaptiveSolver,
-    report: Callable[[str], None],
-    thresholds: ControlThresholds = CONTROL,
+    scene: Model, comm: MPI.Comm, goal: Goal, solver: AdaptiveSolver, report: Callable[[str], None]
 ) -> AccuracyResult:
     """Refine until the goal is reached, or cannot be. Collective.
 
     Where the scene states no degree it is 2; 1 for a quantity that is compared from mesh to mesh.
 
     Args:
-        scene: what to solve; its mesh sets where to begin (:func:`.adaptive.coarsest`), its ε is the largest.
+        scene: what to solve; its mesh sets where to begin (:meth:`.AdaptiveSolver.begin`), its ε is the largest.
         comm: the ranks.
         goal: what is asked for.
-        solver: timer, progress and interruption.
+        solver: timer and interruption.
         report: called with a line about each mesh.
-        thresholds: how mesh and smoothing follow from the error.
 
     Raises:
         InputError: on all ranks alike: the scene has no such quantity, or does not fit its mesh.
     """
-    degree = scene.solver.degree or (2 if quantities.find(goal.quantity).estimated else 1)
-    run = AdaptiveRun(
-        scene=scene.with_solver(degree=degree), goal=goal, solver=solver, report=report, thresholds=thresholds
+    quantity = quantities.find(goal.quantity)()
+    solver = replace(solver, existence=quantity.needs_existence)
+    degree = scene.solver.degree or (2 if quantity.estimated else 1)
+    run = _Run(comm, ErrorBalance(goal.accuracy, quantity, scene.dimension, degree), solver, report)
+    level, why = run.levels(scene.with_solver(degree=degree))
+    return AccuracyResult(
+        goal=goal,
+        level=level,
+        solution=replace(level.solution, scene=scene),
+        degree=degree,
+        steps=tuple(run.steps),
+        why=why,
+        interrupted=why is not None and solver.interrupted(),
     )
-    found = run.finish(solver.first_domain(scene, comm))
-    return replace(found, solution=replace(found.solution, scene=scene))
 
 
-@dataclass(kw_only=True)
-class AdaptiveRun:
-    """One run to a goal. Everything it decides on is the same on all ranks.
+class _Run:
+    """One run to a goal. Everything it decides on is the same on all ranks."""
 
-    Attributes:
-        scene: what to solve; its ε is the largest.
-        goal: what is asked for.
-        solver: timer, progress and interruption.
-        report: called with a line about each mesh.
-        thresholds: how mesh and smoothing follow from the error.
-        steps: the meshes whose error is known.
-    """
-
-    scene: Model
-    goal: Goal
-    solver: AdaptiveSolver
-    report: Callable[[str], None]
-    thresholds: ControlThresholds = CONTROL
-    steps: list[AdaptiveStep] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.elements = Elements(dimension=self.scene.dimension, degree=self.scene.solver.degree or 1)
-        self.quantity = quantities.find(self.goal.quantity)()
-        self.solver = replace(self.solver, existence=self.quantity.needs_existence)
-        self.balance = ErrorBalance(
-            accuracy=self.goal.accuracy, quantity=self.quantity, elements=self.elements, thresholds=self.thresholds
-        )
-        self._failures = 0
+    def __init__(
+        self, comm: MPI.Comm, balance: ErrorBalance, solver: AdaptiveSolver, report: Callable[[str], None]
+    ) -> None:
+        self.steps: list[AdaptiveStep] = []
+        self._comm, self._balance, self._solver, self._report = comm, balance, solver, report
+        self._room = cost.memory_room(comm) - cost.peak_memory(comm)
+        self._failures, self._start = 0, time.perf_counter()
         self._estimated: AdaptiveLevel | None = None
 
-    def finish(self, domain: Domain) -> AccuracyResult:
-        """Refine the coarsest mesh that sees the data until the goal is reached, or cannot be. Collective.
+    def levels(self, scene: Model) -> tuple[AdaptiveLevel, str | None]:
+        """The last mesh, and why it does not reach the goal; from the coarsest one that sees the data. Collective."""
+        level = self._solver.begin(scene, self._comm)
+        try:
+            self._record(level)
+            while self._failures or not self.steps[-1].error <= self._balance.accuracy:
+                self._start = time.perf_counter()
+                if self._estimated is not None and self._solver.interrupted():
+                    raise _EndedError(_INTERRUPTED)
+                level = self._next(level)
+                self._record(level)
+        except _EndedError as end:
+            if str(end) != _INTERRUPTED or self._estimated is None:
+                return level, str(end)
+            self._report(_INTERRUPTED)
+            return self._estimated, _INTERRUPTED  # the last mesh with an error
+        return level, None
 
-        Args:
-            domain: the body on the first mesh (:meth:`.AdaptiveSolver.first_domain`).
-        """
-        self.comm, start = domain.mesh.comm, time.perf_counter()
-        self.room = cost.memory_room(self.comm) - cost.peak_memory(self.comm)
-        level = self.solver.begin(adaptive.coarsest(self.scene), domain, self.thresholds)
-        why = self._record(level, start)
-        while why is None and not (self._known and self.steps[-1].error <= self.goal.accuracy):
-            start, stopped = time.perf_counter(), self._estimated is not None and self.solver.interrupted()
-            found = _INTERRUPTED if stopped else self._next(level)
-            if isinstance(found, str):
-                why = found
-            elif self._estimated is not None and _is_stopped(found):
-                why = _INTERRUPTED
-            else:
-                level, why = found, self._record(found, start)
-        if why == _INTERRUPTED and self._estimated is not None:  # the last mesh with an error is given
-            level = self._estimated
-            self.report(why)
-        return AccuracyResult(
-            goal=self.goal,
-            level=level,
-            solution=level.solution,
-            degree=self.elements.degree,
-            steps=tuple(self.steps),
-            why=why,
-            interrupted=why is not None and self.solver.interrupted(),
-        )
-
-    @property
-    def _known(self) -> bool:
-        """Whether the last mesh has an error."""
-        return bool(self.steps) and not self._failures
-
-    def _record(self, level: AdaptiveLevel, start: float) -> str | None:
-        """Record a level; why to stop at it, or None. Collective."""
+    def _record(self, level: AdaptiveLevel) -> None:
+        """Record a level. Collective."""
         solution = level.solution
         if solution.solve_result is None or solution.solve_result.interrupted:
-            return solution.reason
-        self.quantity.add(level)
+            stopped = solution.solve_result is not None and self._estimated is not None
+            raise _EndedError(_INTERRUPTED if stopped else solution.reason)
+        self._balance.quantity.add(level)
         if solution.estimate is None and solution.converged:
-            return "the error of a law whose energy of separation depends on the mode is not estimated"
+            raise _EndedError("the error of a law whose energy of separation depends on the mode is not estimated")
         if solution.estimate is None:
             self._failures += 1
-            self.report(f"{level.dofs:,} unknowns: {solution.reason}")
-            return solution.reason if self._failures >= self.thresholds.failures else None
+            self._report(f"{level.dofs:,} unknowns: {solution.reason}")
+            if self._failures >= CONTROL.failures:
+                raise _EndedError(solution.reason)
+            return
         self._failures, self._estimated = 0, level
-        self.steps.append(self._step(level, largest(self.comm, time.perf_counter() - start)))
-        self.report(_line(len(self.steps), self.steps[-1], self.solver.timer.total))
-        return None
+        self.steps.append(self._step(level, solution.estimate))
+        self._report(_line(len(self.steps), self.steps[-1], self._solver.timer.total))
 
-    def _step(self, level: AdaptiveLevel, seconds: float) -> AdaptiveStep:
-        estimate = level.solution.estimate
-        assert estimate is not None
-        norm, smoothing = estimate.energy_norm or 1.0, self.quantity.smoothing()
+    def _step(self, level: AdaptiveLevel, estimate: Estimate) -> AdaptiveStep:
+        norm, quantity = estimate.energy_norm or 1.0, self._balance.quantity
+        smoothing = quantity.smoothing()
         return AdaptiveStep(
             dofs=level.dofs,
-            error=self.quantity.error(),
+            error=quantity.error(),
             discretisation=estimate.discretisation / norm,
             smoothing=smoothing,
             algebraic=estimate.algebraic / norm,
             epsilon=level.solution.epsilon,
             tolerance=level.solution.scene.solver.tolerance,
-            seconds=seconds,
-            memory=cost.peak_memory(self.comm),
+            seconds=largest(self._comm, time.perf_counter() - self._start),
+            memory=cost.peak_memory(self._comm),
         )
 
-    def _next(self, level: AdaptiveLevel) -> AdaptiveLevel | str:
-        """The next level, or why there is none. Collective."""
-        if self._known and math.isfinite(error := self.steps[-1].error):
-            needed = self.elements.needed(level.dofs, error / self.goal.accuracy, self.quantity)
-            if too_many := self._too_many(needed):
-                return too_many
-        scene = level.solution.scene
+    def _next(self, level: AdaptiveLevel) -> AdaptiveLevel:
+        """The next level. Collective."""
+        balance, scene = self._balance, level.solution.scene
+        last = None if self._failures else self.steps[-1]
+        if last is not None and math.isfinite(last.error):
+            self._check_affordable(balance.needed(level.dofs, last.error))
         if self.steps:
-            scene = self.balance.next_scene(scene, self.steps[-1])
-        if self._known and self.balance.mesh_suffices(self.steps):
-            return self.solver.again(level, scene)
-        refined = adaptive.refined(level, self.balance.bulk(self.steps[-1] if self._known else None))
-        unknowns = refined.domain.dimension * nodes.count(refined.domain.mesh, self.elements.degree)
-        return self._too_many(unknowns) or self.solver.refine(level, refined, scene, self.quantity.ahead())
+            scene = balance.next_scene(scene, self.steps[-1])
+        if last is not None and balance.mesh_suffices(self.steps):
+            return self._solver.again(level, scene)
+        refined = adaptive.refined(level, balance.bulk(last))
+        self._check_affordable(refined.domain.dimension * nodes.count(refined.domain.mesh, balance.degree))
+        return self._solver.refine(level, refined, scene, balance.quantity.ahead())
 
-    def _too_many(self, dofs: float) -> str | None:
-        """Why so many unknowns cannot be solved for; None where they can."""
-        needed = self.elements.memory(dofs)
-        if dofs <= _LARGEST and needed <= self.room:
-            return None
+    def _check_affordable(self, dofs: float) -> None:
+        """End where so many unknowns cannot be solved for."""
+        wanted, degree = self._balance.accuracy, self._balance.degree
         if not math.isfinite(dofs):
-            return f"{self.goal.accuracy:g} is beyond any number of unknowns"
-        return (
-            f"{self.goal.accuracy:g} would need {dofs:.1e} unknowns or more and {needed / 1024:.3g} GB; "
-            f"{self.room / 1024:.3g} GB can be used"
-        )
-
-
-def _is_stopped(level: AdaptiveLevel) -> bool:
-    """Whether a solve was stopped by a signal."""
-    result = level.solution.solve_result
-    return result is not None and result.interrupted
+            raise _EndedError(f"{wanted:g} is beyond any number of unknowns")
+        needed = cost.memory_of_all_meshes(dofs, self._balance.dimension, degree)
+        if dofs > _LARGEST or needed > self._room:
+            raise _EndedError(
+                f"{wanted:g} would need {dofs:.1e} unknowns or more and {needed / 1024:.3g} GB; "
+                f"{self._room / 1024:.3g} GB can be used"
+            )
 
 
 def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:
@@ -201,36 +166,7 @@ def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Elements:
-    """What elements are refined.
-
-    Attributes:
-        dimension: d, 2 or 3.
-        degree: p, 1 or 2.
-    """
-
-    dimension: int
-    degree: int = 1
-
-    def memory(self, dofs: float) -> float:
-        """What so many unknowns take, about, on meshes refined where the error is, MB."""
-        return cost.memory_of_all_meshes(dofs, self.dimension, self.degree)
-
-    def needed(self, dofs: int, times: float, quantity: Quantity) -> float:
-        """The unknowns that an error so many times smaller takes, at the best rate of convergence.
-
-        Args:
-            dofs: unknowns now.
-            times: the error now over the one wanted.
-            quantity: whose error it is.
-        """
-        rate = quantity.power_of_energy * self.degree / self.dimension
-        with np.errstate(over="ignore"):
-            return float(dofs * np.maximum(1.0, np.float64(times)) ** (1.0 / rate))
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ErrorBalance:
     """The balance between the three parts of the error.
 
@@ -239,14 +175,25 @@ class ErrorBalance:
     Attributes:
         accuracy: what is asked for, relative.
         quantity: the target quantity.
-        elements: that are refined.
-        thresholds: how the parts are balanced.
+        dimension: d, 2 or 3.
+        degree: of the elements that are refined, p, 1 or 2.
     """
 
     accuracy: float
     quantity: Quantity
-    elements: Elements
-    thresholds: ControlThresholds = CONTROL
+    dimension: int
+    degree: int
+
+    def needed(self, dofs: int, error: float) -> float:
+        """The unknowns that the accuracy takes, at the best rate of convergence.
+
+        Args:
+            dofs: unknowns now.
+            error: with these.
+        """
+        rate = self.quantity.power_of_energy * self.degree / self.dimension
+        with np.errstate(over="ignore"):
+            return float(dofs * np.maximum(1.0, np.float64(error) / self.accuracy) ** (1.0 / rate))
 
     def bulk(self, last: AdaptiveStep | None) -> float:
         """Part of the squared error to refine: no more than the aim needs.
@@ -257,18 +204,18 @@ class ErrorBalance:
             last: the last step; None where no error is known.
         """
         on_contact = self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm
-        most = self.thresholds.bulk ** (1 if self.elements.dimension == 2 and not on_contact else 2)
+        most = CONTROL.bulk ** (1 if self.dimension == 2 and not on_contact else 2)
         mesh, smoothing, _ = (0.0, 0.0, 0.0) if last is None else self.quantity.parts(last)
         if not self.quantity.known_from_one_mesh or mesh <= 0.0:
             return most
         left = self._beside(smoothing) / mesh
         # Halving the edges of marked cells leaves 4^-p of it.
-        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.elements.degree)
+        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.degree)
         return min(needed, most) if needed > 0.0 else most
 
     def _beside(self, part: float) -> float:
         """The largest error beside a part with which both together are no larger than the aim."""
-        return math.sqrt(max((self.thresholds.aim * self.accuracy) ** 2 - part**2, 0.0))
+        return math.sqrt(max((_AIM * self.accuracy) ** 2 - part**2, 0.0))
 
     def mesh_suffices(self, steps: Sequence[AdaptiveStep]) -> bool:
         """Whether the next step must change ε or the tolerance, and not the mesh.
@@ -279,7 +226,7 @@ class ErrorBalance:
         mesh, smoothing, algebraic = self.quantity.parts(steps[-1])
         if smoothing > max(mesh, self._allowed_smoothing(mesh)):
             return self._smoothing_falls(steps)
-        wanted = self.thresholds.aim * self.accuracy
+        wanted = _AIM * self.accuracy
         return mesh <= wanted < max(smoothing, algebraic) * 2
 
     @staticmethod
@@ -290,7 +237,7 @@ class ErrorBalance:
 
     def _allowed_smoothing(self, mesh: float) -> float:
         """The error that smoothing may cause: a part of the accuracy, or all that a fine enough mesh leaves."""
-        return max(self.thresholds.smoothing * self.accuracy, self._beside(mesh))
+        return max(CONTROL.smoothing * self.accuracy, self._beside(mesh))
 
     def next_scene(self, scene: Model, last: AdaptiveStep) -> Model:
         """The scene with the ε and the tolerance of the next step.
@@ -303,7 +250,7 @@ class ErrorBalance:
         solver, values = scene.solver, dict[str, float]()
         if smoothing > self._allowed_smoothing(mesh):
             widths = {name: getattr(solver, name) for name in ("epsilon", "epsilon_absolute")}
-            values = {name: self.thresholds.smoothing * width for name, width in widths.items() if width is not None}
+            values = {name: CONTROL.smoothing * width for name, width in widths.items() if width is not None}
         if 10 * last.algebraic > max(last.discretisation, self.accuracy):
             values["tolerance"] = solver.tolerance / 10
         return scene.with_solver(**values)

@@ -140,7 +140,7 @@ def l_shape() -> Model:
 def slope(bulk: float, most: int, degree: int = 1) -> float:
     """Observed order in unknowns of the estimated error, over the last factor of about ten."""
     scene, solver, points = l_shape().with_solver(degree=degree), AdaptiveSolver(timer=Timer()), []
-    level = solver.begin(scene, solver.first_domain(scene, COMM))
+    level = solver.begin(scene, COMM)
     while level.dofs < most:
         level = solver.refine(level, adaptive.refined(level, bulk), level.solution.scene)
         points.append((level.dofs, level.solution.estimate.relative))  # type: ignore[union-attr]
