@@ -23,7 +23,7 @@ from ..system import existence
 from ..system.system import System, assemble
 from ..system.thresholds import DEFAULT, Thresholds
 
-_LOG = logger("preparation")
+_PREPARED = logger("preparation")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ def prepare(
     with timer("existence"):
         solvability = solvability or existence.solvability(system.problem, system.forces)
     margin = "" if solvability.margin is None else f", margin {solvability.margin:.3g}"
-    _LOG.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
+    _PREPARED.info("%d unknowns; existence: %s%s", system.dofs, solvability.state, margin)
     with timer("assembly"):
         system.attach_free_motions(solvability.loose)
         warnings = _warnings(scene, system, solvability)
@@ -142,5 +142,5 @@ def _warnings(scene: Model, system: System, solvability: Solvability) -> tuple[s
         *plausibility.before_solving(system.problem, system.forces),
         *plausibility.of_existence(solvability),
     )
-    warn(_LOG, found)
+    warn(_PREPARED, found)
     return found

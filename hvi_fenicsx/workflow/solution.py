@@ -60,13 +60,7 @@ class PressedObstacle:
 
     def summary(self) -> dict[str, object]:
         """The entry ``obstacle`` of ``summary.json``."""
-        return {
-            "part": self.part,
-            "displacement": self.displacement.tolist(),
-            "force": self.force.tolist(),
-            "borne": self.borne,
-            "difference": self.difference,
-        }
+        return vars(self) | {"displacement": self.displacement.tolist(), "force": self.force.tolist()}
 
 
 @dataclass(frozen=True, kw_only=True)

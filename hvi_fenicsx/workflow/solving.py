@@ -33,8 +33,6 @@ _LOG = logger("workflow")
 def solve(
     scene: Model,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    *,
-    progress: Progress = newton_step,
     timer: Timer | None = None,
     thresholds: Thresholds = DEFAULT,
 ) -> Solution:
@@ -43,22 +41,17 @@ def solve(
     Args:
         scene: what to solve.
         comm: the ranks.
-        progress: called at each Newton step; by default it is logged.
         timer: where time goes; by default a new one.
         thresholds: the numbers that tune the solvers.
 
     Raises:
         InputError: the scene does not fit its mesh, on all ranks alike.
     """
-    found = find_solution(prepare(scene, comm, timer, thresholds=thresholds), progress)
-    solution = found.estimated()
-    found.free()
-    return solution
+    return finish(prepare(scene, comm, timer, thresholds=thresholds))
 
 
 def finish(
     prepared: Preparation,
-    progress: Progress = newton_step,
     interrupted: Callable[[], bool] = never,
     start: fem.Function | None = None,
     *,
@@ -68,12 +61,11 @@ def finish(
 
     Args:
         prepared: the scene.
-        progress: called at each Newton step; by default it is logged.
         interrupted: whether to stop (collective, asked at each Newton step).
         start: a displacement on the same mesh to begin at, m.
         estimating: whether to estimate the error, which takes about as long as the solve.
     """
-    found = find_solution(prepared, progress, interrupted, start)
+    found = find_solution(prepared, interrupted=interrupted, start=start)
     solution = found.estimated() if estimating else found.solution
     found.free_levels()
     return solution
@@ -139,10 +131,11 @@ def find_solution(
         return FoundSolution(prepared=prepared, solution=unsolved(prepared), levels=())
     with prepared.timer("solve"):
         solved, balance = _solved(prepared, prepared.task(progress, interrupted), start)
-    prepared = replace(prepared, system=solved.system)
-    result = solved.result
+    prepared, result, only = replace(prepared, system=solved.system), solved.result, None
     examination, warnings = _examined(prepared, result)
-    only = _uniqueness(prepared, result, examination)
+    if examination.certificate.passed:
+        with prepared.timer("certificate"):
+            only = uniqueness(prepared.system, result.u, examination)
     found = _solution(prepared, result, examination, prepared.warnings + warnings, only, balance)
     return FoundSolution(prepared=prepared, solution=found, levels=solved.levels)
 
@@ -158,21 +151,15 @@ def certified(prepared: Preparation, found: SolveResult) -> Solution:
     return _solution(prepared, found, examination, prepared.warnings + warnings)
 
 
-def _uniqueness(prepared: Preparation, found: SolveResult, examination: Examination) -> Uniqueness | None:
-    """What is known about other equilibria; None where nothing was certified. Collective."""
-    if not examination.certificate.passed:
-        return None
-    with prepared.timer("certificate"):
-        return uniqueness(prepared.system, found.u, examination)
-
-
 def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, tuple[str, ...]]:
     """The certificate of a result, and warnings about the solution. Collective."""
     with prepared.timer("certificate"):
         examination = examine(prepared, found.u)
         warnings = plausibility.of_solution(prepared.problem, examination, found.u)
     warn(_LOG, warnings)
-    _log_certificate(examination.certificate)
+    proof = examination.certificate
+    verdict = "passed" if proof.passed else "not passed"
+    _LOG.info("certificate %s (%g): %s", verdict, proof.tolerance, found_certificate)
     return examination, warnings
 
 
@@ -219,13 +206,6 @@ def _solution(
         warnings=warnings,
         balance=balance,
     )
-
-
-def _log_certificate(found: certificate.Certificate) -> None:
-    names = ("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion")
-    parts = ", ".join(f"{name} {getattr(found, name):.1e}" for name in names)
-    verdict = "passed" if found.passed else "not passed"
-    _LOG.info("certificate %s (%g): %s; %s", verdict, found.tolerance, parts, found.second_order)
 
 
 def _solved(
