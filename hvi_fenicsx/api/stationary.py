@@ -19,7 +19,7 @@ from .solving import check, fields_of
 _LOG = log.logger("api")
 
 
-class _Asked(Table):
+class _Search(Table):
     lowest: bool
     gap: Annotated[float, Field(gt=0, lt=1)]
     limit: Positive | None
@@ -77,7 +77,7 @@ def equilibria(
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
     """
-    _Asked.made({"lowest": lowest, "gap": gap, "limit": limit})
+    _Search.made({"lowest": lowest, "gap": gap, "limit": limit})
     prepared = check(model, comm, **options)
     searched = bodies.Equilibria(prepared)
     stop = time_over(prepared.system.comm, limit)
