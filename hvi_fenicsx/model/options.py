@@ -15,7 +15,7 @@ LinearSolver = Literal["auto", "lu", "gamg"]
 _STARTS = ("unbroken", "resting", "broken")
 
 
-def _start(value: Any) -> Any:
+def _start_value(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return tuple(map(as_value, value))
     if value not in _STARTS:
@@ -27,7 +27,7 @@ def _start(value: Any) -> Any:
 
 Start = Annotated[
     Any,
-    BeforeValidator(_start),
+    BeforeValidator(_start_value),
     PlainSerializer(lambda start: start if isinstance(start, str) else [f.source for f in start]),
 ]
 """The name of a start, or a displacement by component."""
