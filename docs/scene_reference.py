@@ -18,7 +18,7 @@ from hvi_fenicsx.effects import Effect, Place
 from hvi_fenicsx.formula import FUNCTIONS, Formula
 from hvi_fenicsx.laws.base import registered
 from hvi_fenicsx.mesh.shapes import DomainShape, PlacedShape
-from hvi_fenicsx.model.options import PathTable, SolverTable
+from hvi_fenicsx.model.content import PathTable, SolverTable
 from hvi_fenicsx.model.reader import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, TopLevel
 from hvi_fenicsx.schema import OneOf, descriptions
 

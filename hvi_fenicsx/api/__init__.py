@@ -2,6 +2,4 @@
 
 from .following import ModelPath, follow
 from .solution import ModelSolution as Solution
-from .solving import check, solve
-from .stationary import ModelEquilibria, equilibria
-from .studying import study
+from .solving import ModelEquilibria, check, equilibria, solve, study

@@ -1,24 +1,36 @@
-"""Solve and check models from Python."""
+"""Models are solved, checked, searched for equilibria and studied from Python."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Annotated, Any
 
+import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
+from pydantic import Field
 
 from .. import console, workflow
+from ..equilibrium_search import bodies
 from ..errors import InputError
 from ..load_paths import last_borne
 from ..mesh.domain import Domain
+from ..mesh.shapes import OnlyMesh
 from ..model import Model, is_portable
 from ..paths.load_path import LoadPath
 from ..problem import spaces
+from ..results.output_folder import existing
+from ..runtime import log
 from ..runtime.log import newton_step
-from ..schema import Table
+from ..runtime.mpi import time_over
+from ..schema import Positive, Table, require_path
 from ..solvers.method import Progress
+from ..study import plan as study_plan
+from ..study.conduct import conduct
+from ..study.table import Study
 from ..system import petsc_options
 from ..system.thresholds import DEFAULT, Thresholds
 from ..workflow import Preparation, Solution
@@ -153,3 +165,142 @@ def _domain(model: Model) -> Domain:
     """
     domain = model.body.domain
     return domain if is_portable(model) else replace(domain, coarsening=None, shared=None, bends=False)
+
+
+_LOG = log.logger("api")
+
+
+class _Search(Table):
+    lowest: bool
+    gap: Annotated[float, Field(gt=0, lt=1)]
+    limit: Positive | None
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ModelEquilibria:
+    """What :func:`equilibria` found; the same on all ranks, not collective.
+
+    Attributes:
+        solutions: by energy, each certified; their kind is in ``kinds``.
+        kinds: minimiser, saddle or undecided.
+        complete: whether these are all equilibria.
+        lower_bound: no displacement has a lower energy, J/m or J; None where no bound is known.
+        gap: lowest energy minus bound, relative to the energy; None where no bound is known.
+        proven: whether what was asked for is proven.
+        nodes: boxes that were bounded or tested.
+        reason: how the search ended, for people.
+    """
+
+    solutions: tuple[ModelSolution, ...]
+    kinds: tuple[str, ...]
+    complete: bool
+    lower_bound: float | None
+    gap: float | None
+    proven: bool
+    nodes: int
+    reason: str
+
+    def __repr__(self) -> str:
+        found = [f"{kind}: energy {one.energy:.10g}" for one, kind in zip(self.solutions, self.kinds, strict=True)]
+        return "\n".join([self.reason, *found])
+
+
+def equilibria(
+    model: Model,
+    comm: MPI.Comm | None = None,
+    *,
+    lowest: bool = False,
+    gap: float = 1e-8,
+    limit: float | None = None,
+    **options: Any,
+) -> ModelEquilibria:
+    """All equilibria of a model, or the lowest with a proof; at level DEBUG progress is logged. Collective.
+
+    Args:
+        model: what to search; that all equilibria were found can be proven where the tractions of its laws are
+            polylines of one component each.
+        comm: the ranks, if the model is a scene file; by default all. A body from Python has its own.
+        lowest: the lowest energy with a proof, instead of all equilibria.
+        gap: what that proof may leave open, relative to the energy.
+        limit: seconds after which the search stops; None: none.
+        **options: the keys of the scene's table ``[solver]``.
+
+    Raises:
+        InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
+    """
+    _Search.made({"lowest": lowest, "gap": gap, "limit": limit})
+    prepared = check(model, comm, **options)
+    searched = bodies.Equilibria(prepared)
+    stop = time_over(prepared.system.comm, limit)
+    found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
+    solutions = tuple(ModelSolution(**fields_of(searched.solution(point))) for point in found.points)
+    searched.free()
+    prepared.system.free()
+    return ModelEquilibria(
+        solutions=solutions,
+        kinds=tuple(str(point.kind) for point in found.points),
+        complete=found.complete,
+        lower_bound=None if found.lower_bound is None else found.lower_bound * prepared.problem.scales.energy,
+        gap=found.gap,
+        proven=found.proven,
+        nodes=found.nodes,
+        reason=found.reason,
+    )
+
+
+def study(
+    model: Model,
+    folder: str | os.PathLike[str] | None = None,
+    comm: MPI.Comm | None = None,
+    *,
+    repeats: int = 3,
+    force: bool = False,
+    **axes: Sequence[Any],
+) -> Study:
+    """Solve a model along several axes, and compare each solution with a reference. Collective.
+
+    The points are solved in this program, one after the other.
+
+    Args:
+        model: what to study.
+        folder: where tables, pictures and page go, as by ``hvi study``; None: nowhere.
+        comm: the ranks, if the model is a scene file; by default all. A body from Python has its own.
+        repeats: of each point at most, for the median of its time; 1 or more.
+        force: whether a study that is in the folder already is replaced.
+        **axes: values by axis, such as ``epsilon=["exact", 0.1]``, ``mesh=[0, 1, 2]``, ``tolerance``, ``method``,
+            ``smoothing``, ``linear_solver``, ``degree``, ``accuracy``; all combinations are run. Without axes: those of
+            the default plan. ``mesh`` counts refinements of a mesh that you bring, and cells along the first side of a
+            block.
+
+    Raises:
+        InputError: on all ranks alike: there is no such axis or value, the model has not this axis, or ``repeats`` is
+            no number of solves.
+        NoReferenceError: on all ranks alike: no solution exists, or the reference is not certified.
+    """
+    if folder is not None:
+        require_path("folder", folder)
+    ranks = ranks_of(model, comm)
+    if isinstance(repeats, bool) or not isinstance(repeats, int | np.integer) or repeats < 1:
+        raise InputError(f"study: repeats must be a whole number, 1 or more (is {repeats!r})")
+    plan = study_plan.make(_on_its_mesh(model), [_axis(name, values) for name, values in axes.items()])
+    found, _ = conduct(
+        plan, ranks, None if folder is None else Path(folder), repeats=repeats, existing=existing(force=force)
+    )
+    return found
+
+
+def _axis(name: str, values: Any) -> tuple[str, tuple[str, ...]]:
+    if isinstance(values, str) or not isinstance(values, Sequence):
+        raise InputError(f"study: {name} is {values!r}; give a list of values")
+    return study_plan.read_axis(f"{name}={','.join(map(str, values))}")
+
+
+def _on_its_mesh(model: Model) -> Model:
+    """The model; on its own mesh alone, where it has data on that."""
+    portable = is_portable(model)
+    values = (value for effect in model.effects for value in effect.spatial_values())
+    if model.from_file or (portable and all(value.everywhere for value in values)):
+        return model
+    domain = replace(model.body.domain, shared=None)
+    only = domain if portable else replace(domain, coarsening=None, bends=False)
+    return model.changed(domain=OnlyMesh(shape="given mesh", given=only))

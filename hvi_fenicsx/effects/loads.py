@@ -16,6 +16,8 @@ from ..schema import Finite, refusal
 from ..typing import Array
 from .base import (
     BodySizes,
+    Condition,
+    Contribution,
     Drive,
     Evaluate,
     FormContext,
@@ -25,7 +27,6 @@ from .base import (
     SurfaceLoad,
     from_python,
 )
-from .contribution import Condition, Contribution
 from .elasticity import Elasticity, strain, voigt
 from .values import FormulaField, Listed, OneValue, Value, Vector, as_value
 

@@ -16,10 +16,9 @@ from ..errors import InputError
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.shapes import DomainShape
 from ..schema import Mistake, unknown
-from . import consistency
+from . import content
 from .body import Body
-from .content import TABLES, WHOLE, Content, dotted
-from .options import PathTable, SolverTable
+from .content import TABLES, WHOLE, Content, PathTable, SolverTable, dotted
 
 if TYPE_CHECKING:
     from ..problem.compose import Formulation
@@ -79,7 +78,7 @@ class Model(Content):
         self.parts = {**parts, **{name: BoundaryPart((one.first,)) for name, one in self.body.interfaces.items()}}
         order = list(TABLES)
         self.effects = tuple(sorted(effects, key=lambda e: order.index(self.table(e))))
-        if mistakes := consistency.contradictions(self):
+        if mistakes := content.contradictions(self):
             raise Mistakes(mistakes)
 
     def _placed(self, effect: Effect) -> Effect:

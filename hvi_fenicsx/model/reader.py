@@ -40,9 +40,8 @@ from ..schema import (
 )
 from . import plugins
 from .body import Body
-from .content import WHOLE
+from .content import WHOLE, PathTable, SolverTable
 from .model import Mistakes, Model
-from .options import PathTable, SolverTable
 
 DEFAULT_ELASTICITY = "isotropic"
 

@@ -20,7 +20,7 @@ from ..effects import Direction
 from ..errors import SolverError
 from ..formula import Formula
 from ..laws import Superpotential
-from ..model.options import Start
+from ..model.content import Start
 from ..problem.law_term import LawTerm
 from ..system.equations import Cells
 from ..system.system import System

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from ..class_registry import enter, hint, load_modules
 from ..errors import InputError
-from ..model.options import SolverTable
+from ..model.content import SolverTable
 from ..problem.compose import Formulation
 from ..rigid import Solvability
 from ..runtime.cost import Timer

@@ -18,7 +18,7 @@ from ..mesh import nodes
 from ..mesh.domain import DEFAULT as MESH
 from ..mesh.domain import Domain, check_affordable
 from ..model import Model
-from ..model.options import SolverTable
+from ..model.content import SolverTable
 from ..problem.compose import Formulation
 from ..problem.problem import Problem
 from ..rigid import LoadFactors, Solvability
