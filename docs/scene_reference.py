@@ -20,7 +20,7 @@ from hvi_fenicsx.laws.base import registered
 from hvi_fenicsx.mesh.shapes import DomainShape, PlacedShape
 from hvi_fenicsx.model.content import PathTable, SolverTable
 from hvi_fenicsx.model.reader import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, TopLevel
-from hvi_fenicsx.schema import OneOf, descriptions
+from hvi_fenicsx.schema import OneOf
 
 T = TypeVar("T")
 
@@ -86,7 +86,7 @@ def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None
 def _effects(place: Place, title: str) -> Iterator[str]:
     for key, kind in _provided(Effect.registry[place]).items():
         yield from (f"### {title.format(key=key)}", "", f"{_summary(kind)} Adds `{kind.term}`.", "")
-        fields = descriptions(kind)
+        fields = [name for name, field in kind.model_fields.items() if field.description]
         if fields:
             yield from ("| key | value | default |", "|---|---|---|")
             yield from (_row(kind, name) for name in fields)
@@ -107,7 +107,8 @@ def _parameter(parameter: inspect.Parameter) -> str:
 
 
 def _row(model: type[BaseModel], name: str) -> str:
-    field, text = model.model_fields[name], descriptions(model).get(name, "")
+    field = model.model_fields[name]
+    text = field.description or ""
     value = ", ".join(filter(None, [_escaped(text), _limits(field), _choices(field)]))
     required = field.is_required() or (name == "shape" and issubclass(model, DomainShape))  # its name tells the kind
     default = "required" if required else _toml(field.get_default(call_default_factory=True))

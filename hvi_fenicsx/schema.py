@@ -5,14 +5,9 @@ Light: it loads pydantic and nothing heavier, and knows no particular table.
 
 from __future__ import annotations
 
-import ast
-import functools
-import inspect
-import itertools
 import json
 import os
 import re
-import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,37 +30,6 @@ from pydantic_core import CoreSchema, ErrorDetails, InitErrorDetails, PydanticCu
 
 from .class_registry import closest
 from .errors import InputError
-
-
-@functools.cache
-def descriptions(table: type[BaseModel]) -> Mapping[str, str]:
-    """The text of each field that has one, by name; of a field that is declared anew, the new one.
-
-    Args:
-        table: whose fields.
-    """
-    found: dict[str, str] = {}
-    for kind in reversed(table.__mro__):
-        if issubclass(kind, BaseModel):
-            anew = inspect.get_annotations(kind)
-            found = {name: text for name, text in found.items() if name not in anew} | _texts(kind)
-    return {name: found[name] for name in table.model_fields if name in found}
-
-
-def _texts(kind: type[BaseModel]) -> dict[str, str]:
-    """The texts below a class's own fields; none where its source is not at hand."""
-    try:
-        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    except (OSError, TypeError, SyntaxError, ValueError):
-        return {}
-    assert isinstance(definition, ast.ClassDef)
-    found = {}
-    for field, below in itertools.pairwise(definition.body):
-        match field, below:
-            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
-                found[name] = inspect.cleandoc(text)
-    return found
-
 
 Keys = tuple[str | int, ...]
 """A place: the keys from the outermost table down to it; the entries of a list have numbers."""
@@ -132,8 +96,8 @@ def _message(error: ErrorDetails, table: type[Table]) -> str:
     """What is allowed and what is there, without pydantic's own terms."""
     kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
     if kind == "missing":
-        known = descriptions(table).get(str(error["loc"][-1]))
-        return "is missing" + (f": {known}" if known else "")
+        field = table.model_fields.get(str(error["loc"][-1]))
+        return "is missing" + (f": {field.description}" if field and field.description else "")
     if kind == "extra_forbidden":
         return unknown("key", str(error["loc"][-1]), table.allowed_keys())
     if kind == "literal_error":
@@ -226,7 +190,7 @@ def mistakes_of(error: ValidationError, table: type[Table]) -> list[Mistake]:
 class Table(BaseModel):
     """A table of the scene file: frozen, no unknown keys, no silent conversions."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
     @model_validator(mode="wrap")
     @classmethod

@@ -21,7 +21,6 @@ from ..mesh import nodes
 from ..problem.spaces import displacement_space
 from ..rigid import RigidBody, rigid_fields
 from ..runtime import forms
-from ..runtime.mpi import agree
 from ..typing import Array
 
 Form = Callable[[Any, Any], Any]
@@ -54,8 +53,7 @@ class Energy(Effect):
         space = displacement_space(mesh)
         matrix = _assembled(self.form, space)
         _check_symmetry(matrix)
-        stiffness = _stretch_stiffness(matrix, space)
-        _check_rigid_motions(matrix, space, stiffness)
+        stiffness = _stiffness(matrix, space)
         matrix.destroy()
         return self.model_copy(update={"modulus": stiffness})
 
@@ -108,42 +106,32 @@ def _check_symmetry(matrix: PETSc.Mat) -> None:
         )
 
 
+def _stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:
+    """The largest energy of a unit stretch over the volume, N/m², where no rigid motion costs any. Collective."""
+    comm, d = space.mesh.comm, space.mesh.geometry.dim
+    points = nodes.points(space)[: space.dofmap.index_map.size_local]
+    one = fem.Constant(space.mesh, PETSc.ScalarType(1.0))
+    volume = comm.allreduce(fem.assemble_scalar(forms.compiled(one * ufl.dx)))
+    stretches = [_energy(matrix, points[:, i : i + 1] * np.eye(d)[i]) / volume for i in range(d)]
+    if not min(stretches) > 0.0:
+        axis = "xyz"[int(np.argmin(stretches))]
+        raise InputError(f"a stretch along {axis} costs no energy (a(v, v) = {min(stretches):.3g}); it must")
+    away = (points - comm.allreduce(points.sum(axis=0)) / comm.allreduce(len(points))) / volume ** (1.0 / d)
+    motions = rigid_fields(away, RigidBody(dimension=d, centre=np.zeros(3)))
+    names = [f"the translation along {axis}" for axis in "xyz"[:d]]
+    names += ["the rotation"] if d == 2 else [f"the rotation about {axis}" for axis in "xyz"]
+    for number, name in enumerate(names):
+        if abs(_energy(matrix, motions[:, number])) > ROUNDING * max(stretches) * volume ** (1.0 - 2.0 / d):
+            raise InputError(
+                f"{name} costs energy, as a rigid motion of an elastic body must not; write the form in the "
+                "strain sym(grad(u)), and what holds the body as a Displacement, Contact or Support"
+            )
+    return float(max(stretches))
+
+
 def _energy(matrix: PETSc.Mat, field: Array) -> float:
     """a(v, v) of a field at the owned vertices, (n, d). Collective."""
     x, y = matrix.createVecs()
     x.array[:] = field.ravel()
     matrix.mult(x, y)
     return float(x.dot(y))
-
-
-def _owned_points(space: fem.FunctionSpace) -> Array:
-    return nodes.points(space)[: space.dofmap.index_map.size_local]
-
-
-def _stretch_stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:
-    """The largest energy of a unit stretch along an axis, over the volume, N/m². Collective."""
-    points, d = _owned_points(space), space.mesh.geometry.dim
-    volume = space.mesh.comm.allreduce(
-        fem.assemble_scalar(forms.compiled(fem.Constant(space.mesh, PETSc.ScalarType(1.0)) * ufl.dx))
-    )
-    energies = [_energy(matrix, points[:, i : i + 1] * np.eye(d)[i]) / volume for i in range(d)]
-    if not min(energies) > 0.0:
-        axis = "xyz"[int(np.argmin(energies))]
-        raise InputError(f"a stretch along {axis} costs no energy (a(v, v) = {min(energies):.3g}); it must")
-    return float(max(energies))
-
-
-def _check_rigid_motions(matrix: PETSc.Mat, space: fem.FunctionSpace, stiffness: float) -> None:
-    points, d = _owned_points(space), space.mesh.geometry.dim
-    corners = agree(space.mesh.comm, (points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)))
-    low, high = np.min([c[0] for c in corners], axis=0), np.max([c[1] for c in corners], axis=0)
-    length = float(np.max(high - low))
-    fields = rigid_fields((points - (low + high) / 2) / length, RigidBody(dimension=d, centre=np.zeros(3)))
-    names = [f"the translation along {axis}" for axis in "xyz"[:d]]
-    names += ["the rotation"] if d == 2 else [f"the rotation about {axis}" for axis in "xyz"]
-    for number, name in enumerate(names):
-        if abs(_energy(matrix, fields[:, number])) > ROUNDING * stiffness * length ** (d - 2):
-            raise InputError(
-                f"{name} costs energy, as a rigid motion of an elastic body must not; write the form in the "
-                "strain sym(grad(u)), and what holds the body as a Displacement, Contact or Support"
-            )
