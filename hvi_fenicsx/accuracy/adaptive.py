@@ -206,7 +206,7 @@ def _unresolved(problem: Problem) -> Entities:
     space, comm = bubbles.space(problem.space.mesh, nodes.degree(problem.space)), problem.domain.mesh.comm
     found: list[Entities] = [np.empty(0, dtype=np.int32)]
     for facets, value in data_errors.everything(problem):
-        at = data_errors.sample(problem, space, facets)
+        at = data_errors.facet_modes(problem, space, facets)
         squares, area, values = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas, at.of(value)
         low, high = -largest(comm, np.max(-values, initial=-np.inf)), largest(comm, np.max(values, initial=-np.inf))
         allowed = max(CONTROL.unresolved * (high - low), _ROUNDING * max(abs(low), abs(high))) ** 2

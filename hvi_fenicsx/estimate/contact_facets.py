@@ -85,6 +85,7 @@ class ContactFacets:
         bubbles: the blocks of their bubbles, (f, k).
         areas: over L^(d-1), (f,).
         cells: the cells, (f,).
+        local: the facets themselves, (f,).
     """
 
     degree: int
@@ -92,6 +93,7 @@ class ContactFacets:
     bubbles: Entities
     areas: Array
     cells: Entities
+    local: Entities
 
     @property
     def dimension(self) -> int:
@@ -124,7 +126,7 @@ def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) 
     table = np.array(_numbers_in_cell(degree, topology.cell_name()), dtype=np.int32)
     found = np.take_along_axis(space.dofmap.list[cells], table[number], axis=1)
     points = np.asarray(problem.points[on[:, :d]] / problem.scales.length)
-    return ContactFacets(degree, on, found, facets.areas(points), cells)
+    return ContactFacets(degree, on, found, facets.areas(points), cells, local)
 
 
 def _numbers_in_cell(degree: int, cell: str) -> list[list[int]]:

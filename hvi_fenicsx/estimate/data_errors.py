@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,9 @@ from mpi4py import MPI
 from ..certify.contact_state import ContactState
 from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..formula import SpatialValue
+from ..mesh.boundary_part import Inequalities
 from ..problem import spaces
+from ..problem.contact_surface import Surface
 from ..problem.elastic_operator import stiffness_tensor
 from ..problem.problem import Bounds, PrescribedComponent, Problem
 from ..problem.thresholds import DEFAULT as composition
@@ -69,58 +71,55 @@ def everything(problem: Problem) -> Iterator[tuple[Entities, SpatialValue]]:
 
 
 @dataclass(frozen=True)
-class FacetSamples:
-    """Sample points (q of them) within facets (f).
+class FacetModes:
+    """Legendre modes (m of them) on facets (f), at q sample points in each.
 
     Attributes:
         facets: whose cells this rank owns.
         nodes: their nodes, corners first, m, (f, n, 3).
         barycentric: the sample points in barycentric coordinates, (q, d).
         weights: of the points; their sum is 1, (q,).
+        values: of the modes at the points, orthonormal under the weights, (m, q).
+        degrees: of the modes, (m,).
+        compliance: nondimensional displacement by traction of the wave of one half-length, along each axis, (f, d).
     """
 
     facets: ContactFacets
     nodes: Array
     barycentric: Array
     weights: Array
+    values: Array
+    degrees: Array
+    compliance: Array
 
     @property
-    def corners(self) -> Array:
-        """The vertices, m, (f, d, 3)."""
-        return self.nodes[:, : self.facets.dimension]
+    def areas(self) -> Array:
+        """What the sample points stand for, over L^(d-1), (f, q)."""
+        return np.asarray(self.facets.areas[:, None] * self.weights)
 
     def interpolated(self, at_nodes: Array, at: Array | None = None) -> Array:
-        """Values at the nodes, interpolated at points, (f, q).
+        """Values at the nodes (f, n, ...), interpolated at points, on the curve where a facet is curved, (f, q, ...).
 
         Args:
-            at_nodes: the values, (f, n).
+            at_nodes: the values.
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
-        points = self.barycentric if at is None else at
-        return np.asarray(at_nodes @ spaces.simplex_functions(self.facets.degree, points).T)
+        functions = spaces.simplex_functions(self.facets.degree, self.barycentric if at is None else at)
+        return np.asarray(np.einsum("qn,fn...->fq...", functions, at_nodes))
 
-    def of(self, value: SpatialValue, at: Array | None = None) -> Array:
-        """A value at points, SI, (f, q).
+    @functools.cached_property
+    def points(self) -> Array:
+        """The sample points, m, (f, q, 3)."""
+        return self.interpolated(self.nodes)
+
+    def of(self, value: SpatialValue | Inequalities, at: Array | None = None) -> Array:
+        """A value, or where inequalities hold, at points, SI, (f, q).
 
         Args:
             value: on the boundary.
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
-        points = self.points if at is None else self.places(at)
-        return value.at(points.reshape(-1, 3)).reshape(points.shape[:2])
-
-    @functools.cached_property
-    def points(self) -> Array:
-        """The sample points, m, (f, q, 3)."""
-        return self.places(self.barycentric)
-
-    def places(self, at: Array) -> Array:
-        """Points of the facets, on the curve where a facet is curved, m, (f, q, 3).
-
-        Args:
-            at: in barycentric coordinates, (q, d).
-        """
-        return np.asarray(np.einsum("qn,fni->fqi", spaces.simplex_functions(self.facets.degree, at), self.nodes))
+        return _at(value, self.points if at is None else self.interpolated(self.nodes, at))
 
     def beyond_nodes(self, value: SpatialValue, at: Array | None = None) -> Array:
         """What interpolation between the nodes leaves of a value at points, SI, (f, q).
@@ -129,36 +128,7 @@ class FacetSamples:
             value: on the boundary.
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
-        at_nodes = value.at(self.nodes.reshape(-1, 3)).reshape(self.nodes.shape[:2])
-        return np.asarray(self.of(value, at) - self.interpolated(at_nodes, at))
-
-
-def sample(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities) -> FacetSamples:
-    """Samples of boundary facets, exact for products of the modes of the data. Collective.
-
-    Args:
-        problem: the mesh.
-        bubbles: the space of bubbles.
-        facets: the local facets.
-    """
-    found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
-    barycentric, weights = quadrature("interval" if d == 2 else "triangle", 2 * DEFAULT.data_degree[d - 2])
-    return FacetSamples(found, problem.positions[found.nodes], barycentric, weights)
-
-
-@dataclass(frozen=True)
-class FacetModes(FacetSamples):
-    """Legendre modes (m of them) on facets (f), at q sample points.
-
-    Attributes:
-        values: of the modes at the points, orthonormal under the weights, (m, q).
-        degrees: of the modes, (m,).
-        compliance: nondimensional displacement by traction of the wave of one half-length, along each axis, (f, d).
-    """
-
-    values: Array
-    degrees: Array
-    compliance: Array
+        return np.asarray(self.of(value, at) - self.interpolated(_at(value, self.nodes), at))
 
     def coefficients(self, sampled: Array) -> Array:
         """The coefficients of sampled values (f, q), (f, m)."""
@@ -186,23 +156,30 @@ class FacetModes(FacetSamples):
         return np.asarray(self.facets.areas / compliance * np.sum(squares, axis=1))
 
 
+def _at(value: SpatialValue | Inequalities, points: Array) -> Array:
+    """A value at points (f, q, 3), m; SI, (f, q)."""
+    return np.asarray(value.at(points.reshape(-1, 3)).reshape(points.shape[:2]))
+
+
 def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities) -> FacetModes:
-    """The modes on boundary facets. Collective.
+    """The modes on boundary facets, at points that are exact for products of them. Collective.
 
     Args:
         problem: the mesh.
         bubbles: the space of bubbles.
         facets: the local facets.
     """
-    at, d = sample(problem, bubbles, facets), problem.scales.dimension
-    degree, kind = DEFAULT.data_degree[d - 2], basix.CellType.interval if d == 2 else basix.CellType.triangle
-    legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, degree, at.barycentric[:, 1:])
+    found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
+    degree, kind = DEFAULT.data_degree[d - 2], "interval" if d == 2 else "triangle"
+    barycentric, weights = quadrature(kind, 2 * degree)
+    family, cell = basix.PolynomialType.legendre, basix.CellType[kind]
+    legendre: Any = basix.tabulate_polynomials(family, cell, degree, barycentric[:, 1:])
     values = legendre / math.sqrt(math.factorial(d - 1))
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
-    material = stiffness_tensor(problem.bulk, at.facets.cells)
-    size = (math.factorial(d - 1) * at.facets.areas) ** (1 / (d - 1))  # in space, a leg of a right triangle
-    compliance = size[:, None] / math.pi * surface_compliance(material, at.corners)
-    return FacetModes(at.facets, at.nodes, at.barycentric, at.weights, values, degrees, compliance)
+    material, places = stiffness_tensor(problem.bulk, found.cells), problem.positions[found.nodes]
+    size = (math.factorial(d - 1) * found.areas) ** (1 / (d - 1))  # in space, a leg of a right triangle
+    compliance = size[:, None] / math.pi * surface_compliance(material, places[:, :d])
+    return FacetModes(found, places, barycentric, weights, values, degrees, compliance)
 
 
 _ANGLES = 32
@@ -271,17 +248,16 @@ def redistributed(
     within, pressure = gaps / compliance[:, None], pushes.copy()
     if not free:
         return _solved(kernel, pushes, within, pressure, 4 * DEFAULT.coupled_rounds)
-    areas = on.facets.areas[:, None] * on.weights
-    wanted = total(comm, float(np.sum(areas * pushes)))
+    wanted = total(comm, float(np.sum(on.areas * pushes)))
     if wanted == 0.0:
         return pressure
     reach = (pushes @ kernel.T) * compliance[:, None]
     low = comm.allreduce(float(np.min(gaps - reach, initial=0.0)), op=MPI.MIN)
     high = comm.allreduce(float(np.max(gaps, initial=0.0)), op=MPI.MAX)
-    for _ in range(DEFAULT.gap_shifts):
+    for _ in range(DEFAULT.bubble_steps):
         shift = (low + high) / 2
         pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, DEFAULT.coupled_rounds)
-        more = total(comm, float(np.sum(areas * pressure))) > wanted
+        more = total(comm, float(np.sum(on.areas * pressure))) > wanted
         low, high = (low, shift) if more else (shift, high)
     return pressure
 
@@ -317,16 +293,19 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[Conta
 
     for facets, axis, value in tractions(problem):
         on = modes(facets)
-        rest = on.energies(
-            np.asarray(on.of(value) / problem.scales.stress), on.compliance[:, axis], lowest=on.facets.degree
-        )
-        np.add.at(found, on.facets.cells, rest)
+        stress = np.asarray(on.of(value) / problem.scales.stress)
+        np.add.at(found, on.facets.cells, on.energies(stress, on.compliance[:, axis], lowest=on.facets.degree))
     for part in problem.prescribed:
         if varies(part.value):
             on = modes(part.facets)
             np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
-    for obstacle in _obstacles(problem, states, modes, CERTIFICATE.near):
-        np.add.at(found, obstacle.on.facets.cells, _moved_pressure(problem, bubbles, obstacle))
+    for bounds, *values in gaps(problem):
+        state = next(s for s in states if s.surface is bounds.surface)
+        for value, sign, bound in zip(values, (-1.0, 1.0), (bounds.upper, -bounds.lower), strict=True):
+            if value is not None:
+                on, nodal = modes(bounds.surface.facets), (sign * state.contact_pressure, bound + sign * state.normal)
+                within = np.asarray(-sign * on.beyond_nodes(value) / problem.scales.displacement)
+                np.add.at(found, on.facets.cells, _moved_pressure(problem, bubbles, bounds.surface, on, nodal, within))
     return found
 
 
@@ -340,60 +319,39 @@ def _unprescribed(problem: Problem, on: FacetModes, part: PrescribedComponent) -
     return on.energies_of_displacements(rest, on.compliance[:, part.component])
 
 
-@dataclass(frozen=True)
-class _Obstacle:
-    """One side's gap of a part with contact, nondimensional.
+def _moved_pressure(
+    problem: Problem,
+    bubbles: fem.FunctionSpace,
+    surface: Surface,
+    on: FacetModes,
+    nodal: Sequence[Array],
+    within: Array,
+) -> Array:
+    """Energies of what a gap's variation within facets changes of the contact pressure, (f,). Collective.
 
-    Attributes:
-        bounds: of the part.
-        push: pressure of the body against it at the nodes, (m,).
-        gap: distance from it at the nodes, (m,).
+    Args:
+        problem: what was solved.
+        bubbles: the space of bubbles.
+        surface: the part.
+        on: its facets.
+        nodal: pressure of the body against the obstacle, and distance from it, at the nodes, (m,) both.
         within: what interpolation between the nodes leaves of the gap at the sample points, (f, q).
-        on: the facets of the part.
     """
-
-    bounds: Bounds
-    push: Array
-    gap: Array
-    within: Array
-    on: FacetModes
-
-
-def _obstacles(
-    problem: Problem, states: Sequence[ContactState], modes: Callable[[Entities], FacetModes], rounding: float
-) -> Iterator[_Obstacle]:
-    """The sides of the parts with contact whose gap varies within facets by more than rounding. Collective."""
-    for bounds, lower, upper in gaps(problem):
-        state = next(s for s in states if s.surface is bounds.surface)
-        for value, sign, bound in ((lower, -1.0, bounds.upper), (upper, 1.0, -bounds.lower)):
-            if value is None:
-                continue
-            on = modes(bounds.surface.facets)
-            within = np.asarray(-sign * on.beyond_nodes(value) / problem.scales.displacement)
-            if problem.domain.mesh.comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) > rounding:
-                push, gap = sign * state.contact_pressure, bound + sign * state.normal
-                yield _Obstacle(bounds, np.maximum(push, 0.0), np.maximum(gap, 0.0), within, on)
-
-
-def _moved_pressure(problem: Problem, bubbles: fem.FunctionSpace, obstacle: _Obstacle) -> Array:
-    """Energies of what a gap's variation within the facets changes of the contact pressure, (f,). Collective."""
-    surface, on = obstacle.bounds.surface, obstacle.on
+    comm = problem.domain.mesh.comm
+    if comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) <= CERTIFICATE.near:
+        return np.zeros(len(within))
     at = PartPoints(problem, bubbles, surface, 1)
     normals = at.of_nodes(surface.normals).mean(axis=1)
     compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
-    pushes, gaps = (on.interpolated(at.of_nodes(v[:, None])[:, :, 0]) for v in (obstacle.push, obstacle.gap))
-    solve = functools.partial(
-        redistributed,
-        comm=problem.domain.mesh.comm,
-        on=on,
-        pushes=pushes,
-        compliance=compliance,
-        free=not _held(problem, surface.normals),
+    pushes, gaps = (on.interpolated(at.of_nodes(np.maximum(values, 0.0)[:, None])[:, :, 0]) for values in nodal)
+    free = not _is_supported(problem, surface.normals)
+    moved, before = (
+        redistributed(comm, on, pushes, gaps + more, compliance, free=free) for more in (within, np.zeros_like(within))
     )
-    return on.energies(solve(gaps=gaps + obstacle.within) - solve(gaps=gaps), compliance, lowest=0)
+    return on.energies(moved - before, compliance, lowest=0)
 
 
-def _held(problem: Problem, normals: Array) -> bool:
+def _is_supported(problem: Problem, normals: Array) -> bool:
     """Whether a prescribed component holds the body against a translation along a part's mean normal. Collective."""
     mean = [abs(total(problem.domain.mesh.comm, float(along))) for along in normals.sum(axis=0)]
     return any(mean[part.component] > composition.turned_to_prescribed * max(mean) for part in problem.prescribed)

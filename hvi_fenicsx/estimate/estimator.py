@@ -89,7 +89,7 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states)
-    cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse)
+    cells += part_ends.squares_at_ends(problem, traces.bubbles, u, examination, inverse)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])

@@ -7,7 +7,6 @@ smaller, wherever the body gives way. What holds the body firmly is singular at 
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -17,12 +16,10 @@ from dolfinx import fem, la
 from ..certify import placed_forces
 from ..certify.certificate import Examination
 from ..certify.contact_state import ContactState
-from ..effects import SideMoments
-from ..effects.base import SurfaceLoad
 from ..mesh import facets as facet_sizes
 from ..mesh import nodes
-from ..mesh.boundary_part import Inequalities
 from ..problem import boundary_parts, references, spaces
+from ..problem.interface_sides import outward
 from ..problem.problem import Problem
 from ..runtime.mpi import total
 from ..typing import Array, Entities, Mask
@@ -31,16 +28,15 @@ from .data_errors import FacetModes, facet_modes
 from .dual_norm import DualNorm
 
 
-def energies(on: FacetModes, missing: Array, tractions: Array) -> Array:
+def _energies(part: _Part, squares: Array) -> Array:
     """η_K² of facets on which a firm hold ends elsewhere than in the scene, (f,).
 
     Args:
-        on: the facets.
-        missing: 1 at the sample points that the mesh does not hold, -1 at those that it holds too much, (f, q).
-        tractions: the mean ones over the facets at the end, (f, d).
+        part: that ends.
+        squares: of the mean tractions over the facets at the end, (f, d).
     """
-    moved = np.sum(on.weights * missing, axis=1)
-    costs = np.pi**2 / 4.0 * np.abs(moved) * on.facets.areas * np.sum(tractions**2 * on.compliance, axis=1)
+    on, moved = part.on, np.sum(part.on.weights * part.missing, axis=1)
+    costs = np.pi**2 / 4.0 * np.abs(moved) * on.facets.areas * np.sum(squares * on.compliance, axis=1)
     return np.asarray(costs * np.where(moved > 0.0, _of_lacking(on.facets.degree, np.abs(moved)), 1.0))
 
 
@@ -58,40 +54,15 @@ def _of_lacking(degree: int, share: Array) -> Array:
     return np.asarray(np.maximum(4.0 / np.pi * work - 1.0, 0.0))
 
 
-def firmness(on: FacetModes, rates: Array) -> Array:
-    """How far a law holds as a support does, from 0 to 1 along each axis, (f, d).
-
-    Args:
-        on: the facets.
-        rates: by which its tractions rise with the displacement, means over the facets at the end, (f, d).
-    """
-    beside = rates * on.compliance
-    return np.asarray(beside / (1.0 + beside))
-
-
-def mean(on: FacetModes, ends: Array) -> Array:
-    """The mean over those corners of each facet at which a part ends, (f, d).
-
-    Args:
-        on: the facets.
-        ends: as :func:`at_ends` gives them, local blocks (n, d).
-    """
+def _mean(on: FacetModes, ends: Array) -> Array:
+    """The mean over those corners of each facet at which a part ends, of local blocks (n, d); (f, d)."""
     values = ends[on.facets.corners]
     count = np.any(values, axis=2).sum(axis=1)
     return np.asarray(values.sum(axis=1) / np.maximum(count, 1)[:, None])
 
 
-def yielding(problem: Problem, part: str, states: Sequence[ContactState]) -> tuple[Array, Array]:
-    """What laws of a part put on the body where they are off their kinks, and how fast it rises; owned blocks (n, d).
-
-    Args:
-        problem: what was solved.
-        part: its name.
-        states: of the parts of Γc.
-
-    Returns:
-        Nodal forces, and those for a unit of displacement along each axis.
-    """
+def _yielding(problem: Problem, part: str, states: Sequence[ContactState]) -> tuple[Array, Array]:
+    """What laws of a part put on the body off their kinks, and how fast that rises; owned blocks (n, d)."""
     forces = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
     rates = np.zeros_like(forces)
     for state in (state for state in states if state.surface.part == part):
@@ -105,21 +76,20 @@ def yielding(problem: Problem, part: str, states: Sequence[ContactState]) -> tup
     return forces, rates
 
 
-def at_ends(problem: Problem, part: Entities, beyond: Entities, forces: Array, reaction: Array) -> Array:
+def _at_ends(problem: Problem, part: _Part, forces: Array, reaction: Array) -> Array:
     """The mean tractions over the facets of a part that meet at a vertex of its end, local blocks (n, d). Collective.
 
     What holds the body beyond the end as well, along the same axis, is no end and is taken off.
 
     Args:
         problem: what was solved.
-        part: the local facets of the part.
-        beyond: those of the same sides that are not in it.
+        part: that ends.
         forces: on the part, owned blocks (n, d).
         reaction: of everything, owned blocks (n, d).
     """
-    here, there = (_areas(problem, facets) for facets in (part, beyond))
-    own = _means(problem, part, forces, here, here > 0.0)
-    other = _means(problem, beyond, reaction, there, here == 0.0)
+    here, there = (_areas(problem, facets) for facets in (part.facets, part.beyond))
+    own = _means(problem, part.facets, forces, here, here > 0.0)
+    other = _means(problem, part.beyond, reaction, there, here == 0.0)
     left = np.where(own * other > 0.0, np.sign(own) * np.maximum(np.abs(own) - np.abs(other), 0.0), own)
     return np.where(((here > 0.0) & (there > 0.0))[:, None], left, 0.0)
 
@@ -158,15 +128,21 @@ def _means(problem: Problem, facets: Entities, forces: Array, areas: Array, coun
 
 
 @dataclass(frozen=True)
-class _Piece:
-    """Facets of a side (f of them) that a part has as a whole, or not at all, with q sample points in each.
+class _Part:
+    """A part with `where`, and the facets of its sides (f of them), each of which the mesh counts whole or not at all.
 
     Attributes:
-        on: the facets.
+        name: of the part.
+        facets: its local facets.
+        beyond: the other local facets of its sides.
+        on: both, with q sample points in each.
         share: 1 at the sample points that are in the part, else 0, (f, q).
         meshed: the same as the mesh has it, (f, q).
     """
 
+    name: str
+    facets: Entities
+    beyond: Entities
     on: FacetModes
     share: Array
     meshed: Array
@@ -176,34 +152,20 @@ class _Piece:
         """1 at the sample points where the mesh lacks the part, -1 beyond its end, (f, q)."""
         return np.asarray(self.share - self.meshed)
 
-    @property
-    def sizes(self) -> Array:
-        """What the sample points stand for, over L^(d-1), (f, q)."""
-        return np.asarray(self.on.facets.areas[:, None] * self.on.weights)
+
+def _parts(problem: Problem, bubbles: fem.FunctionSpace) -> Iterator[_Part]:
+    """The parts with `where`. Collective."""
+    for name, piece in problem.pieces.items():
+        if piece.where is not None:
+            facets, side = problem.part_facets[name], problem.domain.facets(piece.on)
+            on = facet_modes(problem, bubbles, side)
+            share, meshed = on.of(piece.where), np.isin(on.facets.local, facets)
+            whole = np.broadcast_to(meshed[:, None], share.shape)
+            beyond = np.setdiff1d(side, facets).astype(np.int32)
+            yield _Part(name, facets, beyond, on, share.astype(np.float64), whole.astype(np.float64))
 
 
-@dataclass(frozen=True)
-class _Part:
-    """A part with `where`.
-
-    Attributes:
-        name: of the part.
-        facets: its local facets.
-        beyond: the other local facets of its sides.
-        pieces: both, sampled.
-    """
-
-    name: str
-    facets: Entities
-    beyond: Entities
-    pieces: Sequence[_Piece]
-
-
-_Lacking = tuple[_Piece, Array]
-"""Facets, and the tractions that the mesh lacks at their sample points, nondimensional, (f, q, d)."""
-
-
-def squares(
+def squares_at_ends(
     problem: Problem, bubbles: fem.FunctionSpace, u: fem.Function, examination: Examination, inverse: DualNorm
 ) -> Array:
     """η_K² of the owned cells that the ends of parts add. Collective.
@@ -216,130 +178,88 @@ def squares(
         inverse: of the system's stiffness.
     """
     cells = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
-    parts = list(_parts(problem, bubbles))
+    parts, owned = list(_parts(problem, bubbles)), np.arange(len(examination.forces.reaction), dtype=np.int32)
     if not parts:
         return cells
     holding = placed_forces.reactions(problem, u, examination.forces, examination.states)
-    lacking: list[_Lacking] = []
-    for part in parts:
-        lacking += [*_loads(problem, part), *_sums(problem, part)]
+    lacking = [_loads(problem, part) + _sums(problem, part) for part in parts]
+    for part, tractions in zip(parts, lacking, strict=True):
         if part.name in holding:
-            held = holding[part.name].at(np.arange(len(examination.forces.reaction), dtype=np.int32))
-            lacking += _held(problem, part, held, examination, cells)
-    return np.asarray(cells + _of_loads(problem, inverse, lacking))
+            firm, lost = _held(problem, part, holding[part.name].at(owned), examination)
+            np.add.at(cells, part.on.facets.cells, _energies(part, firm))
+            tractions += part.missing[:, :, None] * lost[:, None]
+    return np.asarray(cells + _of_loads(problem, inverse, parts, lacking))
 
 
-def _held(problem: Problem, part: _Part, forces: Array, examination: Examination, cells: Array) -> list[_Lacking]:
-    """Add η_K² of what holds the body firmly on a part; the tractions that the mesh lacks of what gives way there.
+def _held(problem: Problem, part: _Part, forces: Array, examination: Examination) -> tuple[Array, Array]:
+    """The squares of the tractions that hold the body firmly at the end, and those of what gives way; (f, d) both.
 
-    Collective.
+    A law holds as a support does as far as its tractions rise with the displacement. Collective.
 
     Args:
         problem: what was solved.
         part: which one.
         forces: all that holds the body there, owned blocks (n, d).
         examination: of the solution.
-        cells: η_K², changed in place.
     """
-    giving, rates = yielding(problem, part.name, examination.states)
-    reaction = examination.forces.reaction
-    firm, soft, rising = (
-        at_ends(problem, part.facets, part.beyond, *one)
-        for one in ((forces - giving, reaction), (giving, reaction), (rates, np.zeros_like(rates)))
-    )
-    lacking: list[_Lacking] = []
-    for piece in part.pieces:
-        on, lost = piece.on, mean(piece.on, soft)
-        stiff = firmness(on, mean(on, rising))
-        for tractions in (mean(on, firm), np.sqrt(stiff) * lost):
-            np.add.at(cells, on.facets.cells, energies(on, piece.missing, tractions))
-        lacking.append((piece, np.asarray(piece.missing[:, :, None] * ((1.0 - stiff) * lost)[:, None])))
-    return lacking
+    giving, rates = _yielding(problem, part.name, examination.states)
+    each = ((forces - giving, examination.forces.reaction), (giving, examination.forces.reaction), (rates, 0.0 * rates))
+    firm, soft, rising = (_mean(part.on, _at_ends(problem, part, *one)) for one in each)
+    stiff = rising * part.on.compliance
+    stiff /= 1.0 + stiff
+    return firm**2 + stiff * soft**2, (1.0 - stiff) * soft
 
 
-def _parts(problem: Problem, bubbles: fem.FunctionSpace) -> Iterator[_Part]:
-    """The parts with `where`. Collective."""
-    for name, piece in problem.pieces.items():
-        if piece.where is not None:
-            facets = problem.part_facets[name]
-            beyond = np.setdiff1d(problem.domain.facets(piece.on), facets).astype(np.int32)
-            on = [facet_modes(problem, bubbles, some) for some in (facets, beyond)]
-            shares = [_share(one, piece.where) for one in on]
-            meshed = np.ones_like(shares[0]), np.zeros_like(shares[1])
-            yield _Part(name, facets, beyond, [_Piece(*one) for one in zip(on, shares, meshed, strict=True)])
+def _loads(problem: Problem, part: _Part) -> Array:
+    """The tractions that the mesh lacks of the loads on a part, at the sample points, nondimensional, (f, q, d)."""
+    on, missing = part.on, part.missing
+    found = np.zeros((*missing.shape, problem.scales.dimension))
+    for load in (effect.surface_load() for where, effect, _ in problem.contributions if where == part.name):
+        if load is None:
+            continue
+        there = np.zeros_like(found)
+        for axis, value in enumerate(load.components):
+            if value.everywhere:
+                there[:, :, axis] = on.of(value)
+        if load.pressure is not None and load.pressure.everywhere:
+            there -= on.of(load.pressure)[:, :, None] * _outward(problem, on)[:, None]
+        found += np.where(missing[:, :, None] == 0.0, 0.0, missing[:, :, None] * there)
+    return found / problem.scales.stress
 
 
-def _share(on: FacetModes, where: Inequalities) -> Array:
-    return where.at(on.points.reshape(-1, 3)).reshape(on.points.shape[:2]).astype(np.float64)
-
-
-def _loads(problem: Problem, part: _Part) -> Iterator[_Lacking]:
-    """The tractions that the mesh lacks of the loads on a part."""
-    loads = (effect.surface_load() for where, effect, _ in problem.contributions if where == part.name)
-    for load, piece in itertools.product((load for load in loads if load is not None), part.pieces):
-        there = _tractions(problem, piece.on, load, piece.missing != 0.0)
-        yield piece, np.asarray(piece.missing[:, :, None] * there)
-
-
-def _sums(problem: Problem, part: _Part) -> Iterator[_Lacking]:
+def _sums(problem: Problem, part: _Part) -> Array:
     """The same of sums over a part: spread over more than it, they are less everywhere. Collective."""
+    on, d = part.on, problem.scales.dimension
+    at, found = on.points.reshape(-1, 3), np.zeros((*part.share.shape, d))
     spread = [effect for where, effect, _ in problem.contributions if where == part.name and effect.is_sum]
-    if not spread:
-        return
-    true, meshed = _moments(problem, part, "share"), _moments(problem, part, "meshed")
-    for effect in spread:
-        for piece in part.pieces:
-            at, shape = piece.on.points.reshape(-1, 3), (*piece.share.shape, problem.scales.dimension)
-            wanted, given = (effect.spread_at(moments, at).reshape(shape) for moments in (true, meshed))
-            lacking = piece.share[:, :, None] * wanted - piece.meshed[:, :, None] * given
-            yield piece, np.asarray(lacking / problem.scales.stress)
+    for sign, counted in ((1.0, part.share), (-1.0, part.meshed)) if spread else ():
+        areas = (on.areas * counted).ravel() * problem.scales.length ** (d - 1)
+        moments = boundary_parts.of_points(problem.domain.mesh.comm, at[:, :d], areas)
+        for effect in spread:
+            found += sign * counted[:, :, None] * effect.spread_at(moments, at).reshape(found.shape)
+    return found / problem.scales.stress
 
 
-def _moments(problem: Problem, part: _Part, which: str) -> SideMoments:
-    """Area, centroid and second moments of the part, in truth (``share``) or as ``meshed``. Collective."""
-    d = problem.scales.dimension
-    points = np.concatenate([piece.on.points.reshape(-1, 3)[:, :d] for piece in part.pieces])
-    sizes = np.concatenate([(piece.sizes * getattr(piece, which)).ravel() for piece in part.pieces])
-    return boundary_parts.of_points(problem.domain.mesh.comm, points, sizes * problem.scales.length ** (d - 1))
-
-
-def _of_loads(problem: Problem, inverse: DualNorm, lacking: Sequence[_Lacking]) -> Array:
-    """η_K² of the owned cells that lacking tractions add. Collective."""
-    d = problem.scales.dimension
+def _of_loads(problem: Problem, inverse: DualNorm, parts: Sequence[_Part], lacking: Sequence[Array]) -> Array:
+    """η_K² of the owned cells that lacking tractions (f, q, d) on the parts' facets add. Collective."""
+    comm, d = problem.domain.mesh.comm, problem.scales.dimension
     cells = np.zeros(problem.domain.mesh.topology.index_map(d).size_local)
     forces: list[tuple[Entities, Array]] = []
-    for piece, tractions in lacking:
-        facets = piece.on.facets
-        functions = spaces.simplex_functions(facets.degree, piece.on.barycentric, spaces.edge_share(problem.space))
-        weighted = piece.sizes[:, :, None] * tractions
+    for part, tractions in zip(parts, lacking, strict=True):
+        facets, weighted = part.on.facets, part.on.areas[:, :, None] * tractions
+        functions = spaces.simplex_functions(facets.degree, part.on.barycentric, spaces.edge_share(problem.space))
         forces.append((facets.nodes.ravel(), np.einsum("fqd,qn->fnd", weighted, functions).reshape(-1, d)))
         np.add.at(cells, facets.cells, np.sum(np.abs(weighted), axis=(1, 2)) ** 2)
-    whole = total(problem.domain.mesh.comm, float(cells.sum()))
+    whole = total(comm, float(cells.sum()))
     if whole == 0.0:
         return cells
     missing = gathered(problem.space, summed(forces, d)).everywhere(problem.space.dofmap.index_map.size_local)
     energy = problem.bulk.energy_by_cell(inverse.solve(problem.combined(missing))[0])
-    return np.asarray(total(problem.domain.mesh.comm, float(energy.sum())) * cells / whole)
-
-
-def _tractions(problem: Problem, on: FacetModes, load: SurfaceLoad, where: Mask) -> Array:
-    """A load, as far as it is known between nodes, at chosen ones of the sample points, nondimensional, (f, q, d)."""
-    found = np.zeros((*where.shape, problem.scales.dimension))
-    for axis, value in enumerate(load.components):
-        if value.everywhere:
-            found[where, axis] = value.at(on.points[where])
-    if load.pressure is not None and load.pressure.everywhere:
-        normals = np.broadcast_to(_outward(problem, on)[:, None], found.shape)
-        found[where] -= load.pressure.at(on.points[where])[:, None] * normals[where]
-    return np.asarray(found / problem.scales.stress)
+    return np.asarray(total(comm, float(energy.sum())) * cells / whole)
 
 
 def _outward(problem: Problem, on: FacetModes) -> Array:
     """The outward unit normals of facets, (f, d)."""
-    corners, d = on.corners[:, :, : problem.scales.dimension], problem.scales.dimension
-    sides = corners[:, 1:] - corners[:, :1]
-    normals = np.cross(sides[:, 0], sides[:, 1]) if d == 3 else sides[:, 0, ::-1] * [1.0, -1.0]
-    cells = problem.positions[problem.space.dofmap.list[on.facets.cells]].mean(axis=1)[:, :d]
-    inward = np.sum((cells - corners.mean(axis=1)) * normals, axis=1) > 0.0
-    normals = np.where(inward[:, None], -normals, normals)
-    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    d = problem.scales.dimension
+    inner = problem.positions[problem.space.dofmap.list[on.facets.cells]].mean(axis=1)[:, :d]
+    return outward(on.nodes[:, :d, :d], inner)

@@ -18,12 +18,12 @@ class EstimateThresholds:
         rough_tolerance: the same where the answer is a small part or is taken up by a next round: what the solver left,
             and bubbles that are found again beside nodes that moved, at degree 1; such bubbles at degree 2, and nodes
             among those rounds.
-        bubble_steps: conjugate gradient steps at most of a solve for bubbles.
+        bubble_steps: conjugate gradient steps at most of a solve for bubbles; bisections of the body's motion along a
+            normal, where a gap varies within facets.
         rounds: of the active set of the bounds between the nodes, and of corrections of the nodes' answer to bubbles by
             the laws, at most.
         vertex_tolerance: the same, where conjugate gradients on the bubbles solve for the nodes at each step.
         data_degree: of the modes by which the data on a facet are sampled, in the plane and in space.
-        gap_shifts: bisections of the body's motion along a normal, where a gap varies within facets.
         coupled_rounds: times at most that bubbles and nodes are solved for in turns; sweeps over a facet's points for a
             shift of a gap.
         rounding: nondimensional norms up to this are rounding: a body that meets no force has no error, not 100 % of
@@ -43,7 +43,6 @@ class EstimateThresholds:
     rounds: int = 4
     vertex_tolerance: float = 1e-6
     data_degree: tuple[int, int] = (14, 6)
-    gap_shifts: int = 20
     coupled_rounds: int = 12
     rounding: float = 1e-12
     coupled: tuple[float, float] = (0.3, 0.0)

@@ -131,7 +131,7 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
     parts = [
         space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel())).reshape(blocks.shape),
         (context.points if is_curved(space) else context.points_on_curves)[blocks][:, :, :d],
-        _outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
+        outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
     ]
     every = agree(context.domain.mesh.comm, parts)
     numbers, points, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
@@ -144,8 +144,13 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
     )
 
 
-def _outward(corners: Array, inner: Array) -> Array:
-    """Unit normals of segments or triangles (f, d, d) away from points inside (f, d)."""
+def outward(corners: Array, inner: Array) -> Array:
+    """The unit normals of segments or triangles away from points inside, (f, d).
+
+    Args:
+        corners: of the facets, (f, d, d).
+        inner: points inside, (f, d).
+    """
     sides = corners[:, 1:] - corners[:, :1]
     plane = corners.shape[1] == 2
     across = np.column_stack([sides[:, 0, 1], -sides[:, 0, 0]]) if plane else np.cross(sides[:, 0], sides[:, 1])
