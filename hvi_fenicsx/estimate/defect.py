@@ -21,10 +21,9 @@ from ..problem.problem import Bounds, Problem
 from ..problem.thresholds import DEFAULT as composition
 from ..runtime import forms
 from ..typing import Array, Entities, Mask
-from .bubbles import BubbleStiffness, Springs, of_cell
+from .bubbles import DEFAULT, BubbleStiffness, Springs, of_cell
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
-from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True)

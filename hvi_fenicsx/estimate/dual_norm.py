@@ -27,8 +27,8 @@ from ..system.multigrid import Levels
 from ..system.system import System
 from ..system.thresholds import DEFAULT as SYSTEM
 from ..typing import Array, Entities, Integers
+from .bubbles import DEFAULT
 from .law_traces import nearest
-from .thresholds import DEFAULT
 
 NEAR = CERTIFICATE.near
 

@@ -19,11 +19,9 @@ from ..runtime.mpi import total
 from ..system.multigrid import Levels
 from ..system.system import System
 from ..typing import Array
-from . import coupled_errors, data_errors, defect, dual_norm, part_ends
-from .bubbles import BubbleStiffness
-from .contact_errors import ratio
+from . import coupled_errors, data_errors, defect, dual_norm
+from .bubbles import DEFAULT, BubbleStiffness
 from .law_traces import ErrorField, LawTraces
-from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,12 +56,12 @@ class Estimate:
     @property
     def relative(self) -> float:
         """The total over |||u_h|||; infinite where u_h is a rigid motion and the error is not 0."""
-        return ratio(self.total, self.energy_norm)
+        return coupled_errors.ratio(self.total, self.energy_norm)
 
     @property
     def coarse(self) -> bool:
         """Whether the mesh's error is so large that the numbers are rough."""
-        return ratio(self.discretisation, self.energy_norm) > DEFAULT.coarse
+        return coupled_errors.ratio(self.discretisation, self.energy_norm) > DEFAULT.coarse
 
     def as_dict(self) -> dict[str, float]:
         """The numbers by name, nondimensional."""
@@ -89,7 +87,7 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states)
-    cells += part_ends.squares_at_ends(problem, traces.bubbles, u, examination, inverse)
+    cells += data_errors.squares_at_ends(problem, traces.bubbles, u, examination, inverse)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])
@@ -152,7 +150,7 @@ def warnings(errors: Estimate) -> tuple[str, ...]:
     """
     if not errors.coarse:
         return ()
-    share = ratio(errors.discretisation, errors.energy_norm)
+    share = coupled_errors.ratio(errors.discretisation, errors.energy_norm)
     size = f"{percent(share)} of the solution" if np.isfinite(share) else "as large as the solution"
     return (
         f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "

@@ -22,11 +22,9 @@ from ..mesh import nodes
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..typing import Array, Entities, Mask
-from . import bubbles, contact_facets
-from .bubbles import BlockForces, gathered, summed
-from .interface_points import InterfacePoints
-from .thresholds import DEFAULT
-from .traces import PartPoints, Trace
+from . import bubbles
+from .bubbles import DEFAULT, BlockForces, gathered, summed
+from .traces import InterfacePoints, PartPoints, Trace, frames
 
 
 def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
@@ -259,7 +257,7 @@ class LawTraces:
             force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
         if (interface := self.problem.interface_of(state.surface)) is not None and interface.curved:
-            axes = contact_facets.frames(state.surface)
+            axes = frames(state.surface)
         points = self.part(state.surface, axes)
         return points.tested(points.interpolated_components(np.einsum("mkd,md->mk", axes, force)))[0]
 
