@@ -106,10 +106,10 @@ class ModelPath(LoadPath):
 
     def plot(self) -> Figure | None:
         """Force over displacement of the driven part, as a matplotlib figure; None where no part is driven."""
-        from ..report.pictures import path as path_picture
+        from ..report.pictures import charts
 
         shown = self._as_read()
-        return None if shown.driven is None else path_picture.make(shown)
+        return None if shown.driven is None else charts.path_chart(shown)
 
     def _as_read(self) -> PathResult:
         """As the report reads it from its folder."""

@@ -22,7 +22,7 @@ from ..problem.stress import cell_stress, space_of_stress
 from ..report.reader import Result
 from ..report.solution_arrays import ContactPart
 from ..results import ResultFolder, gathering
-from ..results.contact_parts import contact_parts
+from ..results.gathering import contact_parts
 from ..results.output_folder import existing
 from ..results.whole import write_whole
 from ..runtime import log

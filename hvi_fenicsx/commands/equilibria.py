@@ -18,7 +18,7 @@ from ..errors import ExitCode, NotWrittenError
 from ..model import dump_scene
 from ..report import page
 from ..report.pictures.draw import draw as draw_pictures
-from ..results import plain, tables
+from ..results import plain, whole
 from ..results.summary import common
 from ..results.whole import made, write_record, write_whole
 from ..runtime import writing
@@ -189,7 +189,7 @@ def _entry(found: Found, rows: list[Row], unit: float) -> Row:
 def _write(call: Session, rows: list[Row], record: Record, *, draw: bool) -> None:
     """Write table, summary and scene, then picture and page; that one cannot be made costs a line. Rank 0 only."""
     work = call.folder.work
-    tables.write(work / TABLE, COLUMNS, ([row[name] for name in COLUMNS] for row in rows))
+    whole.write_table(work / TABLE, COLUMNS, ([row[name] for name in COLUMNS] for row in rows))
     writing.text(work / "scene.toml", dump_scene(call.scene, call.folder.target))
     write_record(work, record)
     if rows and draw:

@@ -15,8 +15,8 @@ from ..paths.load_path import LoadPath
 from ..paths.state import End, Event
 from ..report import page
 from ..report.pictures.draw import draw as draw_pictures
-from ..results import tables, vtk_fields
-from ..results.contact_parts import contact_parts
+from ..results import vtk_fields, whole
+from ..results.gathering import contact_parts
 from ..results.output_folder import ResultFolder
 from ..results.summary import plain, summary
 from ..results.whole import made, write_record
@@ -95,7 +95,7 @@ def _contact_rows(run: PathRun) -> Iterator[tuple[Any, ...]]:
         for row, problem, u in run.crossings(factor):
             found = certificate.examine(problem, u, run.prepared.scene.solver.tolerance)
             parts = contact_parts(problem, found.states)
-            yield from ((row, float(factor), *cells) for cells in tables.contact_rows(parts))
+            yield from ((row, float(factor), *cells) for cells in whole.contact_rows(parts))
 
 
 def _write_on_root(
@@ -103,9 +103,9 @@ def _write_on_root(
 ) -> None:
     """Tables, scene, summary, and the states of a path that was interrupted. Rank 0 only."""
     work = folder.work
-    tables.write_path(work / "path.csv", path)
+    whole.write_path(work / "path.csv", path)
     if rows:
-        tables.write(work / "path_contact.csv", ("row", "factor", *tables.CONTACT), rows)
+        whole.write_table(work / "path_contact.csv", ("row", "factor", *whole.CONTACT), rows)
     writing.text(work / "scene.toml", dump_scene(run.prepared.scene, folder.target))
     write_record(work, record)
     if path.end == End.INTERRUPTED and (folder.target / JOURNAL).exists():

@@ -1,6 +1,8 @@
 """A solution as plain arrays, in SI, on rank 0; its vertices are numbered as the unknowns are.
 
 At degree 2 its vertices are the nodes, and its cells and facets the parts of those of the mesh: the once refined mesh.
+The parts of Γc have the rows and columns of ``contact.csv``, in its order: a plane part is ordered along it, chains of
+facets being followed from end to end, with their arc length.
 """
 
 from __future__ import annotations
@@ -12,18 +14,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..effects import SurfaceLoad
+from ..certify.contact_state import ContactState
+from ..effects import Direction, SurfaceLoad
+from ..geometry import chains
 from ..mesh import nodes
 from ..problem import spaces
+from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.stress import stress_of_parts, von_mises
 from ..report.reader import Result
-from ..report.solution_arrays import LoadArrays, SolutionArrays
+from ..report.solution_arrays import ContactPart, LoadArrays, SolutionArrays
 from ..runtime.mpi import agree, joined
 from ..typing import Array, Entities, Integers
 from ..workflow import Solution
-from .contact_parts import contact_parts
 from .summary import summary
+
+_DIGITS = 9
+"""Digits of the part's size; coordinates that should be equal may differ in later ones."""
 
 
 def result(solution: Solution) -> Result | None:
@@ -113,3 +120,162 @@ def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> L
     numbers, every = (joined(comm, own) for own in (spaces.global_numbers(problem.space, local), values))
     vertices, first = np.unique(numbers, return_index=True)
     return LoadArrays(vertices=vertices, traction=every[first, :d], pressure=every[first, d])
+
+
+def contact_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str, ContactPart]:
+    """The parts of Γc by name, in the order of their names, on rank 0; none elsewhere. Collective.
+
+    Args:
+        problem: what was solved.
+        states: of the parts.
+    """
+    comm, scales, found = problem.domain.mesh.comm, problem.scales, {}
+    for state in sorted(states, key=lambda state: state.surface.part):
+        columns = {name: joined(comm, values) for name, values in columns_of(problem, state).items()}
+        others = {name: joined(comm, values) for name, values in _others(problem, state).items()}
+        if comm.rank == 0:
+            found[state.surface.part] = _sorted(state.surface.part, columns, others, scales.dimension)
+    return found
+
+
+def _sorted(name: str, columns: dict[str, Array], others: dict[str, Any], d: int) -> ContactPart:
+    """A part in the order of the table. Rank 0 only."""
+    vertices, facets = others["vertices"], np.unique(others["facets"], axis=0)  # ranks may know the same facets
+    points = np.column_stack([columns[axis] for axis in "xyz"[:d]])
+    s = {}
+    if d == 2:
+        order, s["s"] = along(points, vertices, others["edges"])
+    else:
+        order = lexicographic(points)
+    return ContactPart(
+        name=name,
+        columns=s | {name: values[order] for name, values in columns.items()},
+        facets=facets[np.isin(facets, vertices).all(axis=1)],
+        **{name: others[name][order] for name in ("vertices", "weight", "normal", "drops")},
+    )
+
+
+def _others(problem: Problem, state: ContactState) -> dict[str, Any]:
+    """What this rank knows of a part besides, in any order."""
+    scales, space, surface = problem.scales, problem.space, state.surface
+    facets = spaces.global_numbers(space, nodes.linear_facets(space, surface.facets))
+    return {
+        "vertices": spaces.global_numbers(space, surface.blocks),
+        "facets": np.sort(facets, axis=1),
+        "edges": _edges(problem, surface) if scales.dimension == 2 else facets,
+        "weight": surface.weights * scales.length ** (scales.dimension - 1),
+        "normal": surface.normals,
+        "drops": _drops(state) * scales.displacement,
+    }
+
+
+def columns_of(problem: Problem, state: ContactState) -> dict[str, Array]:
+    """What this rank knows of a part's columns but ``s``, (m,) each; NaN where the table is empty.
+
+    Args:
+        problem: what was solved.
+        state: of the part.
+    """
+    scales, d = problem.scales, problem.scales.dimension
+    u, p = scales.displacement, scales.stress
+    found = {axis: state.surface.points[:, i] for i, axis in enumerate("xyz"[:d])}
+    found["u_n"] = state.normal_displacement * u
+    for i in range(d - 1):
+        found[f"u_t{i + 1}"] = state.tangential_displacement[:, i] * u
+        if state.resists_slip:  # else σ_t is a support's, at a corner
+            found[f"friction_t{i + 1}"] = state.friction[:, i] * p
+    if state.bounds is not None:
+        found["gap"] = np.where(np.isfinite(state.gap), state.gap * u, np.nan)
+        found["contact"] = state.contact.astype(float)
+    found["sigma_n"] = state.pressure * p
+    for name, kind in (("branch_t", "tangential"), ("branch_n", "normal")):
+        branch = state.branch(*(direction for direction in Direction if getattr(direction, kind)))
+        if branch is not None:
+            found[name] = branch.astype(float)
+    return found
+
+
+def _drops(state: ContactState) -> Array:
+    """The slips at which the friction law drops, (m, j)."""
+    slips = [law.term for law in state.laws if law.term.direction is Direction.SLIP]
+    each = [term.stretch[:, None] * term.exact.concave.kinks for term in slips]
+    return np.concatenate([np.empty((len(state.surface.weights), 0)), *each], axis=1)
+
+
+def _edges(problem: Problem, surface: Surface) -> Integers:
+    """A part's facets that this rank knows by their global ends, the body to their left, at degree 2 halves; (k, 2).
+
+    Args:
+        problem: what was solved.
+        surface: the part.
+    """
+    mesh, space = problem.domain.mesh, problem.space
+    facets = np.asarray(surface.facets, dtype=np.int32)
+    if not len(facets):
+        return np.empty((0, 2), dtype=np.int64)
+    on = nodes.facet_nodes(space, facets)
+    mesh.topology.create_connectivity(1, 2)
+    cells = [mesh.topology.connectivity(1, 2).links(f)[0] for f in facets]
+    x = problem.points[:, :2]
+    first, last = x[on[:, 0]], x[on[:, 1]]
+    inwards = x[space.dofmap.list[cells][:, :3]].mean(axis=1) - first
+    along = last - first
+    left = along[:, 0] * inwards[:, 1] - along[:, 1] * inwards[:, 0] > 0
+    dofs = np.where(left[:, None], on[:, :2], on[:, 1::-1])
+    if nodes.degree(space) == 2:
+        dofs = np.vstack([np.column_stack([dofs[:, 0], on[:, 2]]), np.column_stack([on[:, 2], dofs[:, 1]])])
+    return spaces.global_numbers(space, dofs)
+
+
+def lexicographic(points: Array) -> npt.NDArray[np.intp]:
+    """The order of points (m, d) by their coordinates, in which those that should be equal are.
+
+    Args:
+        points: m, (m, d).
+    """
+    size = float(np.max(np.ptp(points, axis=0), initial=0.0))
+    return np.lexsort(np.round(points / (size or 1.0), _DIGITS).T[::-1])
+
+
+def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, Array]:
+    """The order of vertices along their part and the arc length of each, in that order.
+
+    A chain runs from the lexicographically smaller of its ends; a closed one from its smallest vertex, the body to the
+    left, and is cut there. Chains follow one another by their smallest vertices, each beginning at the arc length at
+    which the last one ended. The arc length is 0 at the smallest vertex of all, and negative before it.
+
+    Args:
+        points: the vertices, m, (m, 2).
+        numbers: of the vertices, (m,).
+        pairs: the facets by these numbers, the body to their left, (k, 2); a facet may be there twice. One with a
+            vertex that is none of these is left out.
+    """
+    rank = np.empty(len(points), dtype=np.int64)
+    rank[lexicographic(points)] = np.arange(len(points))
+    by_number = np.argsort(numbers)
+    within = np.unique(pairs[np.isin(pairs, numbers).all(axis=1)], axis=0)
+    edges = by_number[np.searchsorted(numbers[by_number], within)]
+    inner = np.unique(edges[:, 1])
+    found = [chain if chain[0] in inner else _oriented(chain, rank) for chain in chains(edges, rank)]
+    found += [np.array([alone]) for alone in np.setdiff1d(np.arange(len(points)), edges)]
+    return _measured(points, sorted(found, key=lambda chain: int(np.min(rank[chain]))), rank)
+
+
+def _oriented(chain: Integers, rank: Integers) -> Integers:
+    """An open chain from the lower of its ends."""
+    return chain if rank[chain[0]] <= rank[chain[-1]] else chain[::-1]
+
+
+def _measured(points: Array, ordered: list[Integers], rank: Integers) -> tuple[Integers, Array]:
+    """All chains one after the other; a vertex where two of them touch belongs to the first."""
+    order: dict[int, float] = {}
+    end = 0.0
+    for i, chain in enumerate(ordered):
+        steps = np.linalg.norm(np.diff(points[chain], axis=0), axis=1)
+        s = end + np.concatenate([[0.0], np.cumsum(steps)])
+        if i == 0:
+            s -= s[int(np.argmin(rank[chain]))]
+        for vertex, length in zip(chain, s, strict=True):
+            order.setdefault(int(vertex), float(length))
+        end = float(s[-1])
+    return np.array(list(order), dtype=np.int64), np.array(list(order.values()))

@@ -22,7 +22,7 @@ from ..rigid import Mode
 from ..typing import Array, Entities, Integers
 from ..workflow import Solution
 from . import vtk_files
-from .contact_parts import columns_of
+from .gathering import columns_of
 from .vtk_files import Entry, Grid
 
 _LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")

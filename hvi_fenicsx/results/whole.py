@@ -1,25 +1,48 @@
-"""A whole result: every file of a folder that is being written but its log, in the order in which one needs another."""
+"""A whole result: every file of a folder that is being written but its log, in the order in which one needs another.
+
+Tables are comma-separated values, in SI: ``contact.csv``, ``boundary.csv``, ``path.csv``.
+"""
 
 from __future__ import annotations
 
+import csv
 import json
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..certify import placed_forces
 from ..model import Model, dump_scene
+from ..paths.load_path import LoadPath, PathRow
+from ..problem import references, spaces
 from ..problem.stress import stress_of_parts
+from ..problem.vectors import NodalForces
 from ..report import page, solution_arrays
 from ..report.pictures.draw import draw
-from ..report.solution_arrays import ReportError, SolutionArrays
+from ..report.solution_arrays import ContactPart, ReportError, SolutionArrays
 from ..runtime import writing
 from ..runtime.cost import Timer
-from ..runtime.mpi import on_root
-from ..typing import Array
+from ..runtime.mpi import joined, on_root
+from ..typing import Array, Entities
 from ..workflow import Solution
-from . import gathering, tables, vtk_fields
+from . import gathering, vtk_fields
 from .output_folder import ResultFolder
 from .summary import summary
+
+CONTACT = (
+    *("part", "s", "x", "y", "z", "u_n", "u_t1", "u_t2", "gap", "sigma_n", "friction_t1", "friction_t2"),
+    *("contact", "branch_t", "branch_n"),
+)
+"""The columns of ``contact.csv``."""
+_WHOLE = ("contact", "branch_t", "branch_n")
+_QUANTITIES = ("", "u_", "traction_", "reaction_")
+"""The vertex, its displacement, the part's load there, what the part's support, contact and laws put on the body."""
+BOUNDARY = ("part", *(quantity + axis for quantity in _QUANTITIES for axis in "xyz"))
+"""Those of ``boundary.csv``."""
+_PATH = ("row", "factor", "event", "part", "x", "y", "z", "energy", "work", "dissipated", "stable")
 
 
 def write_whole(
@@ -68,7 +91,7 @@ def _write_basis(folder: ResultFolder, scene: Model, arrays: SolutionArrays | No
     assert arrays is not None
     work = folder.work
     if arrays.parts:
-        tables.write(work / "contact.csv", tables.CONTACT, tables.contact_rows(arrays.parts))
+        write_table(work / "contact.csv", CONTACT, contact_rows(arrays.parts))
     solution_arrays.save(work / solution_arrays.FILE, arrays)
     writing.text(work / "scene.toml", dump_scene(scene, folder.target))
     write_record(work, record)
@@ -84,8 +107,8 @@ def _write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None
         vtk_fields.write_escape(folder / "displacement.pvd", problem, mode)
     if states:
         vtk_fields.write_contact(folder / "contact.pvd", problem, states)
-    rows = list(tables.boundary_rows(solution))
-    on_root(problem.domain.mesh.comm, lambda: tables.write(folder / "boundary.csv", tables.BOUNDARY, rows))
+    rows = list(boundary_rows(solution))
+    on_root(problem.domain.mesh.comm, lambda: write_table(folder / "boundary.csv", BOUNDARY, rows))
 
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:
@@ -113,3 +136,97 @@ def made(what: str, tell: Callable[[str], None], make: Callable[[], object]) -> 
         make()
     except ReportError as error:
         tell(f"{what}: {error}")
+
+
+def write_table(file: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table: numbers with all their digits, nothing where there is none. Rank 0 only.
+
+    Args:
+        file: where to.
+        header: the names of the columns.
+        rows: its cells.
+
+    Raises:
+        NotWrittenError: it cannot be written.
+    """
+    with writing.told(file), file.open("w", newline="", encoding="utf-8") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(header)
+        table.writerows([_text(cell) for cell in row] for row in rows)
+
+
+def _text(cell: Any) -> Any:
+    if isinstance(cell, float):
+        return repr(float(cell)) if math.isfinite(cell) else ""
+    return "" if cell is None else cell
+
+
+def contact_rows(parts: Mapping[str, ContactPart]) -> Iterator[tuple[Any, ...]]:
+    """The rows of ``contact.csv``, the parts one after the other. Rank 0 only.
+
+    Args:
+        parts: by their names, as :func:`.contact_parts.contact_parts` finds them.
+    """
+    for name, part in parts.items():
+        yield from zip([name] * len(part), *(_column(part, column) for column in CONTACT[1:]), strict=True)
+
+
+def _column(part: ContactPart, name: str) -> list[float | int | None]:
+    """The cells of a column; whole numbers are counts and the numbers of pieces."""
+    values: Any = part[name].tolist()
+    return [int(v) if math.isfinite(v) else None for v in values] if name in _WHOLE else values
+
+
+def boundary_rows(solution: Solution) -> Iterator[tuple[Any, ...]]:
+    """The rows of ``boundary.csv``: vertices of every boundary table and of the sides of interfaces, by their points.
+
+    To be asked for all of them on all ranks; those on rank 0 are the table's. Collective.
+
+    Args:
+        solution: what was found.
+    """
+    problem = solution.problem
+    loads = placed_forces.loads(problem) if solution.forces is None else solution.forces.loads
+    facets = {name: problem.part_facets[name] for name in solution.scene.parts}
+    for one in problem.interfaces:
+        facets[f"{one.name}{placed_forces.SECOND}"] = problem.domain.facets([one.sides.second])
+    for name, own in facets.items():
+        rows = joined(problem.domain.mesh.comm, _at_vertices(solution, loads, name, own))
+        order = np.lexsort(rows[:, problem.scales.dimension - 1 :: -1].T)
+        yield from ((name, *row) for row in rows[order].tolist())
+
+
+def _at_vertices(solution: Solution, loads: Mapping[str, NodalForces], part: str, facets: Entities) -> Array:
+    """The numbers at the vertices of a part that this rank owns, (m, 12); NaN: none. Collective."""
+    problem, forces = solution.problem, solution.forces
+    blocks = references.vertices(problem, facets)
+    d, scales = problem.scales.dimension, problem.scales
+    found = np.full((len(blocks), len(_QUANTITIES), 3), np.nan)
+    found[:, 0, :d] = problem.positions[blocks, :d]
+    if part in loads:
+        found[:, 2, :d] = loads[part].at(blocks) * scales.force / references.lumped(problem, facets)[blocks, None]
+    if solution.solve_result is not None and forces is not None:
+        found[:, 1, :d] = spaces.values(problem.space, solution.solve_result.u.x.array)[blocks] * scales.displacement
+        reaction = forces.reactions.get(part)
+        found[:, 3, :d] = 0.0 if reaction is None else reaction.at(blocks) * scales.force
+    return found.reshape(len(blocks), len(BOUNDARY) - 1)
+
+
+def write_path(file: Path, path: LoadPath) -> None:
+    """Write ``path.csv``: force and mean displacement of each driven part follow the common columns. Rank 0 only.
+
+    Args:
+        file: where to.
+        path: the path.
+    """
+    measured = (f"{part}.{kind}{axis}" for part in path.parts for kind in "fu" for axis in "xyz"[: path.dimension])
+    rows = ((number, *_path_row(path, row)) for number, row in enumerate(path.rows))
+    write_table(file, (*_PATH, *measured), rows)
+
+
+def _path_row(path: LoadPath, row: PathRow) -> Iterator[Any]:
+    point: Any = [] if row.point is None else row.point.tolist()
+    yield from (float(row.factor), row.event, row.part, *point, *[None] * (3 - len(point)))
+    yield from (float(row.energy), float(row.work), float(row.dissipated), int(row.stable))
+    for part in path.parts:
+        yield from (*map(float, row.forces[part]), *map(float, row.displacements[part]))

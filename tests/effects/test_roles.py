@@ -14,8 +14,8 @@ from runs import process, summary
 from scenes import model
 
 from hvi_fenicsx.report import reader
-from hvi_fenicsx.report.pictures import sides
-from hvi_fenicsx.report.pictures.sides import touches
+from hvi_fenicsx.report.pictures import shape
+from hvi_fenicsx.report.pictures.shape import touches
 
 OWN = '''
 import ufl
@@ -136,7 +136,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_users_effects_are_drawn(folder: Path) -> None:
     found = reader.read(folder / "r")
-    (held,), loaded = sides.held_sides(found), sides.loaded_sides(found)
+    (held,), loaded = shape.held_sides(found), shape.loaded_sides(found)
     assert (held.side.part, held.rolling) == ("wall", True)
     assert {load.side.part for load in loaded} == {"pull", "press"}
     pull = next(load for load in loaded if load.side.part == "pull")

@@ -19,8 +19,8 @@ from scenes import model as scene_table
 from scenes import quadratic_linear
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.report.pictures import sides
-from hvi_fenicsx.report.pictures.sides import regions
+from hvi_fenicsx.report.pictures import shape
+from hvi_fenicsx.report.pictures.shape import regions
 from hvi_fenicsx.report.reader import Result
 from hvi_fenicsx.results import gathering
 from hvi_fenicsx.results.summary import summary
@@ -113,7 +113,7 @@ def test_a_load_may_be_a_formula_a_function_or_ufl(body: hvi.Body) -> None:
     found.append(hvi.solve(hvi.Model(body, [*others, hvi.Pressure("press", 1e6 * (1 + x[0]))]), estimate=False))
     for solution in found:
         assert solution.energy == pytest.approx(found[0].energy, rel=1e-11)
-        shown = {load.side.part: load for load in sides.loaded_sides(as_read(solution))}
+        shown = {load.side.part: load for load in shape.loaded_sides(as_read(solution))}
         at = solution.problem.points[shown["press"].side.vertices]  # on one rank vertices are numbered alike
         np.testing.assert_allclose(shown["press"].traction[:, 1], -1e6 * (1 + at[:, 0]), rtol=1e-9)
         np.testing.assert_allclose(shown["press"].traction[:, [0, 2]], 0.0, atol=1e-6)

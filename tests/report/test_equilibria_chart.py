@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from hvi_fenicsx.report.pictures import equilibria
+from hvi_fenicsx.report.pictures import charts
 from hvi_fenicsx.report.pictures.style import BLUE, ORANGE, VERMILION
 from hvi_fenicsx.report.reader import EquilibriaResult
 
@@ -34,7 +34,7 @@ def search(folder: Path, energies: list[float]) -> EquilibriaResult:
 
 def test_a_vertex_has_the_colour_of_the_law_that_is_broken(tmp_path: Path) -> None:
     """It had that of the law along the contact part, whatever the one across it was on."""
-    fig = equilibria.make(search(tmp_path, [-2.0]))
+    fig = charts.equilibria_chart(search(tmp_path, [-2.0]))
     (strip,) = fig.axes[1].images
     colours = np.asarray(strip.get_array())[0]
     assert np.allclose(colours, [to_rgb(c) for c in (BLUE, ORANGE, ORANGE, VERMILION)])

@@ -31,7 +31,7 @@ from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.report import reader
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
-from hvi_fenicsx.report.pictures import bodies, draw, sides
+from hvi_fenicsx.report.pictures import bodies, draw, shape
 from hvi_fenicsx.report.solution_arrays import FILE, ContactPart, LoadArrays, SolutionArrays, load, save
 from hvi_fenicsx.runtime import processes
 
@@ -241,7 +241,7 @@ def test_a_slanted_side_is_held_along_its_own_normal(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", body, np.zeros_like)
     change(folder, parts={})
     write_sides(folder, body, wall=lambda _: upright[:, 0] == 0)
-    (support,) = sides.held_sides(reader.read(folder))
+    (support,) = shape.held_sides(reader.read(folder))
     assert support.side.normals[:, :2] == pytest.approx(np.broadcast_to(-turn[:, 0], (5, 2)))
     assert len(support.side.facets) == 4
 

@@ -16,8 +16,20 @@ from ..reader import Result
 from ..units import quantity, thousands, unit_for
 from .canvas import Canvas
 from .plane import PlaneCanvas
-from .shape import DeformedBody, PartGeometry, deform, escaping, followed, part_geometries, undeformed
-from .sides import held_sides, loaded_sides, regions, roles_by_side, touches
+from .shape import (
+    DeformedBody,
+    PartGeometry,
+    deform,
+    escaping,
+    followed,
+    held_sides,
+    loaded_sides,
+    part_geometries,
+    regions,
+    roles_by_side,
+    touches,
+    undeformed,
+)
 from .style import BLUE, EMBER, GREY, INK, PALE, SLATE, VERMILION
 
 PEAK = 0.005

@@ -21,8 +21,7 @@ from matplotlib.transforms import Bbox
 from ...typing import Array
 from ..body_mesh import BodyMesh
 from ..reader import Result
-from .shape import DeformedBody, PartGeometry
-from .sides import HeldSide, LoadedSide, Region, Side
+from .shape import DeformedBody, HeldSide, LoadedSide, PartGeometry, Region, Side
 from .style import INK, VERMILION, WIDTH, figure, heading, resize
 
 LETTERS = 12

@@ -30,8 +30,7 @@ from ...errors import HviError, NotWrittenError
 from ...runtime import processes, writing
 from .. import reader
 from ..reader import Result
-from . import bodies, contact, equilibria
-from . import path as path_picture
+from . import bodies, charts, contact
 from .draw import COMPLAINT, PictureError
 from .style import save
 
@@ -98,11 +97,11 @@ def drawings_of(folder: Path) -> list[Drawing]:
     """
     if (folder / "equilibria.csv").exists():
         search = reader.read_equilibria(folder)
-        return [Drawing(folder / equilibria.NAME, equilibria.CAPTION, partial(equilibria.make, search))]
+        return [Drawing(folder / "equilibria.png", charts.EQUILIBRIA_CAPTION, partial(charts.equilibria_chart, search))]
     if (folder / "path.csv").exists():
         path = reader.read_path(folder)
         drawn = path.driven is not None
-        return [Drawing(folder / path_picture.NAME, path_picture.CAPTION, partial(path_picture.make, path))] * drawn
+        return [Drawing(folder / "path.png", charts.PATH_CAPTION, partial(charts.path_chart, path))] * drawn
     result = reader.read(folder)
     arrays = result.arrays
     if arrays.displacement is None and arrays.escape_mode is None and not arrays.parts:

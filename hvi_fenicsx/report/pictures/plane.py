@@ -21,8 +21,7 @@ from ..body_mesh import BodyMesh
 from ..solution_arrays import NOTHING
 from ..units import quantity
 from .canvas import Canvas, Label
-from .shape import ARROW, DeformedBody, PartGeometry
-from .sides import HeldSide, LoadedSide, Region, Side
+from .shape import ARROW, DeformedBody, HeldSide, LoadedSide, PartGeometry, Region, Side
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, VERMILION
 
 LEGIBLE = 5000

@@ -22,8 +22,7 @@ from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..units import quantity, unit_for
 from .canvas import Canvas, Label
-from .shape import ARROW, DeformedBody, PartGeometry
-from .sides import HeldSide, LoadedSide, Region, Side
+from .shape import ARROW, DeformedBody, HeldSide, LoadedSide, PartGeometry, Region, Side
 from .style import BLUE, GREY, INK, PALE, VERMILION, pressure_scale
 
 ELEVATIONS, AZIMUTHS = (22, -22), (-58, -122, 122, 58)

@@ -1,0 +1,225 @@
+"""The charts of a load path and of a search of all equilibria.
+
+``path.png``: the force over the displacement of the driven part, stable and unstable stretches, jumps and events;
+``equilibria.png``: the energies of all equilibria, and beside each its state along Γc.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.markers import CARETDOWN
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, MaxNLocator
+
+from ...typing import Array, Mask
+from ..reader import EquilibriaResult, PathResult, Row
+from ..units import Unit, number, unit_for
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, VERMILION, figure, titled
+
+PATH_CAPTION = (
+    "The load path: force (under a moment the load factor) over mean displacement of the driven part. Solid: stable; "
+    "dashed: unstable, which a test cannot hold; dotted: jumps; dots: events on the way, some where they are many."
+)
+_DOTS = 40
+"""So many events have a dot at most."""
+MOST = 16
+"""Equilibria in the picture, those of lowest energy."""
+EQUILIBRIA_CAPTION = (
+    "The equilibria that were found, the lowest at the top. Left: the energy above the lowest found. Right: the state "
+    "of each along the contact parts, vertex by vertex."
+)
+_PIECES = (BLUE, ORANGE, GREEN, PURPLE)
+_KINDS, _OTHER = {"minimiser": ("o", INK), "saddle": ("^", "white")}, ("s", "white")
+"""The mark of each kind of equilibrium, and its face."""
+
+
+def path_chart(result: PathResult) -> Figure:
+    """The picture of a load path.
+
+    Args:
+        result: the path; a part of it is driven.
+    """
+    assert result.driven is not None
+    u, force = result.along(result.driven)
+    pulled = bool(np.any(force))
+    load = force if pulled else result.columns["factor"]
+    units = unit_for(float(np.max(np.abs(u))), "m"), _unit(result, load) if pulled else Unit(1.0, "")
+    fig = figure(5.8)
+    titled(fig, result.title, _path_subject(result), *_path_verdict(result))
+    axes = fig.add_subplot()
+    x, y = np.asarray(u / units[0].size), np.asarray(load / units[1].size)
+    _stretches(axes, result, x, y)
+    _marks(axes, result, x, y, units)
+    axes.axhline(0.0, color=GREY, lw=0.8, zorder=0)
+    direction = " along its force" if pulled else ""
+    axes.set_xlabel(f"mean displacement of “{result.driven}”{direction} ({units[0].name})")
+    axes.set_ylabel(f"force on “{result.driven}” ({units[1].name})" if pulled else "load factor")
+    axes.margins(0.06, 0.10)
+    fig.legend(loc="outside lower center", ncols=4, fontsize=11, handlelength=1.6, columnspacing=0.9)
+    return fig
+
+
+def _unit(result: PathResult, force: Array) -> Unit:
+    return unit_for(float(np.max(np.abs(force))), "N" if len(result.axes) == 3 else "N/m")
+
+
+def _path_subject(result: PathResult) -> str:
+    path = result.path
+    return f"load path · largest factor {path['peak_factor']:.5g} · {_events(path['events'] + path['folds'])}"
+
+
+def _events(count: int) -> str:
+    return "1 event" if count == 1 else f"{count} events"
+
+
+def _path_verdict(result: PathResult) -> tuple[str, str]:
+    path = result.path
+    if path["uncertified"]:
+        return f"✗ {path['uncertified']} rows NOT certified", VERMILION
+    words = {"reached": "✓ certified to its end", "escapes": "✓ certified, then it comes off"}
+    return (words[path["end"]], GREEN) if path["end"] in words else (f"✗ {path['end']}", VERMILION)
+
+
+def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
+    """The curve, each kind of it as one line that has gaps."""
+    jump = np.array([event == "jump" for event in result.events[1:]], dtype=bool)
+    stable = result.stable[:-1] & ~jump
+    kinds: tuple[tuple[Mask, str, dict[str, Any]], ...] = (
+        (stable, "stable", {"color": BLUE, "ls": "-", "lw": 2.4, "zorder": 3}),
+        (~stable & ~jump, "unstable", {"color": VERMILION, "ls": (0, (4, 2)), "lw": 1.5, "zorder": 2}),
+        (jump, "jump", {"color": GREY, "ls": ":", "lw": 2.2, "zorder": 2}),
+    )
+    for kind, name, look in kinds:
+        if np.any(kind):
+            axes.plot(*_with_gaps(x, y, kind), label=name, **look)
+
+
+def _with_gaps(x: Array, y: Array, chosen: Mask) -> tuple[Array, Array]:
+    """The chosen stretches between neighbouring rows, others left out."""
+    points = np.column_stack([x, y])
+    parts = [np.vstack([points[at : at + 2], [[np.nan, np.nan]]]) for at in np.flatnonzero(chosen)]
+    joined = np.vstack(parts)
+    return joined[:, 0], joined[:, 1]
+
+
+def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: tuple[Unit, Unit]) -> None:
+    """Events as dots, the largest force, turns and the end by name."""
+    events = np.flatnonzero([e in ("kink", "contact", "release", "fold") for e in result.events])
+    shown = events[:: max(1, -(-len(events) // _DOTS))]
+    if len(shown):
+        axes.plot(x[shown], y[shown], "o", color=INK, ms=3.4, alpha=0.8, mew=0, zorder=4, label="event")
+    look: dict[str, Any] = {"ls": "", "ms": 9, "mec": "white", "mew": 0.8, "zorder": 6}
+    peak = int(np.argmax(y))
+    load = f"{number(y[peak], 4)} {units[1].name}".rstrip()
+    words = f"peak {load} at {number(x[peak], 4)} {units[0].name}"
+    axes.plot(x[peak], y[peak], marker=CARETDOWN, color=PURPLE, label=words, **{**look, "ms": 12})
+    for row, marker, colour, text in _named(result):
+        axes.plot(x[row], y[row], marker=marker, color=colour, label=text, **look)
+
+
+def _named(result: PathResult) -> Iterator[tuple[int, str, str, str | None]]:
+    """Turns and the end: row, mark, colour and words."""
+    for count, row in enumerate(n for n, event in enumerate(result.events) if event == "turn"):
+        yield row, "s", INK, None if count else "turn"
+    if result.path["end"] != "reached":
+        yield len(result.events) - 1, "X", VERMILION, str(result.path["end"])
+
+
+def equilibria_chart(result: EquilibriaResult) -> Figure:
+    """The picture of a search.
+
+    Args:
+        result: the search; it found something.
+    """
+    rows = result.rows[:MOST]
+    states = [result.state(row) for row in rows]
+    fig = figure(1.8 + 0.62 * len(rows))
+    titled(fig, result.title, *_search_subject(result, len(rows)))
+    energies, strips = fig.subplots(1, 2, width_ratios=(2, 3))
+    _energies(energies, result, rows)
+    _strips(strips, rows, states)
+    _legend(fig, sorted({row["kind"] for row in rows}), states)
+    return fig
+
+
+def _search_subject(result: EquilibriaResult, shown: int) -> tuple[str, str, str]:
+    known, count = result.known, len(result.rows)
+    below = f"{count} equilibria" if count != 1 else "one equilibrium"
+    below += f", the {shown} lowest shown" if shown < count else ""
+    if known["complete"]:
+        return below, "✓ all, proven", GREEN
+    return (below, "✓ the lowest, proven", GREEN) if known["proven"] else (below, "there may be others", INK)
+
+
+def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None:
+    values = np.array(result.energies[: len(rows)]) - result.energies[0]
+    unit = unit_for(float(values[-1]), result.unit)
+    values = np.asarray(values / unit.size)
+    for i, (row, value) in enumerate(zip(rows, values, strict=True)):
+        mark, face = _KINDS.get(row["kind"], _OTHER)
+        axes.plot(value, i, mark, color=INK, mfc=face, ms=9, clip_on=False)
+    spread = float(values[-1]) or 1.0
+    axes.set_xlim(-0.06 * spread, 1.06 * spread)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
+    axes.xaxis.set_major_locator(MaxNLocator(2) if spread != 1.0 or values[-1] else FixedLocator([0.0]))
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel(f"{unit.name} above the lowest found,\n{number(result.energies[0])} {result.unit}")
+
+
+def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) -> None:
+    """A strip for each equilibrium: the piece of the law at each vertex, and a line below where it has lifted off."""
+    longest = max(map(len, states))
+    for i, (row, vertices) in enumerate(zip(rows, states, strict=True)):
+        colours = np.array([[to_rgb(_colour(v)) for v in vertices]])
+        axes.imshow(colours, extent=(-0.5, len(vertices) - 0.5, i + 0.26, i - 0.26), aspect="auto", zorder=1)
+        edges = np.arange(len(vertices) - 1) + 0.5
+        axes.vlines(edges, i - 0.26, i + 0.26, color="white", lw=0.8 if longest < 80 else 0.2)
+        lifted = np.flatnonzero([_is_lifted(vertex) for vertex in vertices])
+        axes.hlines(np.full(len(lifted), i + 0.34), lifted - 0.5, lifted + 0.5, color=INK, lw=3.0)
+        words = f"{row['kind']}, {row['broken']} broken"
+        axes.text(0.0, i - 0.3, words, transform=axes.get_yaxis_transform(), va="bottom", size=10, color=GREY)
+    axes.set_xlim(-0.5, longest - 0.5)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_yticks([])
+    axes.spines[["left"]].set_visible(False)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("vertex along the contact parts")
+
+
+def _is_lifted(vertex: Row) -> bool:
+    return vertex["contact"] in ("0", "false", "False")
+
+
+def _branch(vertex: Row) -> str:
+    """The piece that the laws of a vertex are on: of two laws the later one, or the kink that one of them is on."""
+    found = [vertex[column] for column in ("branch_t", "branch_n") if vertex[column]]
+    return "-1" if "-1" in found else max(found, key=int, default="")
+
+
+def _colour(vertex: Row) -> str:
+    branch = _branch(vertex)
+    if not branch:
+        return PALE
+    return VERMILION if branch == "-1" else _PIECES[int(branch) % len(_PIECES)]
+
+
+def _legend(fig: Figure, kinds: Sequence[str], states: Sequence[Sequence[Row]]) -> None:
+    found = sorted({_branch(v) for vertices in states for v in vertices} - {"", "-1"}, key=int)
+    marks = {kind: _KINDS.get(kind, _OTHER) for kind in kinds}
+    handles: list[Patch | Line2D] = [
+        Line2D([], [], marker=mark, color=INK, mfc=face, ls="", label=kind) for kind, (mark, face) in marks.items()
+    ]
+    handles += [Patch(color=_PIECES[int(b) % len(_PIECES)], label=f"piece {int(b) + 1} of the law") for b in found[:4]]
+    if any(_branch(v) == "-1" for vertices in states for v in vertices):
+        handles.append(Patch(color=VERMILION, label="on a kink or drop"))
+    if any(_is_lifted(v) for vertices in states for v in vertices):
+        handles.append(Line2D([], [], color=INK, lw=3.0, label="lifted off"))
+    fig.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=10, handlelength=1.2)
