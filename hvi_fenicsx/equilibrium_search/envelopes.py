@@ -1,37 +1,21 @@
 """Convex envelopes of laws on a box: convex parts of their chains, and chords that touch these.
 
-A chain of parabolas is an array (k, 6) of its arcs, each `low, high, anchor, value, traction, slope`. Neighbouring arcs
-that are convex together are one run. The hull of the runs, from left to right, is found as that of points (Andrew 1979,
-Information Processing Letters 9), with common tangents in place of chords.
+A chain of parabolas is an array (k, 6) of its arcs, each `low, high, anchor, value, traction, slope`. The hull of its
+convex arcs, and of the ends of the others, is found from left to right as that of points (Andrew 1979, Information
+Processing Letters 9), with common tangents in place of chords.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
-from bisect import bisect_left
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import accumulate
-from typing import cast
 
 import numpy as np
+from scipy.optimize import brentq
 
-from ..typing import Array, Integers, Mask
-from .arcs import INF, ArcTable, apart
+from ..laws.traction_graph import Arc
+from ..typing import Array, Mask
+from .arcs import ArcTable, apart, arcs_of
 from .thresholds import LIMITS
-
-LOW, HIGH = 0, 1
-
-
-@dataclass(slots=True)
-class _Piece:
-    """A run of the hull: from where it is touched, the slope of the chord that leads there, and where it is left."""
-
-    run: Run
-    start: float
-    chord: float
-    end: float
 
 
 def envelopes(arcs: ArcTable, low: Array, high: Array, added: Array) -> list[Array]:
@@ -50,7 +34,7 @@ def envelopes(arcs: ArcTable, low: Array, high: Array, added: Array) -> list[Arr
     for i, (begin, end) in enumerate(zip(first.tolist(), (first + count).tolist(), strict=True)):
         rows = table[i, begin:end]
         if falls[i, begin:end].any() or breaks[i, begin : end - 1].any():
-            rows = _hull(_runs(rows, falls[i, begin:end], breaks[i, begin : end - 1]))
+            rows = _hull(_convex_parts(arcs_of(rows)))
         result.append(rows)
     return result
 
@@ -80,233 +64,96 @@ def _falls(table: Array, meets: Mask) -> tuple[Mask, Mask]:
     return meets & (slope < 0.0), meets[:, :-1] & meets[:, 1:] & drops
 
 
-def _runs(rows: Array, falls: Mask, drops: Mask) -> list[Run]:
-    """Convex arcs joined where their traction does not drop; of falling arcs points that may be on the hull."""
-    joined = ~(falls[:-1] | falls[1:] | drops)
-    cuts: Integers = np.concatenate([[0], np.flatnonzero(~joined) + 1, [len(rows)]])
-    risen = _risen(rows)
-    runs = []
-    for begin, end in itertools.pairwise(map(int, cuts)):
-        if not falls[begin]:
-            runs.append(Run.of(rows[begin:end]))
+def _convex_parts(arcs: list[Arc]) -> list[Arc]:
+    """Arcs that do not fall, and of those that do the ends that no such arc has."""
+    result: list[Arc] = []
+    for i, arc in enumerate(arcs):
+        if arc.slope >= 0.0:
+            result.append(arc)
             continue
-        if begin == 0 or (falls[begin - 1] and risen[begin - 1]):
-            runs.append(_point(rows[begin], LOW))
-        if end == len(rows):
-            runs.append(_point(rows[begin], HIGH))
-    return runs
+        if i == 0 or arcs[i - 1].slope < 0.0:
+            result.append(_point(arc, arc.low))
+        if i == len(arcs) - 1:
+            result.append(_point(arc, arc.high))
+    return result
 
 
-def _risen(rows: Array) -> Mask:
-    """After which arcs the traction jumps upwards, rounding included; two falling ones may meet on the hull there."""
-    _, high, anchor, _, traction, slope = rows[:-1].T
-    after = rows[1:, 4] + rows[1:, 5] * (rows[1:, LOW] - rows[1:, 2])
-    before = traction + slope * (high - anchor)
-    return np.asarray(after > before + LIMITS.rounding * np.maximum(np.abs(before), np.abs(slope * anchor)))
+def _point(arc: Arc, x: float) -> Arc:
+    return Arc(x, x, x, arc.at(x), 0.0, 0.0)
 
 
-def _point(arc: Array, end: int) -> Run:
-    """One end of an arc."""
-    x, off = arc[end], arc[end] - arc[2]
-    return Run.of(np.array([[x, x, x, arc[3] + (arc[4] + 0.5 * arc[5] * off) * off, 0.0, 0.0]]))
+@dataclass(slots=True)
+class _Piece:
+    """An arc of the hull: from where it is touched, the slope of the chord that leads there, and where it is left."""
+
+    arc: Arc
+    start: float
+    chord: float
+    end: float
+
+    def support(self, p: float) -> tuple[float, float]:
+        """Where a line of slope p supports the arc from its start on: the place, and the value there."""
+        _, high, anchor, value, traction, slope = self.arc
+        if slope > 0.0:
+            x = anchor + (p - traction) / slope
+            if self.start < x < high:
+                return x, value + 0.5 * (p + traction) * (x - anchor)
+            x = min(max(x, self.start), high)
+        else:
+            x = self.start if p <= traction else high
+        return x, self.arc.at(x)
 
 
-def _hull(runs: Sequence[Run]) -> Array:
-    """The hull of runs from left to right."""
-    hull: list[_Piece] = []
-    for run in runs:
-        chord, touch = -np.inf, run.low
-        while hull:
-            top = hull[-1]
-            chord, top.end, touch = tangent(top.run, top.start, run)
-            if len(hull) == 1 or chord >= top.chord:
-                break
+def _hull(arcs: list[Arc]) -> Array:
+    """The hull of convex arcs from left to right."""
+    hull = [_Piece(arcs[0], arcs[0].low, -np.inf, arcs[0].high)]
+    for arc in arcs[1:]:
+        following = _Piece(arc, arc.low, -np.inf, arc.high)
+        while len(hull) > 1 and _apart_at(hull[-1].chord, hull[-1], following) < 0.0:
             hull.pop()
-        hull.append(_Piece(run, touch, chord, run.high))
-    return np.concatenate(_parts(hull))
+        following.chord, hull[-1].end, following.start = _tangent(hull[-1], following)
+        hull.append(following)
+    return np.array(_joined(hull))
 
 
-def _parts(hull: Sequence[_Piece]) -> list[Array]:
-    """Runs and chords of a hull; those that are as short as rounding makes them are left out."""
-    result: list[Array] = []
+def _joined(hull: list[_Piece]) -> list[Arc]:
+    """Arcs and chords of a hull; those that are as short as rounding makes them are left out."""
+    result: list[Arc] = []
     for piece, following in zip(hull, [*hull[1:], None], strict=True):
         if apart(piece.start, piece.end):
-            result.append(_between(piece))
+            result.append(piece.arc._replace(low=piece.start, high=piece.end))
         else:
             piece.end = piece.start
         if following is None:
             continue
         if apart(piece.end, following.start):
-            value = piece.run.at(piece.end)
-            result.append(np.array([[piece.end, following.start, piece.end, value, following.chord, 0.0]]))
+            value = piece.arc.at(piece.end)
+            result.append(Arc(piece.end, following.start, piece.end, value, following.chord, 0.0))
         else:
             following.start = piece.end
-    return result or [hull[0].run.rows]
+    return result or [hull[0].arc]
 
 
-def _between(piece: _Piece) -> Array:
-    """The arcs of a run from where it is touched to where it is left; none as short as rounding."""
-    run, start, end = piece.run, piece.start, piece.end
-    first, last = bisect_left(run.highs, start), min(bisect_left(run.highs, end), len(run.highs) - 1)
-    while first < last and not apart(start, run.highs[first]):
-        first += 1
-    while last > first and not apart(run.highs[last - 1], end):
-        last -= 1
-    rows = run.rows[first : last + 1].copy()
-    rows[0, LOW], rows[-1, HIGH] = start, end
-    return rows
-
-
-@dataclass(frozen=True, slots=True)
-class Run:
-    """A convex chain of arcs on a finite interval, for questions about single points.
-
-    Attributes:
-        rows: the arcs `low, high, anchor, value, traction, slope`, (k, 6).
-        table: the same as lists.
-        highs: ends of the arcs.
-        rates: tractions at both ends of each arc, which do not fall, 2 k.
-    """
-
-    rows: Array
-    table: list[list[float]]
-    highs: list[float]
-    rates: list[float]
-
-    @classmethod
-    def of(cls, rows: Array) -> Run:
-        """A chain.
-
-        Args:
-            rows: its arcs, (k, 6).
-        """
-        rates = rows[:, 4:5] + rows[:, 5:6] * (rows[:, :2] - rows[:, 2:3])
-        table = cast("list[list[float]]", rows.tolist())
-        return cls(rows, table, [arc[1] for arc in table], list(accumulate(map(float, rates.ravel()), max)))
-
-    @property
-    def low(self) -> float:
-        """Begin of the interval."""
-        return self.table[0][0]
-
-    @property
-    def high(self) -> float:
-        """End of the interval."""
-        return self.highs[-1]
-
-    def at(self, x: float) -> float:
-        """The value of the chain.
-
-        Args:
-            x: a point of the interval.
-        """
-        _, _, anchor, value, traction, slope = self._arc(x)
-        d = x - anchor
-        return value + (traction + 0.5 * slope * d) * d
-
-    def rate(self, x: float) -> float:
-        """The traction; left of a jump.
-
-        Args:
-            x: a point of the interval.
-        """
-        _, _, anchor, _, traction, slope = self._arc(x)
-        return traction + slope * (x - anchor)
-
-    def _arc(self, x: float) -> list[float]:
-        return self.table[min(bisect_left(self.highs, x), len(self.highs) - 1)]
-
-
-@dataclass(frozen=True, slots=True)
-class _Support:
-    """Where a line of given slope supports a run: the point, the value there, and the arc along which it moves."""
-
-    x: float
-    value: float
-    arc: list[float] | None
-
-
-def tangent(left: Run, start: float, right: Run) -> tuple[float, float, float]:
-    """The common tangent of two runs from below: its slope, and where it touches each.
-
-    Args:
-        left: the left one.
-        start: its part from here on is what counts.
-        right: the right one.
-    """
-    if not apart(left.high, right.low):
-        if not apart(start, left.high):
-            return right.rates[0], start, right.low
-        if right.low == right.high:
-            return left.rates[-1], left.high, right.low
-    low, high = _bracket(left, start, right)
-    p = _root(left, start, right, low, high)
-    a, b = _support(left, p, start), _support(right, p, right.low)
-    if b.x > a.x:
-        p = (b.value - a.value) / (b.x - a.x)
-    return p, a.x, b.x
-
-
-def _support(run: Run, p: float, start: float) -> _Support:
-    k, inside = divmod(bisect_left(run.rates, p), 2)
-    if inside:
-        low, high, anchor, value, traction, slope = arc = run.table[k]
-        if slope > 0.0:
-            x = anchor + (p - traction) / slope
-            if max(low, start) < x < high:
-                return _Support(x, value + 0.5 * (p + traction) * (x - anchor), arc)
-            x = max(min(x, high), low, start)
-        else:
-            x = max(low, start)
-    else:
-        x = max(run.table[k][0] if k < len(run.table) else run.high, start)
-    return _Support(x, run.at(x), None)
-
-
-def _difference(left: Run, start: float, right: Run, p: float) -> float:
+def _apart_at(p: float, left: _Piece, right: _Piece) -> float:
     """a*(p) - b*(p), a* being the conjugate of a; it does not rise with p."""
-    a, b = _support(left, p, start), _support(right, p, right.low)
-    return (p * a.x - a.value) - (p * b.x - b.value)
+    (x, value), (y, other) = left.support(p), right.support(p)
+    return (p * x - value) - (p * y - other)
 
 
-def _bracket(left: Run, start: float, right: Run) -> tuple[float, float]:
-    """A range of slopes with the tangent's in which both touching points move along one arc each."""
-    low, high = -INF, INF
-    for marks in ([left.rate(start)], left.rates, right.rates):
-        begin, end = 0, len(marks)
-        while begin < end:
-            middle = (begin + end) // 2
-            p = marks[middle]
-            if p <= low or (p < high and _difference(left, start, right, p) >= 0.0):
-                low, begin = max(low, p), middle + 1
-            else:
-                high, end = min(high, p), middle
-    spread = 1.0 + max(abs(m) for m in (low, high) if math.isfinite(m))
-    return (low if math.isfinite(low) else high - spread), (high if math.isfinite(high) else low + spread)
-
-
-def _root(left: Run, start: float, right: Run, low: float, high: float) -> float:
-    """The root of a*(p) - b*(p) in a range of p where both touching points move along one formula."""
-    middle = 0.5 * (low + high)
-    square, line, constant = 0.0, 0.0, 0.0
-    # a*(p) = p anchor - value + (p - traction)²/(2 slope) where the point is free; p x - value(x) where it is an end
-    for sign, here in ((1.0, _support(left, middle, start)), (-1.0, _support(right, middle, right.low))):
-        if here.arc is not None:
-            _, _, anchor, value, traction, slope = here.arc
-            square += sign * 0.5 / slope
-            line += sign * (anchor - traction / slope)
-            constant += sign * (0.5 * traction**2 / slope - value)
-        else:
-            line += sign * here.x
-            constant -= sign * here.value
-    roots = _quadratic_roots(square, line, constant)
-    inside = [r for r in roots if low <= r <= high] or roots or [middle]
-    return min(inside, key=lambda r: abs(r - min(max(r, low), high)))
-
-
-def _quadratic_roots(a: float, b: float, c: float) -> list[float]:
-    """Real roots of a p² + b p + c."""
-    if a == 0.0:
-        return [-c / b] if b != 0.0 else []
-    q = -0.5 * (b + math.copysign(math.sqrt(max(b * b - 4.0 * a * c, 0.0)), b))
-    return [q / a, c / q] if q != 0.0 else [q / a]
+def _tangent(left: _Piece, right: _Piece) -> tuple[float, float, float]:
+    """The common tangent of two arcs from below: its slope, and where it touches each."""
+    a, b = left.arc, right.arc
+    first = b.rate(b.low)
+    if not apart(a.high, b.low) and (not apart(left.start, a.high) or a.rate(a.high) <= first):
+        return first, a.high, b.low
+    marks = [a.rate(left.start), a.rate(a.high), first, b.rate(b.high)]
+    p, most = min(marks), max(marks)
+    if _apart_at(p, left, right) > 0.0:
+        after = _apart_at(most, left, right)
+        p = (
+            most
+            if after >= 0.0
+            else brentq(_apart_at, p, most, (left, right), np.finfo(float).tiny, 4.0 * np.finfo(float).eps)
+        )
+    (x, value), (y, other) = left.support(p), right.support(p)
+    return ((other - value) / (y - x) if y > x else p), x, y
