@@ -16,7 +16,7 @@ from ..typing import Array
 from .arcs import FREE, Chain, chain, total
 from .curved_laws import LawGraph, law_graph
 from .lengths import Lengths
-from .rigid_motions import with_motions
+from .rigid_motions import without_resistance
 from .scalar_problem import ScalarProblem
 from .thresholds import LIMITS
 
@@ -47,10 +47,8 @@ def scalar_problem(
     chains = [*unknowns, *(laws.chains[v] for v in vectors)]
     whole = tuple(total(one) if one else FREE for one in chains)
     lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, LIMITS.zero)
-    stiffness, motions = with_motions(problem.stiffness)
     return ScalarProblem(
-        stiffness=stiffness,
-        motions=motions,
+        stiffness=without_resistance(problem.stiffness),
         force=problem.load(factor),
         lower=lower,
         upper=upper,

@@ -18,7 +18,7 @@ from .arcs import ArcTable, apart, arcs_of
 from .thresholds import LIMITS
 
 
-def envelopes(arcs: ArcTable, low: Array, high: Array, added: Array) -> list[Array]:
+def convex_chains(arcs: ArcTable, low: Array, high: Array, added: Array) -> list[Array]:
     """The convex envelopes of chains plus ½ d x² on intervals: chains whose tractions do not fall, (k, 6) each.
 
     Args:

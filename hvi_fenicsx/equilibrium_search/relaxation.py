@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Integers
-from . import envelopes as convex
 from .arcs import ArcTable
 from .convex_programme import Optimum, minimise, never
 from .curvature import Curvature, CurvatureShare
+from .envelopes import convex_chains
 from .length_programme import LengthProgramme
 from .scalar_problem import Box, ScalarProblem
 from .thresholds import LIMITS
@@ -27,7 +27,7 @@ def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> 
         high: of the box, (n + m,), finite.
         added: d, (n + m,).
     """
-    chains = convex.envelopes(problem.arcs, low, high, added)
+    chains = convex_chains(problem.arcs, low, high, added)
     return ArcTable.of([*chains[: problem.size], *(_risen(c) for c in chains[problem.size :])])
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array, Integers
-from .rigid_motions import RigidMotions
+from .rigid_motions import RigidMotions, resistance
 from .scalar_problem import ScalarProblem
 from .thresholds import LIMITS
 from .tightening import GraphClip, clipped_again
@@ -36,14 +36,14 @@ class RigidBalance:
     def __init__(self, problem: ScalarProblem) -> None:
         self._problem, n = problem, problem.size
         self._graphs = GraphClip(problem, np.zeros(n))
-        motions = problem.motions or RigidMotions.of(problem.stiffness)
+        motions = RigidMotions.of(problem.stiffness)
         self.pivots: Integers = motions.pivots
         self.motions: Array = motions.shapes
         others = np.ix_(motions.others, motions.others)
         self._flexibility = np.zeros((n, n))
         self._flexibility[others] = np.linalg.inv(problem.stiffness[others])
-        resistance, rounding = motions.resistance(problem.stiffness)
-        self._net = np.where(resistance <= rounding, 0.0, resistance + rounding)
+        found, rounding = resistance(problem.stiffness, motions.shapes)
+        self._net = np.where(found <= rounding, 0.0, found + rounding)
         self._rest = self._error()
         self._exact = bool(not self._net.any() and self._rest.sum(axis=1).max() < 0.5)
 

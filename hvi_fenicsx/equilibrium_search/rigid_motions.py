@@ -16,8 +16,6 @@ from scipy.linalg import qr
 from ..typing import Array, Integers
 from .thresholds import LIMITS
 
-EPSILON = float(np.finfo(float).eps)
-
 
 @dataclass(frozen=True, kw_only=True)
 class RigidMotions:
@@ -50,43 +48,36 @@ class RigidMotions:
         shapes[others] = -np.linalg.solve(stiffness[np.ix_(others, others)], stiffness[np.ix_(others, pivots)])
         return cls(pivots=pivots, others=others, shapes=shapes)
 
-    def rounded(self) -> RigidMotions:
-        """The motions whose shares that are next to 0, 1 or -1 are these numbers."""
-        whole = np.round(self.shapes)
-        shapes = np.where(np.abs(self.shapes - whole) < LIMITS.accuracy, whole, self.shapes)
-        return RigidMotions(pivots=self.pivots, others=self.others, shapes=shapes)
 
-    def resistance(self, stiffness: Array) -> tuple[Array, Array]:
-        """How much a stiffness resists the motions, and the size of its rounding, (n, k) each.
+def resistance(stiffness: Array, shapes: Array) -> tuple[Array, Array]:
+    """How much a stiffness resists motions, and the size of its rounding, (n, k) each.
 
-        Args:
-            stiffness: S, (n, n).
-        """
-        size = np.abs(stiffness) @ np.abs(self.shapes)
-        return np.abs(stiffness @ self.shapes), len(stiffness) * LIMITS.rounding * size
+    Args:
+        stiffness: S, (n, n).
+        shapes: T, (n, k).
+    """
+    return np.abs(stiffness @ shapes), len(stiffness) * LIMITS.rounding * (np.abs(stiffness) @ np.abs(shapes))
 
 
-def with_motions(stiffness: Array) -> tuple[Array, RigidMotions]:
-    """A stiffness that does not resist its rigid motions, and these; the given one where they may be deformations.
+def without_resistance(stiffness: Array) -> Array:
+    """A stiffness that does not resist its rigid motions; the given one where they may be deformations.
+
+    Shares of a motion that are next to 0, 1 or -1 are these numbers.
 
     Args:
         stiffness: S, symmetric, (n, n).
     """
     motions = RigidMotions.of(stiffness)
-    resistance, rounding = motions.resistance(stiffness)
-    if np.any(resistance > rounding):
-        return stiffness, motions
-    rounded = motions.rounded()
-    changed, scale = _changed(stiffness, rounded), np.sqrt(np.diag(stiffness))
-    near = np.all(np.abs(changed - stiffness) <= LIMITS.zero * np.outer(scale, scale))
-    return (changed, rounded) if near else (stiffness, motions)
-
-
-def _changed(stiffness: Array, motions: RigidMotions) -> Array:
-    others, pivots = motions.others, motions.pivots
-    result, shapes = stiffness.copy(), motions.shapes[others]
+    found, rounding = resistance(stiffness, motions.shapes)
+    if np.any(found > rounding):
+        return stiffness
+    others, pivots, shapes = motions.others, motions.pivots, motions.shapes[motions.others]
+    whole = np.round(shapes)
+    shapes = np.where(np.abs(shapes - whole) < LIMITS.accuracy, whole, shapes)
+    result, scale = stiffness.copy(), np.sqrt(np.diag(stiffness))
     between = -stiffness[np.ix_(others, others)] @ shapes
     result[np.ix_(others, pivots)], result[np.ix_(pivots, others)] = between, between.T
     own = -shapes.T @ between
     result[np.ix_(pivots, pivots)] = 0.5 * (own + own.T)
-    return result
+    near = np.all(np.abs(result - stiffness) <= LIMITS.zero * np.outer(scale, scale))
+    return result if near else stiffness

@@ -14,7 +14,6 @@ import numpy as np
 from ..typing import Array
 from .arcs import INF, ArcTable, Chain
 from .lengths import Lengths
-from .rigid_motions import RigidMotions
 from .thresholds import LIMITS
 
 
@@ -32,7 +31,6 @@ class ScalarProblem:
         constant: a part of the energy that x does not change.
         error: the energy of the laws differs from that of the chains by this at most; 0 where these are exact.
         farthest: displacements up to which this is known.
-        motions: the rigid motions, which S does not resist; None where they are not told.
     """
 
     stiffness: Array
@@ -44,7 +42,6 @@ class ScalarProblem:
     constant: float = 0.0
     error: float = 0.0
     farthest: float = INF
-    motions: RigidMotions | None = None
 
     @property
     def far(self) -> float:

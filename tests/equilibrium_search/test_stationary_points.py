@@ -21,7 +21,7 @@ from hvi_fenicsx.equilibrium_search import curvature
 from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
-from hvi_fenicsx.equilibrium_search.envelopes import envelopes
+from hvi_fenicsx.equilibrium_search.envelopes import convex_chains
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_search.rigid_balance import RigidBalance
@@ -238,7 +238,7 @@ def test_an_envelope_is_the_hull_of_samples_and_never_above_the_law(seed: int) -
     low, high = np.sort(random.uniform(-4, 4, 2))
     added = random.uniform(0, 3) * random.integers(0, 2)
     table = ArcTable.of([chain(graph, weight, sign)])
-    rows = envelopes(table, np.array([low]), np.array([high]), np.array([added]))[0]
+    rows = convex_chains(table, np.array([low]), np.array([high]), np.array([added]))[0]
     arcs, envelope = arcs_of(rows), ArcTable.of([rows])
     inner = sign * graph.breaks
     x = np.unique(np.concatenate([np.linspace(low, high, 1500), inner[(inner > low) & (inner < high)]]))
