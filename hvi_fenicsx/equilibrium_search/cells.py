@@ -16,7 +16,7 @@ from . import stationarity
 from .arcs import on_interval
 from .balance_programme import Guide
 from .convex_programme import minimise
-from .relaxation import envelopes
+from .envelopes import envelopes
 from .scalar_problem import Box, ScalarProblem, clipped
 from .stationarity import StationaryPoint
 from .thresholds import LIMITS

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from ..laws.traction_graph import Arc
 from ..typing import Array, Mask
 from .arcs import ArcTable, apart, arcs_of
+from .scalar_problem import ScalarProblem
 from .thresholds import LIMITS
 
 
@@ -157,3 +158,37 @@ def _tangent(left: _Piece, right: _Piece) -> tuple[float, float, float]:
         )
     (x, value), (y, other) = left.support(p), right.support(p)
     return ((other - value) / (y - x) if y > x else p), x, y
+
+
+def envelopes(problem: ScalarProblem, low: Array, high: Array, added: Array) -> ArcTable:
+    """The convex envelopes of all laws with ½ d t² added, on a box; those of lengths reach to zero, and never fall.
+
+    Args:
+        problem: the problem.
+        low: of the box, (n + m,), finite.
+        high: of the box, (n + m,), finite.
+        added: d, (n + m,).
+    """
+    chains = convex_chains(problem.arcs, low, high, added)
+    return ArcTable.of([*chains[: problem.size], *(_risen(c) for c in chains[problem.size :])])
+
+
+def _risen(chain: Array) -> Array:
+    """The largest convex chain from zero on that does not fall and is nowhere above the given one, (k, 6)."""
+    low, high, anchor, _, traction, slope = chain.T
+    begin, end = traction + slope * (low - anchor), traction + slope * (high - anchor)
+    rising = np.flatnonzero((end > 0.0) | ((slope > 0.0) & (begin >= 0.0)))
+    if not rising.size:
+        return np.array([_flat(chain[-1], float(high[-1]))])
+    rest = chain[rising[0] :].copy()
+    if begin[rising[0]] < 0.0:
+        rest[0, 0] = np.clip(anchor[rising[0]] - traction[rising[0]] / slope[rising[0]], *rest[0, :2])
+    turn = float(rest[0, 0])
+    return np.vstack([_flat(rest[0], turn), rest]) if turn > 0.0 else rest
+
+
+def _flat(arc: Array, end: float) -> list[float]:
+    """A constant arc from zero on that ends on a given one."""
+    anchor, value, traction, slope = map(float, arc[2:])
+    away = end - anchor
+    return [0.0, end, end, value + (traction + 0.5 * slope * away) * away, 0.0, 0.0]
