@@ -16,10 +16,9 @@ from ..solvers.method import SolveResult
 from ..typing import Array
 from ..workflow import Preparation, Solution, certified, finish
 from .condensed_form import scalar_problem
-from .curved_laws import stationary_point
 from .scalar_problem import ScalarProblem
 from .search import Found, Keep, Saved, Task, find
-from .stationarity import Kind, StationaryPoint
+from .stationarity import Kind, StationaryPoint, stationary_point
 from .thresholds import LIMITS
 
 NONE = Found(complete=True, proven=True, reason="no solution exists")

@@ -1,24 +1,31 @@
 """All stationary points: cells that no point satisfies are given up, the others divided until each has one at most.
 
 A cell gives each unknown an interval, or one joint of its law. It needs no division where its laws tell that it has one
-stationary point at most, and which (:mod:`.cells`). A drop is divided in three: before it, behind it, and on
+stationary point at most, and which. A drop is divided in three: before it, behind it, and on
 it, where the traction may have any value between. Laws act on one component each, and their tractions are polylines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.linalg import LinAlgError, cholesky
+from scipy.optimize import linprog
 
-from ..typing import Array
-from .balance_programme import BalanceTest, Look
-from .cells import PolylineCells, parts, settled
+from ..typing import Array, Integers, Mask
+from . import stationarity
+from .arcs import on_interval
+from .balance_programme import BalanceTest, Guide, Look
+from .convex_programme import minimise
+from .envelopes import envelopes
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
-from .scalar_problem import Box, ScalarProblem
-from .stationarity import PointList
+from .scalar_problem import Box, ScalarProblem, clipped
+from .stationarity import PointList, StationaryPoint
 from .thresholds import LIMITS
 from .tightening import ForceIntervals, clipped_again, shorter
 
@@ -106,3 +113,258 @@ class Enumeration:
     def _balanced(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         ends = self._forces.tightened(low, high)
         return None if ends is None else self._balance.tightened(*ends)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What is known of a cell.
+
+    Attributes:
+        point: a stationary point in the cell; None where none is found.
+        decided: whether there is no other one.
+    """
+
+    point: StationaryPoint | None = None
+    decided: bool = True
+
+
+OPEN = Verdict(decided=False)
+"""What is known of a cell that is to be divided."""
+
+
+class PolylineCells:
+    """Cells of laws whose tractions are polylines.
+
+    Args:
+        problem: the problem.
+    """
+
+    def __init__(self, problem: ScalarProblem) -> None:
+        self._problem = problem
+
+    def verdict(self, cell: Box) -> Verdict:
+        """What is known of a cell.
+
+        Args:
+            cell: the cell.
+        """
+        arcs, problem = self._problem.arcs, self._problem
+        fixed = cell.low == cell.high
+        free = np.flatnonzero(~fixed)
+        if not free.size:
+            return self._done(cell.low)
+        if np.any(arcs.drops(cell.low, cell.high) > 0.0):
+            return OPEN
+        slopes = arcs.least_slope(cell.low, cell.high)
+        matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
+        if _positive(matrix):
+            return self._done(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
+        if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(at_bounds(problem, cell)[free]):
+            return OPEN
+        return self._linear(cell, free, matrix)
+
+    def point(self, x: Array, *, isolated: bool = True) -> StationaryPoint | None:
+        """The stationary point at a place; None where there is none.
+
+        Args:
+            x: the place, (n,).
+            isolated: False where it is one of a continuum.
+        """
+        problem = self._problem
+        x = np.clip(x, problem.lower, problem.upper)
+        if stationarity.imbalance(problem, x) > LIMITS.accuracy:
+            return None
+        kind = stationarity.kind(problem, x)
+        return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
+
+    def _done(self, x: Array, *, isolated: bool = True) -> Verdict:
+        """Nothing is left of a cell but perhaps this point."""
+        return Verdict(point=self.point(x, isolated=isolated))
+
+    def _minimum(self, cell: Box, added: Array) -> Array:
+        """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
+        problem, chains = self._problem, envelopes(self._problem, cell.low, cell.high, added)
+        return minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x).x
+
+    def _linear(self, cell: Box, free: Integers, matrix: Array) -> Verdict:
+        """The solutions of a cell in which every law is on one arc."""
+        problem, arcs, rows = self._problem, self._problem.arcs, np.arange(self._problem.size)
+        k = np.argmax(arcs.meets(cell.low, cell.high), axis=1)
+        offset = arcs.tractions[rows, k] - arcs.slopes[rows, k] * arcs.anchors[rows, k]
+        held = np.setdiff1d(rows, free)
+        right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
+        x, low, high = cell.low.copy(), cell.low[free], cell.high[free]
+        if np.linalg.cond(matrix) < 1.0 / LIMITS.rounding:
+            x[free] = np.linalg.solve(matrix, right)
+            near = LIMITS.same * (1.0 + np.abs(x[free]))
+            inside = np.all((x[free] >= low - near) & (x[free] <= high + near))
+            return self._done(x) if inside else Verdict()
+        if (inner := some_solution(matrix, right, np.column_stack([low, high]))) is None:
+            return Verdict()
+        x[free] = inner
+        return self._done(x, isolated=False)
+
+
+def _positive(matrix: Array) -> bool:
+    """Whether a matrix is positive definite, its least pivot above a share of the largest."""
+    try:
+        pivots = np.diag(cholesky(matrix, lower=True))
+    except LinAlgError:
+        return False
+    return bool(pivots.min() > LIMITS.regular * pivots.max())
+
+
+def some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
+    """A solution of a singular linear system, halfway between two; None if there is none.
+
+    Args:
+        matrix: of the system, (n, n).
+        right: its right side, (n,).
+        sides: intervals, (n, 2).
+    """
+    size, n = float(np.abs(matrix).max()) or 1.0, len(right)
+    ends = [
+        linprog(np.full(n, sign), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
+        for sign in (1.0, -1.0)
+    ]
+    return None if any(e.status != 0 for e in ends) else np.asarray(0.5 * (ends[0].x + ends[1].x))
+
+
+def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guide: Guide | None) -> list[Box]:
+    """The parts of a cell, the one to look at first last.
+
+    Args:
+        problem: the problem.
+        pivots: unknowns that fix the rigid motions.
+        cell: the cell.
+        guide: where means are far from the graphs of laws and bounds; None where that is not known.
+    """
+    found = _far(problem, pivots, cell)
+    if guide is not None:
+        found = found or _guided(problem, cell, guide)
+    return found or list(_any(problem, cell))
+
+
+def at_bounds(problem: ScalarProblem, cell: Box) -> Mask:
+    """Where a bound of the problem can push, and the unknown is free to leave it.
+
+    Args:
+        problem: the problem.
+        cell: the cell.
+    """
+    ends = (cell.low <= problem.lower) | (cell.high >= problem.upper)
+    return np.asarray(ends & (cell.low < cell.high))
+
+
+def _far(problem: ScalarProblem, pivots: Integers, cell: Box) -> list[Box]:
+    """Growing parts of the widest interval of a pivot that reaches far: near the joints, and far on either side."""
+    begin, end = cell.low[pivots], cell.high[pivots]
+    near = np.maximum(problem.joint, np.maximum(begin, -end))
+    most = np.maximum(end, -begin)
+    wide = np.flatnonzero(most > LIMITS.wide * near)
+    if not wide.size:
+        return []
+    j = wide[np.argmax((end - begin)[wide])]
+    at = math.sqrt(near[j] * most[j])
+    marks = [float(begin[j]), *(mark for mark in (-at, at) if begin[j] < mark < end[j]), float(end[j])]
+    return [_with(cell, int(pivots[j]), first, last) for first, last in itertools.pairwise(marks)]
+
+
+def _guided(problem: ScalarProblem, cell: Box, guide: Guide) -> list[Box]:
+    """Parts where the mean is farthest from a graph."""
+    free = cell.low < cell.high
+    law, bound = np.where(free, guide.law, 0.0), np.where(free & at_bounds(problem, cell), guide.bound, 0.0)
+    i, j = int(np.argmax(law)), int(np.argmax(bound))
+    if max(law[i], bound[j]) <= 0.0:
+        return []
+    return list(off_bound(problem, cell, j) if bound[j] >= law[i] else _near(problem, cell, i, float(guide.x[i])))
+
+
+def _near(problem: ScalarProblem, cell: Box, i: int, x: float) -> Iterator[Box]:
+    """Parts at the joint that is nearest to a place; halves if there is none."""
+    joints = _joints(problem, cell, i)
+    if not joints:
+        return _halves(cell, i, 0.5 * float(cell.low[i] + cell.high[i]))
+    return _at_joint(problem, cell, i, *min(joints, key=lambda joint: abs(joint[0] - x)))
+
+
+def _any(problem: ScalarProblem, cell: Box) -> Iterator[Box]:
+    """Parts at a drop where there is one, else at a joint, else at a bound."""
+    arcs = problem.arcs
+    drops = arcs.drops(cell.low, cell.high)
+    if drops.any():
+        i = int(np.argmax(drops / np.maximum(np.diag(problem.stiffness), 1e-300)))
+        chosen = [joint for joint in _joints(problem, cell, i) if joint[1] < -problem.arcs.rounding[i]]
+        return _at_joint(problem, cell, i, *chosen[len(chosen) // 2])
+    joints = np.where(cell.low < cell.high, arcs.meets(cell.low, cell.high).sum(axis=1) - 1, -1)
+    if joints.max() > 0:
+        i = int(np.argmax(joints))
+        chosen = _joints(problem, cell, i)
+        return _at_joint(problem, cell, i, *chosen[len(chosen) // 2])
+    return off_bound(problem, cell, int(np.argmax(at_bounds(problem, cell))))
+
+
+def _joints(problem: ScalarProblem, cell: Box, i: int) -> list[tuple[float, float]]:
+    """The joints of a law inside a cell, and the rise of its traction there."""
+    arcs = on_interval(problem.chains[i], float(cell.low[i]), float(cell.high[i]))
+    return [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in itertools.pairwise(arcs)]
+
+
+def _at_joint(problem: ScalarProblem, cell: Box, i: int, at: float, jump: float) -> Iterator[Box]:
+    if _jumps(problem, i, jump):  # looked at last: a minimiser is on no drop
+        yield _with(cell, i, at, at)
+    yield from _halves(cell, i, at)
+
+
+def _jumps(problem: ScalarProblem, i: int, jump: float) -> bool:
+    return abs(jump) > float(problem.arcs.rounding[i])
+
+
+def _halves(cell: Box, i: int, at: float) -> Iterator[Box]:
+    yield _with(cell, i, cell.low[i], at)
+    yield _with(cell, i, at, cell.high[i])
+
+
+def off_bound(problem: ScalarProblem, cell: Box, i: int) -> Iterator[Box]:
+    """Two parts: an unknown off its bound, and on it.
+
+    Args:
+        problem: the problem.
+        cell: the cell, which reaches to a bound of the unknown.
+        i: the unknown.
+    """
+    lower = cell.low[i] <= problem.lower[i]
+    at = cell.low[i] if lower else cell.high[i]
+    inner = np.nextafter(at, np.inf if lower else -np.inf)
+    yield _with(cell, i, inner, cell.high[i]) if lower else _with(cell, i, cell.low[i], inner)
+    yield _with(cell, i, at, at)
+
+
+def _with(cell: Box, i: int, begin: float, end: float) -> Box:
+    low, high = cell.low.copy(), cell.high.copy()
+    low[i], high[i] = begin, end
+    return replace(cell, low=low, high=high, x=np.clip(cell.x, low, high))
+
+
+def settled(problem: ScalarProblem, cell: Box) -> Box:
+    """The cell with such intervals made places.
+
+    Args:
+        problem: the problem.
+        cell: the cell.
+    """
+    n, arcs = problem.size, problem.arcs
+    low, high = cell.low[:n], cell.high[:n]
+    short = (low < high) & (high - low < LIMITS.rounding**2)
+    if not short.any():
+        return cell
+    at = arcs.high[:n, :-1]
+    jumps = np.abs(arcs.after[:n, 1:] - arcs.before[:n, :-1]) > arcs.rounding[:n, None]
+    inside = jumps & (at > low[:, None]) & (at < high[:, None])
+    places = np.where(inside, at, np.inf).min(axis=1, initial=np.inf)
+    places = np.where(low <= problem.lower, low, np.where(high >= problem.upper, high, places))
+    there = short & np.isfinite(places)
+    ends = [cell.low.copy(), cell.high.copy()]
+    for end in ends:
+        end[:n][there] = places[there]
+    return replace(cell, low=ends[0], high=ends[1], x=clipped(cell.x, *ends))

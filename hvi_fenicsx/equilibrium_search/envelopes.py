@@ -148,14 +148,11 @@ def _tangent(left: _Piece, right: _Piece) -> tuple[float, float, float]:
     if not apart(a.high, b.low) and (not apart(left.start, a.high) or a.rate(a.high) <= first):
         return first, a.high, b.low
     marks = [a.rate(left.start), a.rate(a.high), first, b.rate(b.high)]
-    p, most = min(marks), max(marks)
-    if _apart_at(p, left, right) > 0.0:
-        after = _apart_at(most, left, right)
-        p = (
-            most
-            if after >= 0.0
-            else brentq(_apart_at, p, most, (left, right), np.finfo(float).tiny, 4.0 * np.finfo(float).eps)
-        )
+    p, most, exact = min(marks), max(marks), np.finfo(float)
+    if _apart_at(most, left, right) >= 0.0:
+        p = most
+    elif _apart_at(p, left, right) > 0.0:
+        p = brentq(_apart_at, p, most, (left, right), exact.tiny, 4.0 * exact.eps)
     (x, value), (y, other) = left.support(p), right.support(p)
     return ((other - value) / (y - x) if y > x else p), x, y
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from ..errors import SolverError
 from ..typing import Array
-from .convex_programme import never
-from .descent import descend
+from .convex_programme import minimise, never
+from .length_programme import LengthProgramme
 from .relaxation import Minimum, Relaxation
 from .scalar_problem import Box, ScalarProblem, clipped
 from .thresholds import LIMITS
@@ -257,3 +257,63 @@ class LevelSet:
         if not np.isfinite(best):
             raise SolverError("no lowest energy: a body can move away without end for all that can be shown")
         return float(best - c @ self.found.x)
+
+
+def descend(
+    problem: ScalarProblem,
+    low: Array,
+    high: Array,
+    x: Array,
+    goal: float = math.inf,
+    cut: Callable[[], bool] = never,
+) -> tuple[Array, float]:
+    """A point of a box at which no convex step lowers the energy, and its energy.
+
+    Args:
+        problem: the problem.
+        low: of the box, (n + m,), finite.
+        high: of the box, (n + m,), finite.
+        x: where to begin, (n,).
+        goal: a descent that comes down too slowly to reach this energy is given up.
+        cut: whether to end where it is, since the search stops.
+    """
+    energy = problem.energy(x)
+    for _ in range(LIMITS.most_steps):
+        if cut():
+            break
+        found = _minimiser(problem, low, high, x, cut)
+        after = problem.energy(found)
+        fall, size = energy - after, problem.energy_size(x)
+        if not fall > LIMITS.rounding * size:
+            break
+        x, energy = found, after
+        if energy - goal > LIMITS.most_steps * fall:
+            break
+    return np.asarray(x), energy
+
+
+def _minimiser(problem: ScalarProblem, low: Array, high: Array, x: Array, cut: Callable[[], bool]) -> Array:
+    """The minimiser of a majorant: with φ = h - g and both convex, g is replaced by its tangent at x."""
+    lengths, n, at = problem.lengths, problem.size, problem.arguments(x)
+    rising = problem.arcs.convex_part
+    pull = rising.rates(at)[1] - problem.arcs.rates(at)[1]
+    force = problem.force + pull[:n]
+    begin = np.concatenate([np.minimum(low, at)[:n], np.zeros(len(lengths))])
+    chains = rising.on(begin, np.maximum(high, at))
+    if not len(lengths):
+        return minimise(problem.stiffness, force, chains, x, cut=cut).x
+    size, felt = at[n:], lengths.felt(lengths.vectors(x)) * lengths.factors
+    along = np.divide(pull[n:], size, out=np.zeros_like(size), where=size > 0.0)[:, None] * felt
+    force[lengths.members] += along[lengths.there]
+    ends = [np.concatenate([end[:n], radial]) for end, radial in ((low, np.zeros_like(size)), (high, chains.last[n:]))]
+    programme = LengthProgramme(
+        problem=problem,
+        a=problem.stiffness,
+        b=force,
+        laws=chains,
+        shut=np.zeros_like(size),
+        low=ends[0],
+        high=ends[1],
+        cut=cut,
+    )
+    return programme.minimiser(x)

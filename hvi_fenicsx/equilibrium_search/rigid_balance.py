@@ -4,22 +4,89 @@ With τ = f - Sx the forces that laws and bounds bear, a rigid motion r (Sr = 0)
 x = Tx_p + G(f - τ), where x_p are a few unknowns, pivots, that fix the rigid motion T x_p. So intervals of the forces,
 which also cells that reach far have, bound the differences of displacements to those of the pivots.
 
-Elastic forces have no net force: what Sr is off zero by the rounding of S (:mod:`.rigid_motions`) is taken for zero.
+Eigenvectors only tell how many pivots there are. Elastic forces have no net force, so the blocks of S at the pivots
+are made anew from the block of the others, such that S T = 0; what Sr is off zero by rounding is taken for zero.
 Else a body a million slips away would be held by rounding, where a load that is above its limit by 1e-7 pulls. What is
 beyond rounding counts, and so does what I - T_p - GS is off zero.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.linalg import qr
 
 from ..typing import Array, Integers
-from .rigid_motions import RigidMotions, resistance
 from .scalar_problem import ScalarProblem
-from .thresholds import LIMITS
+from .thresholds import EPSILON, LIMITS
 from .tightening import GraphClip, clipped_again
 
-EPSILON = float(np.finfo(float).eps)
+
+@dataclass(frozen=True, kw_only=True)
+class RigidMotions:
+    """The motions T x_p, to which S is no resistance but for rounding.
+
+    Attributes:
+        pivots: unknowns that fix the motion, (k,).
+        others: all other unknowns, (n - k,).
+        shapes: T, (n, k).
+    """
+
+    pivots: Integers
+    others: Integers
+    shapes: Array
+
+    @classmethod
+    def of(cls, stiffness: Array) -> RigidMotions:
+        """The motions of a stiffness.
+
+        Args:
+            stiffness: S, (n, n).
+        """
+        values, vectors = np.linalg.eigh(stiffness)
+        rigid = vectors[:, values <= LIMITS.zero * np.max(values, initial=0.0)]
+        n, k = rigid.shape
+        pivots = np.asarray(qr(rigid.T, pivoting=True, mode="r")[1][:k], dtype=np.int64)
+        others = np.setdiff1d(np.arange(n), pivots)
+        shapes = np.zeros((n, k))
+        shapes[pivots] = np.eye(k)
+        shapes[others] = -np.linalg.solve(stiffness[np.ix_(others, others)], stiffness[np.ix_(others, pivots)])
+        return cls(pivots=pivots, others=others, shapes=shapes)
+
+
+def resistance(stiffness: Array, shapes: Array) -> tuple[Array, Array]:
+    """How much a stiffness resists motions, and the size of its rounding, (n, k) each.
+
+    Args:
+        stiffness: S, (n, n).
+        shapes: T, (n, k).
+    """
+    return np.abs(stiffness @ shapes), len(stiffness) * LIMITS.rounding * (np.abs(stiffness) @ np.abs(shapes))
+
+
+def without_resistance(stiffness: Array) -> Array:
+    """A stiffness that does not resist its rigid motions; the given one where they may be deformations.
+
+    Shares of a motion that are next to 0, 1 or -1 are these numbers.
+
+    Args:
+        stiffness: S, symmetric, (n, n).
+    """
+    motions = RigidMotions.of(stiffness)
+    found, rounding = resistance(stiffness, motions.shapes)
+    if np.any(found > rounding):
+        return stiffness
+    others, pivots, shapes = motions.others, motions.pivots, motions.shapes[motions.others]
+    whole = np.round(shapes)
+    shapes = np.where(np.abs(shapes - whole) < LIMITS.accuracy, whole, shapes)
+    result, scale = stiffness.copy(), np.sqrt(np.diag(stiffness))
+    between = -stiffness[np.ix_(others, others)] @ shapes
+    result[np.ix_(others, pivots)], result[np.ix_(pivots, others)] = between, between.T
+    own = -shapes.T @ between
+    result[np.ix_(pivots, pivots)] = 0.5 * (own + own.T)
+    near = np.all(np.abs(result - stiffness) <= LIMITS.zero * np.outer(scale, scale))
+    return result if near else stiffness
 
 
 class RigidBalance:

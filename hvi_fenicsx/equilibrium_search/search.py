@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import InputError, SolverError
 from ..typing import Array
-from . import descent, stationarity
+from . import stationarity
 from .enumeration import Enumeration
-from .lowest import Cut, LowestSearch
+from .lowest import Cut, LowestSearch, descend
 from .scalar_problem import Box, ScalarProblem
 from .stationarity import Kind, PointList, StationaryPoint
 from .thresholds import LIMITS
@@ -232,7 +232,7 @@ def _of_lengths(task: Task) -> Found:
     task.report("a search without a proof that nothing is missed")
     below = _bounded(task)
     starts = [*task.known, *([] if below is None else [below.x])]
-    points = task.made_exact([*starts, *descent.loaded_states(task.problem, task.stop)])
+    points = task.made_exact([*starts, *loaded_states(task.problem, task.stop)])
     return Found(
         points=points,
         lower_bound=None if below is None else below.lower - task.problem.error,
@@ -344,3 +344,44 @@ def falls_passed(problem: ScalarProblem, x: Array) -> int:
     dropped = problem.arcs.drops(low, high) > 0.0
     slopes = problem.arcs.least_slope(low, high)
     return int(np.count_nonzero(moved & (dropped | (np.isfinite(slopes) & (slopes < 0.0)))))
+
+
+PROGRAMMES: list[list[float]] = [[k / 8 for k in range(1, 9)], [2, 1.5, 1], [4, 2, 1], [-1, 0, 1]]
+"""Load factors, one after the other; each programme begins at rest."""
+MULTIPLES = (0, 0.5, 2, 5, 20)
+"""They multiply the state that the first programme leads to."""
+
+
+def loaded_states(problem: ScalarProblem, stop: Callable[[], bool]) -> Iterator[Array]:
+    """States that no convex step makes lower: at the end of programmes of loads, and below multiples of the first.
+
+    Args:
+        problem: the problem.
+        stop: asked before each, and inside long descents.
+    """
+    for start in _starts(problem, stop):
+        if stop():
+            return
+        if not problem.is_far(x := _descended(problem, start, stop)):
+            yield x
+
+
+def _starts(problem: ScalarProblem, stop: Callable[[], bool]) -> Iterator[Array]:
+    first = _loaded(problem, PROGRAMMES[0], stop)
+    yield first
+    yield from (_loaded(problem, programme, stop) for programme in PROGRAMMES[1:])
+    yield from (factor * first for factor in MULTIPLES)
+
+
+def _loaded(problem: ScalarProblem, programme: Sequence[float], stop: Callable[[], bool]) -> Array:
+    """The state that a programme of loads leads to from rest."""
+    x: Array = np.zeros(problem.size)
+    for factor in programme:
+        x = _descended(problem.under(factor * problem.force), x, stop)
+    return x
+
+
+def _descended(problem: ScalarProblem, x: Array, stop: Callable[[], bool]) -> Array:
+    far, n = problem.far, problem.size
+    low, high = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
+    return descend(problem, low, high, np.clip(x, low[:n], high[:n]), cut=stop)[0]

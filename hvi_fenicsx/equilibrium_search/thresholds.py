@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+EPSILON = float(np.finfo(float).eps)
+
 
 @dataclass(frozen=True, kw_only=True)
 class SearchThresholds:

@@ -19,10 +19,8 @@ from scipy.linalg import LinAlgError, cholesky
 
 from ..typing import Array, Mask
 from .scalar_problem import ScalarProblem
-from .thresholds import LIMITS
+from .thresholds import EPSILON, LIMITS
 from .tightening import widened
-
-EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,8 @@ from scipy.optimize import brentq
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
-from hvi_fenicsx.equilibrium_search.curved_laws import stationary_point
 from hvi_fenicsx.equilibrium_search.search import Task, find
-from hvi_fenicsx.equilibrium_search.stationarity import Kind, StationaryPoint
+from hvi_fenicsx.equilibrium_search.stationarity import Kind, StationaryPoint, stationary_point
 from hvi_fenicsx.laws.smoothing import registered
 from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.typing import Array

@@ -11,8 +11,7 @@ from scipy.optimize import minimize
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import laws
-from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
-from hvi_fenicsx.equilibrium_search.curved_laws import law_graph
+from hvi_fenicsx.equilibrium_search.condensed_form import law_graph, scalar_problem
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.laws.smoothing import registered
 from hvi_fenicsx.typing import Array

@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import minimize
 
 import hvi_fenicsx as hvi
-from hvi_fenicsx.equilibrium_search import curvature
+from hvi_fenicsx.equilibrium_search import relaxation
 from hvi_fenicsx.equilibrium_search.arcs import FREE, chain
 from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.equilibrium_search.lengths import Lengths
@@ -173,7 +173,7 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int, opening: bool, monkeypa
     inside = [x for x in samples if np.all(problem.arguments(x) >= low)]
     assert inside
     for part in (0.5, 0.999):
-        monkeypatch.setattr(curvature, "LIMITS", replace(LIMITS, part=part))
+        monkeypatch.setattr(relaxation, "LIMITS", replace(LIMITS, part=part))
         bound = Relaxation(problem).solve(Box.around(low, high, low[: problem.size])).bound
         assert min(problem.energy(x) for x in inside) >= bound
 

@@ -11,8 +11,7 @@ from test_lengths import random_problem
 from test_stationary_points import FAST, problem_of
 
 from hvi_fenicsx.equilibrium_search import convex_programme
-from hvi_fenicsx.equilibrium_search.descent import loaded_states
-from hvi_fenicsx.equilibrium_search.search import Found, Task, find
+from hvi_fenicsx.equilibrium_search.search import Found, Task, find, loaded_states
 
 LENGTHS = random_problem(0, 6, 3, opening=True)
 COMPONENTS = problem_of(FAST[0])[0]

@@ -17,7 +17,7 @@ from enumeration import Floor, polyline
 from scenes import DELTA, block, model
 
 from hvi_fenicsx import prepare, read_tables
-from hvi_fenicsx.equilibrium_search import curvature
+from hvi_fenicsx.equilibrium_search import relaxation
 from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
@@ -266,7 +266,7 @@ def test_no_point_of_a_box_is_below_its_bound(seed: int, monkeypatch: pytest.Mon
     )
     low, high = np.sort(random.uniform(-3, 3, (2, n)), axis=0)
     for part in (0.5, 0.999):
-        monkeypatch.setattr(curvature, "LIMITS", dataclasses.replace(LIMITS, part=part))
+        monkeypatch.setattr(relaxation, "LIMITS", dataclasses.replace(LIMITS, part=part))
         bound = Relaxation(problem).solve(Box.around(low, high, low)).bound
         samples = random.uniform(low, high, (300, n))
         assert min(problem.energy(x) for x in samples) >= bound
