@@ -287,13 +287,14 @@ def test_a_process_that_dies_takes_the_picture_with_it_that_it_was_drawing(tmp_p
         "first = drawings.Drawing(found[0].path, '', lambda: os.kill(os.getpid(), signal.SIGKILL))\n"
         "drawings.drawings = lambda result: [first, *found[1:]]\n"
         "os.cpu_count = lambda: int(sys.argv[2])\n"
-        "print(*drawings.draw_all(Path(sys.argv[1])))\n"
+        "sys.exit(drawings.main(sys.argv[1:2]))\n"
     )
     command = [*processes.PYTHON, "-c", code, str(folder), str(processors)]
-    done = subprocess.run(command, env=processes.environment(), capture_output=True, text=True, check=True)
+    done = subprocess.run(command, env=processes.environment(), capture_output=True, text=True, check=False)
+    assert done.returncode == 1
     drawn, failure = {"scene.png", "contact.png"}, "body.png: the drawing process ended with SIGKILL"
-    assert drawn < set(done.stdout.splitlines())
-    assert failure in done.stdout
+    assert drawn == set(done.stdout.splitlines())
+    assert failure in done.stderr
     assert {path.name for path in folder.glob("*.png")} == drawn
 
 

@@ -10,8 +10,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.tri import Triangulation
-from scipy.spatial import cKDTree
 
 from ...typing import Array, Integers, Mask
 from ..body_mesh import BodyMesh
@@ -150,17 +148,10 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
 
 def _dropping(axes: Axes, s: Array, field: Field, drops: Array) -> str:
     """Draw where the law drops, if slips reach that; says what the lines mean."""
-    if not drops.size:
-        return ""
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
-    shown = ((drops <= high) & (drops >= low)).any(axis=0)
-    for drop in drops[:, shown].T:
-        axes.plot(s, drop / field.unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
-    if np.any(np.ptp(np.abs(drops), axis=0) > 0.0):
-        return "dashed: the law drops there" if shown.any() else "the law drops beyond, not reached"
-    sizes = np.unique(np.abs(drops[0, shown] if shown.any() else drops[0]))
-    said = " and ".join(quantity(float(size), "m") for size in sizes)
-    return f"dashed: the law drops at {said}" if shown.any() else f"the law drops at {said}, not reached"
+    shown = drops[:, ((drops <= high) & (drops >= low)).any(axis=0)]
+    axes.plot(s, shown / field.unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
+    return _drops_in_words(shown if shown.size else drops, reached=shown.size > 0) if drops.size else ""
 
 
 def _fallen(axes: Axes, fallen: Mask, s: Array, values: Array, colour: str) -> str:
@@ -212,12 +203,12 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
     if field.kind != "pressure":
         colours, low = shades("#f4f4f1", field.colour), 0.0
     x, y = flat.points.T / unit
-    mesh = Triangulation(x, y, flat.facets)
-    drawn = axes.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=low, vmax=high or 1.0)
+    drawn = axes.tripcolor(x, y, flat.facets, values, shading="gouraud", cmap=colours, vmin=low, vmax=high or 1.0)
     idle = part.idle[flat.facets].all(axis=1)
     if idle.any():
-        grey = Triangulation(mesh.x, mesh.y, flat.facets[idle])
-        axes.tripcolor(grey, np.zeros(len(values)), cmap="gray", vmin=-1, vmax=1, alpha=0.45, antialiased=False)
+        axes.tripcolor(
+            x, y, flat.facets[idle], np.zeros(len(values)), cmap="gray", vmin=-1, vmax=1, alpha=0.45, antialiased=False
+        )
     bar = fig.colorbar(drawn, ax=axes, ticks=None if largest > 0.0 else [0.0], aspect=12)
     bar.outline.set_visible(False)  # type: ignore[operator]
     axes.set_title(f"{field.words} in {field.unit.name}", loc="left", size=14, parse_math=True)
@@ -231,30 +222,33 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
 
 
 def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
-    """Vectors at the nodes of a coarse grid, whatever the mesh."""
+    """Vectors at the vertices nearest to the nodes of a coarse grid, whatever the mesh."""
     points = flat.points / flat.unit.size
-    low, extent = points.min(axis=0), np.ptp(points, axis=0)
-    spacing = float(np.max(extent)) / ARROWS
-    sides = (np.arange(low[i] + spacing / 2, low[i] + max(extent[i], spacing), spacing) for i in (0, 1))
-    nodes = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
-    away, nearest = cKDTree(points).query(nodes)
-    ways = vectors * 0.9 * spacing / (float(np.linalg.norm(vectors, axis=1).max()) or 1.0)
-    shown = np.unique(nearest[(away < spacing) & (np.linalg.norm(ways[nearest], axis=1) > 0.05 * spacing)])
-    look: dict[str, Any] = {"units": "inches", "width": 0.016, "color": INK, "alpha": 0.85}
-    axes.quiver(*points[shown].T, *ways[shown].T, angles="xy", scale_units="xy", scale=1.0, pivot="mid", **look)
+    spacing = float(np.max(np.ptp(points, axis=0))) / ARROWS
+    places = (points - points.min(axis=0)) / spacing
+    far = np.linalg.norm(places % 1.0 - 0.5, axis=1)
+    order = np.argsort(far)
+    shown = order[np.unique(np.floor(places[order]), axis=0, return_index=True)[1]]
+    ways = vectors[shown] * 0.9 * spacing / (float(np.linalg.norm(vectors, axis=1).max()) or 1.0)
+    look: dict[str, Any] = {"units": "inches", "width": 0.016, "minlength": 0, "color": INK, "alpha": 0.85}
+    axes.quiver(*points[shown].T, *ways.T, angles="xy", scale_units="xy", scale=1.0, pivot="mid", **look)
 
 
 def _drop_lines(axes: Axes, flat: FlatPart, part: ContactPart) -> Iterator[str]:
     """Draw where the slip is that at which the law drops, and say so."""
     for drop in part.drops.T[part.drops[0] > 0.0]:
         slip = part.size("slip") / drop
-        at = f"at {quantity(float(drop[0]), 'm')}" if np.ptp(drop) == 0.0 else "at lengths that change"
         reached = bool(np.nanmin(slip) < 1.0 < np.nanmax(slip))
         if reached:
-            x, y = flat.points.T / flat.unit.size
-            mesh = Triangulation(x, y, flat.facets)
-            axes.tricontour(mesh, slip, [1.0], colors=INK, linestyles="--")
-        yield f"dashed: the law drops {at}" if reached else f"the law drops {at}, not reached"
+            axes.tricontour(*(flat.points.T / flat.unit.size), flat.facets, slip, [1.0], colors=INK, linestyles="--")
+        yield _drops_in_words(drop, reached=reached)
+
+
+def _drops_in_words(drops: Array, *, reached: bool) -> str:
+    """Where a law drops, in words: at one slip, or at one for each vertex."""
+    least, most = float(np.abs(drops).min()), float(np.abs(drops).max())
+    at = "at " + quantity(most, "m") if least == most else f"between {quantity(least, 'm')} and {quantity(most, 'm')}"
+    return f"dashed: the law drops {at}" if reached else f"the law drops {at}, not reached"
 
 
 CLOSED = 0.5
@@ -312,26 +306,21 @@ def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
 
 
 def _unrolled(points: Array, triangles: Integers, normals: Array, touches: Mask) -> FlatPart:
-    """Angle times mean radius, and the way along the axis that the normals are most across; cut opposite to contact."""
-    axis = np.linalg.eigh(normals.T @ normals)[1][:, 0]
-    largest = int(np.argmax(np.abs(axis)))
-    straight = abs(axis[largest]) > np.cos(np.radians(2))
-    axis = np.eye(3)[largest] if straight else axis * np.sign(axis[largest])
-    towards = 0 if abs(axis[0]) < np.sqrt(0.5) else 1
-    first = np.eye(3)[towards] - axis[towards] * axis
-    first /= np.linalg.norm(first)
-    plane = np.stack([first, np.cross(axis, first)])
-    arms = points @ plane.T
+    """Angle times mean radius, and the coordinate that the normals are most across; cut opposite to contact."""
+    axis = int(np.argmin(np.sum(normals**2, axis=0)))
+    across = [i for i in range(3) if i != axis]
+    arms = points[:, across]
     arms = arms - np.linalg.lstsq(np.column_stack([2.0 * arms, np.ones(len(arms))]), np.sum(arms**2, axis=1))[0][:2]
     angles, radius = np.arctan2(arms[:, 1], arms[:, 0]), float(np.linalg.norm(arms, axis=1).mean())
     start = float(np.angle(np.sum(np.exp(1j * angles[touches])))) - np.pi
     angles = start + np.mod(angles - start, 2.0 * np.pi)
-    onward = np.column_stack([-np.sin(angles), np.cos(angles)]) @ plane
-    name = "xyz"[largest] if straight else ""
+    ways = np.zeros((len(points), 2, 3))
+    ways[:, 0, across] = np.column_stack([-np.sin(angles), np.cos(angles)])
+    ways[:, 1, axis] = 1.0
     return FlatPart(
-        points=np.column_stack([radius * angles, points @ axis]),
+        points=np.column_stack([radius * angles, points[:, axis]]),
         facets=triangles[np.ptp(angles[triangles], axis=1) < np.pi],
-        ways=np.stack([onward, np.broadcast_to(axis, onward.shape)], axis=1),
-        names=(f"way round, 0 towards +{'xyz'[towards]},", name or "way along,"),
-        how=f"unrolled about {name or 'its axis'}",
+        ways=ways,
+        names=(f"way round, 0 towards +{'xyz'[across[0]]},", "xyz"[axis]),
+        how=f"unrolled about {'xyz'[axis]}",
     )

@@ -21,7 +21,6 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -130,74 +129,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
     processes.die_with_parent()  # or it would write into the folder of the next run
     processes.stand_back()  # the ranks may still be computing
     try:
-        failures = draw_all(folder)
+        found, at_once = drawings_of(folder), os.cpu_count() or 1
     except HviError as error:
-        failures = [error]
-    for failure in failures:
-        print(f"{COMPLAINT}{failure}", file=sys.stderr)
-    for failure in failures:
-        if isinstance(failure, NotWrittenError):
-            return writing.hand_over(failure)
-    return 1 if failures else 0
-
-
-def draw_all(folder: Path) -> list[HviError]:
-    """Draw the pictures of a folder side by side and print the names of those that are there.
-
-    Returns:
-        What went wrong with the others.
-
-    Raises:
-        ResultError: the folder is damaged.
-        PictureError: there is nothing to draw.
-    """
-    found, at_once = drawings_of(folder), os.cpu_count() or 1
+        return _complain(str(error))
     with x_server(wanted=any(drawing.rendered for drawing in found)):
         gc.freeze()  # the processes share what is there; a collection in one of them would copy it
         batches = (found[start : start + at_once] for start in range(0, len(found), at_once))
-        return [failure for batch in batches for failure in _drawn(batch)]
+        return max([code for batch in batches for code in _drawn(batch)], default=0)
 
 
-def _drawn(batch: Sequence[Drawing]) -> Iterator[HviError]:
-    """Draw pictures side by side, each in a process of its own; what went wrong with them."""
-    context, running = multiprocessing.get_context("fork"), []
-    for drawing in batch:
-        receiving, sending = context.Pipe(duplex=False)
-        process = context.Process(target=_draw, args=(drawing, sending), daemon=True)
+def _drawn(batch: Sequence[Drawing]) -> Iterator[int]:
+    """Draw pictures side by side, each in a process of its own; the exit codes."""
+    context = multiprocessing.get_context("fork")
+    running = [context.Process(target=_draw, args=(drawing,), daemon=True) for drawing in batch]
+    for process in running:
         process.start()
-        sending.close()
-        running.append((drawing, process, receiving))
-    for drawing, process, receiving in running:
-        try:
-            failure = receiving.recv()
-        except EOFError:
-            process.join()
-            code = process.exitcode or 0
-            reason = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-            failure = _failed(drawing, f"the drawing process ended with {reason}{_ADVICE * drawing.rendered}")
+    for drawing, process in zip(batch, running, strict=True):
         process.join()
-        if failure is None:
-            print(drawing.path.name, flush=True)
-        else:
-            yield failure
+        code = process.exitcode or 0
+        if code < 0:
+            reason = f"the drawing process ended with {signal.Signals(-code).name}{_ADVICE * drawing.rendered}"
+            code = _complain(f"{drawing.path.name}: {reason}")
+        yield code
 
 
-def _draw(drawing: Drawing, connection: Connection) -> None:
-    """Draw one picture in a process of its own; say what went wrong, if anything did."""
-    failure: HviError | None = None
+def _draw(drawing: Drawing) -> None:
+    """Draw one picture in a process of its own; tell its name, or what went wrong."""
     try:
         save(drawing.make(), drawing.path, drawing.caption)
     except NotWrittenError as error:
-        failure = error
+        sys.exit(writing.hand_over(error))
     except ModuleNotFoundError as error:
-        failure = _failed(drawing, f"needs the package {error.name}, which is not installed here")
+        sys.exit(_complain(f"{drawing.path.name}: needs the package {error.name}, which is not installed here"))
     except Exception as error:  # whatever it is, it is reported in one line
-        failure = _failed(drawing, str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}")
-    connection.send(failure)
+        words = str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}"
+        sys.exit(_complain(f"{drawing.path.name}: {words}"))
+    print(drawing.path.name, flush=True)
 
 
-def _failed(drawing: Drawing, why: str) -> PictureError:
-    return PictureError(f"{drawing.path.name}: {why}")
+def _complain(words: str) -> int:
+    """Tell the caller what went wrong; the exit code."""
+    print(f"{COMPLAINT}{words}", file=sys.stderr, flush=True)
+    return 1
 
 
 @contextlib.contextmanager
