@@ -25,69 +25,36 @@ import sys
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-_HOME = {
-    "__version__": "runtime.versions",
-    "Adhesion": "effects",
-    "Anisotropic": "effects",
-    "Body": "model",
-    "BodyForce": "effects",
-    "Cohesion": "effects",
-    "Contact": "effects",
-    "Displacement": "effects",
-    "Energy": "model.energy",
-    "Force": "effects",
-    "Friction": "effects",
-    "InputError": "errors",
-    "Isotropic": "effects",
-    "Model": "model",
-    "Moment": "effects",
-    "NewtonStep": "runtime.log",
-    "Orthotropic": "effects",
-    "Pressure": "effects",
-    "Solution": "api",
-    "Superpotential": "laws",
-    "Support": "effects",
-    "Temperature": "effects",
-    "Traction": "effects",
-    "check": "api",
-    "dump_scene": "model",
-    "equilibria": "api",
-    "follow": "api",
-    "prepare": "workflow",
-    "read_scene": "model",
-    "read_tables": "model",
-    "set_log_level": "runtime.log",
-    "solve": "api",
-    "study": "api",
+_NAMES = {
+    "api": ("Solution", "check", "equilibria", "follow", "solve", "study"),
+    "effects.contact": ("Contact",),
+    "effects.elasticity": ("Anisotropic", "Isotropic", "Orthotropic"),
+    "effects.law_effects": ("Adhesion", "Cohesion", "Friction", "Support"),
+    "effects.loads": ("BodyForce", "Displacement", "Force", "Moment", "Pressure", "Temperature", "Traction"),
+    "errors": ("InputError",),
+    "laws": ("Superpotential",),
+    "model": ("Body", "Model", "dump_scene", "read_scene", "read_tables"),
+    "model.energy": ("Energy",),
+    "runtime.log": ("NewtonStep", "set_log_level"),
+    "runtime.versions": ("__version__",),
+    "workflow": ("prepare",),
 }
+_HOME = {name: room for room, names in _NAMES.items() for name in names}
 __all__ = sorted([*_HOME, "laws"])
 
 if TYPE_CHECKING:
     from . import laws
     from .api import Solution, check, equilibria, follow, solve, study
-    from .effects import (
-        Adhesion,
-        Anisotropic,
-        BodyForce,
-        Cohesion,
-        Contact,
-        Displacement,
-        Force,
-        Friction,
-        Isotropic,
-        Moment,
-        Orthotropic,
-        Pressure,
-        Support,
-        Temperature,
-        Traction,
-    )
+    from .effects.contact import Contact
+    from .effects.elasticity import Anisotropic, Isotropic, Orthotropic
+    from .effects.law_effects import Adhesion, Cohesion, Friction, Support
+    from .effects.loads import BodyForce, Displacement, Force, Moment, Pressure, Temperature, Traction
     from .errors import InputError
     from .laws import Superpotential
     from .model import Body, Model, dump_scene, read_scene, read_tables
     from .model.energy import Energy
     from .runtime.log import NewtonStep, set_log_level
-    from .runtime.manifest import __version__
+    from .runtime.versions import __version__
     from .workflow import prepare
 
 

@@ -138,8 +138,6 @@ def mesh_of_cells(
         facets: by their vertices, (f, d), and those of each cell, (c, d+1), facet i being opposite to vertex i; of one
             rank only. None: dolfinx looks for them.
     """
-    import basix.ufl
-
     (n, d), kind = points.shape, {2: _mesh.CellType.triangle, 3: _mesh.CellType.tetrahedron}[points.shape[1]]
     topology = _cpp.mesh.Topology(comm, kind)
     vertices = common.IndexMap(comm, *index_map)
@@ -154,10 +152,19 @@ def mesh_of_cells(
     for array, start, end in links:
         found = graph.adjacencylist(array)
         topology.set_connectivity(getattr(found, "_cpp_object", found), start, end)
-    element = basix.ufl.element("Lagrange", kind.name, 1, shape=(d,))
+    return _with_nodes(topology, kind.name, 1, vertices, cells, points, inputs)
+
+
+def _with_nodes(
+    topology: Any, kind: str, degree: int, index_map: Any, cells: Any, nodes: npt.NDArray[np.float64], inputs: Any
+) -> _mesh.Mesh:
+    """The mesh of a topology whose cells have these nodes, (n, d), numbered as given."""
+    import basix.ufl
+
+    element = basix.ufl.element("Lagrange", kind, degree, shape=(nodes.shape[1],))
     shape = fem.coordinate_element(element.basix_element)._cpp_object
-    geometry = _cpp.mesh.Geometry_float64(vertices, cells, shape, points, inputs)
-    return _mesh.Mesh(_cpp.mesh.Mesh_float64(comm, topology, geometry), _Domain(element))
+    geometry = _cpp.mesh.Geometry_float64(index_map, cells, shape, nodes, inputs)
+    return _mesh.Mesh(_cpp.mesh.Mesh_float64(topology.comm, topology, geometry), _Domain(element))
 
 
 def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: npt.NDArray[np.float64]) -> _mesh.Mesh:
@@ -168,16 +175,10 @@ def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: npt.NDArray[np.float64
         dofmap: of the scalar functions of degree 2 on it.
         points: the local nodes by this dofmap, m, (n, 3).
     """
-    import basix.ufl
-
     d, index_map = mesh.geometry.dim, dofmap.index_map
-    element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), 2, shape=(d,))
-    shape = fem.coordinate_element(element.basix_element)._cpp_object
     numbers = index_map.local_to_global(np.arange(len(points), dtype=np.int32))
-    nodes = np.ascontiguousarray(points[:, :d])
-    geometry = _cpp.mesh.Geometry_float64(index_map, dofmap.list, shape, nodes, numbers)
-    topology = getattr(mesh.topology, "_cpp_object", mesh.topology)
-    return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), _Domain(element))
+    topology, nodes = getattr(mesh.topology, "_cpp_object", mesh.topology), np.ascontiguousarray(points[:, :d])
+    return _with_nodes(topology, mesh.topology.cell_name(), 2, index_map, dofmap.list, nodes, numbers)
 
 
 def linear_mesh(mesh: _mesh.Mesh) -> _mesh.Mesh:
@@ -186,17 +187,13 @@ def linear_mesh(mesh: _mesh.Mesh) -> _mesh.Mesh:
     Args:
         mesh: of simplices of any order.
     """
-    import basix.ufl
-
     d, topology = mesh.geometry.dim, getattr(mesh.topology, "_cpp_object", mesh.topology)
     index_map, cells = topology.index_map(0), mesh.topology.connectivity(d, 0).array.reshape(-1, d + 1)
     numbers = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     nodes = np.empty((len(numbers), d))
     nodes[cells] = mesh.geometry.x[geometry_dofmap(mesh)[: len(cells), : d + 1], :d]
-    element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), 1, shape=(d,))
-    shape = fem.coordinate_element(element.basix_element)._cpp_object
-    geometry = _cpp.mesh.Geometry_float64(index_map, cells, shape, nodes, index_map.local_to_global(numbers))
-    return _mesh.Mesh(_cpp.mesh.Mesh_float64(mesh.comm, topology, geometry), _Domain(element))
+    inputs = index_map.local_to_global(numbers)
+    return _with_nodes(topology, mesh.topology.cell_name(), 1, index_map, cells, nodes, inputs)
 
 
 def same_topology(one: _mesh.Mesh, other: _mesh.Mesh) -> bool:

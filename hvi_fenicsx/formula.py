@@ -13,8 +13,7 @@ import sys
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from typing_extensions import override
@@ -25,20 +24,21 @@ from .typing import Array
 
 COORDINATES = ("x", "y", "z")
 CONSTANTS = {"pi": math.pi}
-FUNCTIONS = (
-    "abs",
-    "sqrt",
-    "exp",
-    "log",
-    "sin",
-    "cos",
-    "tan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "min",
-    "max",
-)
+_NUMPY: Mapping[str, Callable[..., Any]] = {
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "sinh": np.sinh,
+    "cosh": np.cosh,
+    "tanh": np.tanh,
+    "min": np.minimum,
+    "max": np.maximum,
+}
+FUNCTIONS = tuple(_NUMPY)
 _TWO_ARGUMENTS = ("min", "max")
 _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -47,7 +47,12 @@ _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_COMPARE: Mapping[type[ast.cmpop], str] = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
+_COMPARE: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
 _LONGEST, _DEEPEST, _LARGEST_POWER = 2000, 50, 64
 _LONGEST_SHOWN = 60
 
@@ -126,43 +131,29 @@ class Computed(SpatialValue):
         return self._at(points)
 
 
-@dataclass(frozen=True, slots=True)
-class Algebra:
+class Algebra(NamedTuple):
     """The operations a formula needs beyond Python's operators.
 
     Attributes:
         number: turns a literal into a value of the algebra.
         functions: by name, those of :data:`FUNCTIONS`.
-        compare: by name (``lt``, ``le``, ``gt``, ``ge``).
         where: ``where(condition, if_true, if_false)``.
     """
 
     number: Callable[[float], Any]
     functions: Mapping[str, Callable[..., Any]]
-    compare: Mapping[str, Callable[[Any, Any], Any]]
     where: Callable[[Any, Any, Any], Any]
 
 
-NUMPY = Algebra(
-    number=np.float64,
-    functions={
-        **{name: getattr(np, name) for name in FUNCTIONS if name not in _TWO_ARGUMENTS},
-        "min": np.minimum,
-        "max": np.maximum,
-    },
-    compare={"lt": np.less, "le": np.less_equal, "gt": np.greater, "ge": np.greater_equal},
-    where=np.where,
-)
+NUMPY = Algebra(np.float64, _NUMPY, np.where)
 
 
 def ufl_algebra(number: Callable[[float], Any]) -> Algebra:
     """UFL's operations; ``number`` wraps a literal (a ``fem.Constant``, so that no value is compiled in)."""
     import ufl
 
-    names = {name: getattr(ufl, name) for name in FUNCTIONS if name not in ("abs", "log", "min", "max")}
-    functions = {**names, "abs": abs, "log": ufl.ln, "min": ufl.min_value, "max": ufl.max_value}
-    compare = {"lt": ufl.lt, "le": ufl.le, "gt": ufl.gt, "ge": ufl.ge}
-    return Algebra(number=number, functions=functions, compare=compare, where=ufl.conditional)
+    others = {"abs": abs, "log": ufl.ln, "min": ufl.min_value, "max": ufl.max_value}
+    return Algebra(number, {name: others.get(name) or getattr(ufl, name) for name in FUNCTIONS}, ufl.conditional)
 
 
 class Formula(SpatialValue):
@@ -342,7 +333,7 @@ def _render(node: ast.expr, x: Any, algebra: Algebra) -> Any:
         case ast.Call(func=ast.Name(id=name), args=args):
             return algebra.functions[name](*(_render(a, x, algebra) for a in args))
         case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=yes, orelse=no):
-            condition = algebra.compare[_COMPARE[type(op)]](_render(a, x, algebra), _render(b, x, algebra))
+            condition = _COMPARE[type(op)](_render(a, x, algebra), _render(b, x, algebra))
             return algebra.where(condition, _render(yes, x, algebra), _render(no, x, algebra))
     raise AssertionError(f"unchecked node {ast.dump(node)}")  # _check has refused everything else
 

@@ -173,8 +173,7 @@ class Superpotential(ABC):
         Args:
             x: displacements, (m,), m.
         """
-        (rises, steeper), (falls, steep) = (part.derivatives(x) for part in (self.convex, self.concave))
-        return rises - falls, steeper - steep
+        return self.right(x), self.convex.second(x) - self.concave.second(x)
 
     @cached_property
     def kinks(self) -> Array:

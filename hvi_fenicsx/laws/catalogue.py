@@ -9,7 +9,7 @@ import itertools
 import math
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -297,15 +297,6 @@ class WeakeningLaw(Superpotential):
     def even(self) -> bool:
         return True
 
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return replace(
-            self,
-            peak_traction=self.peak_traction / traction,
-            delta=self.delta / length,
-            residual_traction=self.residual_traction / traction,
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class _Weakened(DifferentiablePart):
@@ -324,11 +315,6 @@ class _Weakened(DifferentiablePart):
     @override
     def second(self, x: Array) -> Array:
         return (self._drop / self.law.delta) * self._shape(x)[2]
-
-    @override
-    def derivatives(self, x: Array) -> tuple[Array, Array]:
-        _, share, rate = self._shape(x)
-        return self._drop * np.sign(x) * share, (self._drop / self.law.delta) * rate
 
     @property
     def _drop(self) -> float:

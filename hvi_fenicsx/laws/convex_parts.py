@@ -64,14 +64,6 @@ class ConvexPart(ABC):
     def second(self, x: Array) -> Array:
         """Second derivative off the kinks; the larger one-sided one where the derivative's slope breaks."""
 
-    def derivatives(self, x: Array) -> tuple[Array, Array]:
-        """Right and second derivative, (m,) each; a part whose two have terms in common computes these once.
-
-        Args:
-            x: arguments, (m,).
-        """
-        return self.right(x), self.second(x)
-
     @property
     def jumps(self) -> Array:
         """Heights (k,) of the jumps of the derivative at the kinks, all positive."""
@@ -125,11 +117,6 @@ class ScaledPart(ConvexPart):
     @override
     def second(self, x: Array) -> Array:
         return self.part.second(self._original(x)) * (self.length / self.traction)
-
-    @override
-    def derivatives(self, x: Array) -> tuple[Array, Array]:
-        right, second = self.part.derivatives(self._original(x))
-        return quotient(right, self.traction), second * (self.length / self.traction)
 
     def _original(self, x: Array) -> Array:
         """The displacement in the law's own unit, exact at kinks, which kink / length * length may miss."""

@@ -47,10 +47,6 @@ class PolylinePart(ConvexPart):
     def second(self, x: Array) -> Array:
         return self.graph.slope(x)
 
-    @override
-    def derivatives(self, x: Array) -> tuple[Array, Array]:
-        return self.graph.right_and_slope(x)
-
 
 class PolylineLaw(Superpotential):
     """A law given by a `TractionGraph`. A subclass writes `build`; all else follows.
@@ -98,10 +94,6 @@ class PolylineLaw(Superpotential):
     @override
     def right(self, x: Array) -> Array:
         return self.graph.traction(x, "right")
-
-    @override
-    def derivatives(self, x: Array) -> tuple[Array, Array]:
-        return self.graph.right_and_slope(x)
 
     @override
     @cached_property

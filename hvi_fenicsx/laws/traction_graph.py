@@ -36,11 +36,6 @@ class Arc(NamedTuple):
         """The derivative at x."""
         return self.traction + self.slope * (x - self.anchor)
 
-    def moved(self, d: float) -> Arc:
-        """The arc with ½ d x² added."""
-        a = self.anchor
-        return Arc(self.low, self.high, a, self.value + 0.5 * d * a * a, self.traction + d * a, self.slope + d)
-
 
 @dataclass(frozen=True, eq=False)
 class TractionGraph:
@@ -213,15 +208,6 @@ class TractionGraph:
             side: "left" or "right".
         """
         return self._limit(x, *self._pieces(x), side)
-
-    def right_and_slope(self, x: Array) -> tuple[Array, Array]:
-        """Limit from the right and slope, as :meth:`traction` and :meth:`slope`, (m,) each.
-
-        Args:
-            x: displacements (m,).
-        """
-        pieces = self._pieces(x)
-        return self._limit(x, *pieces, "right"), self._steeper(*pieces)
 
     def _pieces(self, x: Array) -> tuple[Integers, Integers]:
         """The pieces before and behind x, (m,) each; off the breaks they are one."""

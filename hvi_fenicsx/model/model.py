@@ -147,17 +147,6 @@ class Model(Content):
         body = self.body if domain is None else self.body.with_shape(domain)
         return self._with(self.effects, body=body, solver=solver or self.solver, path=path or self.path)
 
-    def with_domain(self, **values: Any) -> Self:
-        """The model with other values in ``[domain]``, validated again. Not collective.
-
-        Args:
-            **values: the new values by their keys.
-
-        Raises:
-            InputError: the values are not allowed.
-        """
-        return self.changed(domain=self.domain.changed(**values))
-
     def with_solver(self, **values: Any) -> Self:
         """The model with other values in ``[solver]``, validated again. Not collective.
 
