@@ -213,28 +213,21 @@ class Canvas(ABC):
             self.axes.add_patch(arrow)
             self.reached.append(way)
 
-    def write(self, drawn: Array) -> None:
-        """Write the labels, each where it covers no other one, and as little as possible of what is drawn.
-
-        Args:
-            drawn: points that are better not covered, m, (n, 2).
-        """
-        texts = [self._written(label) for label in self.labels]
-        for _ in range(2):  # labels that reach out of the axes make these smaller
-            self.fig.draw_without_rendering()
-            vertices, taken, dots = self.axes.transData.transform(drawn), list[Bbox](), self.fig.dpi / 72
-            for label, text in zip(self.labels, texts, strict=True):
-                text.xyann = (0.0, 0.0)
-                text.get_window_extent()  # which puts it in its place
-                box = Text.get_window_extent(text)  # without the line that leads to it
-                places = _places(label, np.array(box.size) / dots / 2)
-                boxes = [box.translated(*(place * dots)) for place in places]
-                costs = [(one.count_overlaps(taken), one.count_contains(vertices)) for one in boxes]
-                best = costs.index(min(costs))
-                text.xyann = (float(places[best][0]), float(places[best][1]))
-                assert text.arrow_patch is not None
-                text.arrow_patch.set_visible(best > 0)
-                taken.append(boxes[best])
+    def write(self) -> None:
+        """Write the labels, each where it is wanted, or as near to that as it covers no other one."""
+        self.fig.draw_without_rendering()
+        taken, dots = list[Bbox](), self.fig.dpi / 72
+        for label in self.labels:
+            text = self._written(label)
+            text.get_window_extent()  # which puts it in its place
+            box = Text.get_window_extent(text)  # without the line that leads to it
+            places = _places(label, np.array(box.size) / dots / 2)
+            boxes = [box.translated(*(place * dots)) for place in places]
+            best = int(np.argmin([one.count_overlaps(taken) for one in boxes]))
+            text.xyann = (float(places[best][0]), float(places[best][1]))
+            assert text.arrow_patch is not None
+            text.arrow_patch.set_visible(best > 0)
+            taken.append(boxes[best])
 
     def _written(self, label: Label) -> Annotation:
         """A label on its point, with a line that leads there once it is moved."""

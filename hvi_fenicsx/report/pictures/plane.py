@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import EllipseCollection
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -93,13 +92,9 @@ class PlaneCanvas(Canvas):
                 self.key(Patch(fc="white", ec=GREY, hatch="/////", lw=0.0, label="support"))
                 continue
             places = _at(line, line + width / 2 * outward, _spread(line, np.ones(len(line)), size, apart=width))
-            rollers = EllipseCollection(
-                [width], [width], [0.0], units="xy", offsets=places, offset_transform=self.axes.transData,
-                fc="white", ec=INK, lw=1.2, clip_on=False, zorder=5,
-            )  # fmt: skip
-            self.axes.add_collection(rollers)
-            free: dict[str, Any] = {"marker": "o", "mfc": "white", "ms": 7, "label": "support, free to slide"}
-            self.key(Line2D([], [], color=INK, lw=2.2, **free))
+            rollers: dict[str, Any] = {"color": INK, "marker": "o", "mfc": "white"}
+            self.axes.plot(*places.T, ls="", ms=10, mew=1.2, clip_on=False, zorder=5, **rollers)
+            self.key(Line2D([], [], lw=2.2, ms=7, label="support, free to slide", **rollers))
 
     def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
         """See :meth:`.Canvas.loads`; each load has its own scale and value."""
@@ -180,7 +175,7 @@ class PlaneCanvas(Canvas):
     def finish(self) -> Figure:
         """See :meth:`.Canvas.finish`."""
         self.lay_out()
-        self.write(np.concatenate(self.reached))
+        self.write()
         return self.fig
 
 

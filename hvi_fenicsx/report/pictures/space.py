@@ -47,8 +47,6 @@ class SpaceCanvas(Canvas):
         """
         super().__init__(result, subject)
         self.plotter = pyvista.Plotter(off_screen=True, border=False)
-        self._depths: list[float] = []
-        self._arrows: list[Array] = []
         views = [_view(azimuth, elevation) for elevation, azimuth in itertools.product(ELEVATIONS, AZIMUTHS)]
         seen = [sum(max(float(n @ toward), 0.0) for n in normals) for *_, toward in views]
         self.right, self.up, self.toward = views[int(np.argmax(np.round(seen, 6)))]
@@ -60,8 +58,6 @@ class SpaceCanvas(Canvas):
     def _reach(self, points: Array) -> None:
         """Have the picture show points, m, (n, 3)."""
         self.reached.append(self.project(points))
-        depths = points @ self.toward
-        self._depths += [float(depths.min()), float(depths.max())]
 
     def _skin(self, points: Array, facets: Integers, **look: Any) -> None:
         """Put facets into pyvista's scene; ``scalars`` are by facet, or by vertex of the body."""
@@ -165,7 +161,6 @@ class SpaceCanvas(Canvas):
             self.plotter.add_mesh(cloud.glyph(orient="way", scale="way", geom=arrow), color=INK, lighting=False)
             ends = np.concatenate([tails, tails + ways])
             self._reach(ends)
-            self._arrows += [self.project(tails + part * ways) for part in np.linspace(0.0, 1.0, 9)]
             flat = self.project(ends)
             self.labels.append(Label(load.value, flat[np.argmax(flat[:, 1])], np.array([0.0, 1.0])))
 
@@ -182,20 +177,19 @@ class SpaceCanvas(Canvas):
         (left, bottom), (right, top) = self.extent()
         plotter, wide = self.plotter, right - left
         middle = self.right * (left + right) / 2 + self.up * (bottom + top) / 2
-        far = max(self._depths) - min(self._depths) + wide
         try:
             plotter.window_size = [1600, max(1, round(1600 * (top - bottom) / wide))]
-            plotter.camera_position = [middle + self.toward * (max(self._depths) + far), middle, self.up]
+            plotter.camera_position = [middle + 10 * wide * self.toward, middle, self.up]
             plotter.enable_parallel_projection()  # type: ignore[call-arg]
             plotter.camera.parallel_scale = (top - bottom) / 2
-            plotter.camera.clipping_range = (far / 2, 3 * far)
+            plotter.reset_camera_clipping_range()  # type: ignore[call-arg]
             image = plotter.screenshot(transparent_background=True, return_img=True)
         finally:
             plotter.close()
         self.lay_out()
         self.axes.imshow(image, extent=(left, right, bottom, top), interpolation="antialiased", zorder=1)
         self._directions()
-        self.write(np.concatenate([np.zeros((0, 2)), *self._arrows]))
+        self.write()
         return self.fig
 
     def _directions(self) -> None:
@@ -228,12 +222,8 @@ def _surface(points: Array, facets: Integers) -> pyvista.PolyData:
 
 
 def _sparse(points: Array, size: float) -> Integers:
-    """One point of a face near each node of a coarse grid, which has one node, in the middle, across a narrow face."""
-    extent = np.ptp(points, axis=0)
-    cells = np.round(extent / (0.25 * size))
-    part = (points - points.min(axis=0)) / np.where(extent > 1e-9 * size, extent, np.inf)
-    place = np.where(cells > 0.0, part * cells, np.where(extent > 1e-9 * size, part - 0.5, 0.0))
+    """One point of a face near each node of a coarse grid about its middle."""
+    place = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / (0.25 * size)
     node = np.round(place)
-    distance = np.round(np.linalg.norm(place - node, axis=1), 6)
-    order = np.lexsort((*np.round(place, 6).T[::-1], distance))
+    order = np.argsort(np.round(np.linalg.norm(place - node, axis=1), 6), kind="stable")
     return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
