@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,7 +14,6 @@ from ...typing import Integers
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..units import quantity, thousands, unit_for
-from .canvas import Canvas
 from .plane import PlaneCanvas
 from .shape import (
     DeformedBody,
@@ -32,6 +31,9 @@ from .shape import (
 )
 from .style import BLUE, EMBER, GREY, INK, PALE, SLATE, VERMILION
 
+if TYPE_CHECKING:
+    from .space import SpaceCanvas
+
 PEAK = 0.005
 """Part of the body's volume whose stress may be beyond the end of a scale, which a peak in a corner would spoil."""
 LINE = 40
@@ -42,7 +44,7 @@ _UNITS = {"displacement": ("m", "m"), "moment": ("N", "N\u202fm")}
 """The units of what drives a part as a whole, in the plane and in space."""
 
 
-def _canvas(result: Result, subject: str, contacts: Mapping[str, Integers]) -> Canvas:
+def _canvas(result: Result, subject: str, contacts: Mapping[str, Integers]) -> PlaneCanvas | SpaceCanvas:
     """The canvas for a body; one in space is seen from where its contact parts (facets by name) are seen best."""
     if result.body.dimension == 2:
         return PlaneCanvas(result, subject)
@@ -118,7 +120,9 @@ def _facets(parts: Sequence[PartGeometry]) -> dict[str, Integers]:
     return {geometry.part.name: geometry.facets for geometry in parts}
 
 
-def _loaded(canvas: Canvas, result: Result, shape: DeformedBody, parts: Sequence[PartGeometry]) -> Figure:
+def _loaded(
+    canvas: PlaneCanvas | SpaceCanvas, result: Result, shape: DeformedBody, parts: Sequence[PartGeometry]
+) -> Figure:
     """Add what acts on a deformed body: in equilibrium, the scene's loads or the part of them that is borne."""
     factor = 1.0 if result.last_borne is None else float(result.last_borne["factor"])
     canvas.supports(shape, held_sides(result))

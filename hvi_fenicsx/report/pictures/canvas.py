@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.path import Path
@@ -19,9 +16,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from matplotlib.transforms import Bbox
 
 from ...typing import Array
-from ..body_mesh import BodyMesh
 from ..reader import Result
-from .shape import DeformedBody, HeldSide, LoadedSide, PartGeometry, Region, Side
 from .style import INK, VERMILION, WIDTH, figure, heading, resize
 
 LETTERS = 12
@@ -48,7 +43,7 @@ class Label:
 
 
 @dataclass
-class Canvas(ABC):
+class Canvas:
     """What is drawn of a body, as far as that is alike in the plane and in space.
 
     Attributes:
@@ -73,82 +68,6 @@ class Canvas(ABC):
         self.axes = self.fig.add_subplot()
         self.axes.set_axis_off()
         self._bars = 0
-
-    @abstractmethod
-    def paint(
-        self, shape: DeformedBody, values: Array, colours: Colormap, end: float, *, by_cell: bool = False
-    ) -> None:
-        """Draw the deformed body over the undeformed one, in the colours of values.
-
-        Args:
-            shape: the deformed body.
-            values: by vertex, (n,), or by cell, (c,).
-            colours: of the values, from zero.
-            end: the value at the end of the colours.
-            by_cell: whether they are by cell.
-        """
-
-    @abstractmethod
-    def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
-        """Draw the body at rest, its regions in their tints.
-
-        Args:
-            shape: the body.
-            areas: its regions.
-            fill: the colour of a body without regions.
-        """
-
-    @abstractmethod
-    def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
-        """Name the parts, and show what acts on them.
-
-        Args:
-            shape: the body as it is drawn.
-            sides: the parts.
-            contacts: the names of those with contact or a law.
-            held: the names of those with a support.
-        """
-
-    @abstractmethod
-    def supports(self, shape: DeformedBody, found: Sequence[HeldSide]) -> None:
-        """Draw the supports.
-
-        Args:
-            shape: the body as it is drawn.
-            found: the sides that are held.
-        """
-
-    @abstractmethod
-    def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
-        """Draw arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
-
-        Args:
-            shape: the body as it is drawn.
-            found: the sides with loads.
-        """
-
-    @abstractmethod
-    def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry]) -> None:
-        """Draw the pressure on the parts, and the obstacles where there is room.
-
-        Args:
-            shape: the body as it is drawn.
-            parts: those with contact or a law.
-        """
-
-    @abstractmethod
-    def ghost(self, body: BodyMesh, points: Array, ways: Array) -> None:
-        """Draw a body where a motion brings it, and the ways of some of its points.
-
-        Args:
-            body: the body.
-            points: its points there, m, (n, 3).
-            ways: m, (j, k, 3).
-        """
-
-    @abstractmethod
-    def finish(self) -> Figure:
-        """Lay out the picture and write its labels; the figure."""
 
     def key(self, *artists: Artist) -> None:
         """Add lines to the legend, each words once."""

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.tri import Triangulation
 
 from ...typing import Array, Integers, Mask
 from ..body_mesh import BodyMesh
@@ -197,18 +198,16 @@ def _maps(result: Result, part: ContactPart) -> Figure:
 
 def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Field) -> None:
     """Values as colours, with a bar beside it, from zero; a field along the part as arrows too."""
-    values, unit = np.nan_to_num(field.values / field.unit.size), flat.unit.size
+    values = np.nan_to_num(field.values / field.unit.size)
     largest = float(np.abs(values).max())
     colours, low, high = pressure_scale(float(values.min()), largest)
     if field.kind != "pressure":
         colours, low = shades("#f4f4f1", field.colour), 0.0
-    x, y = flat.points.T / unit
-    drawn = axes.tripcolor(x, y, flat.facets, values, shading="gouraud", cmap=colours, vmin=low, vmax=high or 1.0)
-    idle = part.idle[flat.facets].all(axis=1)
+    mesh, idle = flat.mesh, part.idle[flat.facets].all(axis=1)
+    drawn = axes.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=low, vmax=high or 1.0)
     if idle.any():
-        axes.tripcolor(
-            x, y, flat.facets[idle], np.zeros(len(values)), cmap="gray", vmin=-1, vmax=1, alpha=0.45, antialiased=False
-        )
+        grey = Triangulation(mesh.x, mesh.y, flat.facets[idle])
+        axes.tripcolor(grey, np.zeros(len(values)), cmap="gray", vmin=-1, vmax=1, alpha=0.45, antialiased=False)
     bar = fig.colorbar(drawn, ax=axes, ticks=None if largest > 0.0 else [0.0], aspect=12)
     bar.outline.set_visible(False)  # type: ignore[operator]
     axes.set_title(f"{field.words} in {field.unit.name}", loc="left", size=14, parse_math=True)
@@ -240,7 +239,7 @@ def _drop_lines(axes: Axes, flat: FlatPart, part: ContactPart) -> Iterator[str]:
         slip = part.size("slip") / drop
         reached = bool(np.nanmin(slip) < 1.0 < np.nanmax(slip))
         if reached:
-            axes.tricontour(*(flat.points.T / flat.unit.size), flat.facets, slip, [1.0], colors=INK, linestyles="--")
+            axes.tricontour(flat.mesh, slip, [1.0], colors=INK, linestyles="--")
         yield _drops_in_words(drop, reached=reached)
 
 
@@ -277,6 +276,12 @@ class FlatPart:
     def unit(self) -> Unit:
         """The unit of the coordinates."""
         return unit_for(float(np.abs(self.points).max()), "m")
+
+    @property
+    def mesh(self) -> Triangulation:
+        """Its facets, in that unit."""
+        x, y = self.points.T / self.unit.size
+        return Triangulation(x, y, self.facets)
 
     def along(self, vectors: Array) -> Array:
         """The components of vectors (m, 3) along the coordinates, (m, 2)."""

@@ -35,7 +35,15 @@ class PlaneCanvas(Canvas):
     def paint(
         self, shape: DeformedBody, values: Array, colours: Colormap, end: float, *, by_cell: bool = False
     ) -> None:
-        """See :meth:`.Canvas.paint`; with the edges of cells where they are legible."""
+        """Draw the deformed body over the undeformed one, in the colours of values.
+
+        Args:
+            shape: the deformed body.
+            values: by vertex, (n,), or by cell, (c,).
+            colours: of the values, from zero.
+            end: the value at the end of the colours.
+            by_cell: whether they are by cell.
+        """
         cells, points = shape.body.cells, shape.points[:, :2]
         self._fill(points, cells, np.repeat(values, 3) if by_cell else values, cmap=colours, vmax=end or 1.0)
         if len(cells) * shape.body.size**2 <= LEGIBLE * shape.body.volumes.sum():
@@ -53,7 +61,13 @@ class PlaneCanvas(Canvas):
         self.axes.tripcolor(Triangulation(x, y, cells), values, shading="gouraud", vmin=0.0, zorder=1, **look)
 
     def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
-        """See :meth:`.Canvas.show`."""
+        """Draw the body at rest, its regions in their tints.
+
+        Args:
+            shape: the body.
+            areas: its regions.
+            fill: the colour of a body without regions.
+        """
         if areas:
             number = np.zeros(len(shape.body.cells))
             for i, area in enumerate(areas):
@@ -70,7 +84,14 @@ class PlaneCanvas(Canvas):
         self.reached.append(points[np.concatenate(loops), :2])
 
     def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
-        """See :meth:`.Canvas.sides`; supports are drawn."""
+        """Name the parts, and show what acts on them.
+
+        Args:
+            shape: the body as it is drawn.
+            sides: the parts.
+            contacts: the names of those with contact or a law.
+            held: the names of those with a support.
+        """
         for side in sides:
             line = shape.at_rest[side.vertices, :2]
             middle = _at(line, np.hstack([line, side.normals[:, :2]]), np.array([_lengths(line)[-1] / 2]))[0]
@@ -79,7 +100,12 @@ class PlaneCanvas(Canvas):
                 self._line(line, "contact, friction or adhesion", color=VERMILION, lw=5, zorder=2)
 
     def supports(self, shape: DeformedBody, found: Sequence[HeldSide]) -> None:
-        """A wall along each side, with rollers where the side may move along it."""
+        """Draw the supports.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides that are held.
+        """
         size = shape.body.size
         for support in found:
             line, outward = shape.points[support.side.vertices, :2], support.side.normals[:, :2]
@@ -97,7 +123,12 @@ class PlaneCanvas(Canvas):
             self.key(Line2D([], [], lw=2.2, ms=7, label="support, free to slide", **rollers))
 
     def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
-        """See :meth:`.Canvas.loads`; each load has its own scale and value."""
+        """Draw arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides with loads.
+        """
         size = shape.body.size
         for load in found:
             line, amount = shape.points[load.side.vertices, :2], np.linalg.norm(load.traction, axis=1)
@@ -122,7 +153,12 @@ class PlaneCanvas(Canvas):
         self.reached += [tails, tails + arrows]
 
     def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry]) -> None:
-        """The obstacle of each part, where the part is off it, and the pressure on it as arrows that end there."""
+        """Draw the pressure on the parts, and the obstacles where there is room.
+
+        Args:
+            shape: the body as it is drawn.
+            parts: those with contact or a law.
+        """
         stress = np.nan_to_num(np.concatenate([[0.0], *(geometry.part.pressure for geometry in parts)]))
         gap = quantity(max((geometry.part.largest_gap for geometry in parts), default=0.0), "m")
         for geometry in parts:
@@ -167,13 +203,19 @@ class PlaneCanvas(Canvas):
         self.reached.append(tips)
 
     def ghost(self, body: BodyMesh, points: Array, ways: Array) -> None:
-        """See :meth:`.Canvas.ghost`."""
+        """Draw a body where a motion brings it, and the ways of some of its points.
+
+        Args:
+            body: the body.
+            points: its points there, m, (n, 3).
+            ways: m, (j, k, 3).
+        """
         self._outline(points, body.outline, ec=VERMILION, lw=2, ls=(0, (5, 3)), zorder=4)
         self._outline(points, body.outline, fc=VERMILION, alpha=0.12, zorder=3)
         self.follow(ways[:, :, :2])
 
     def finish(self) -> Figure:
-        """See :meth:`.Canvas.finish`."""
+        """Lay out the picture and write its labels; the figure."""
         self.lay_out()
         self.write()
         return self.fig

@@ -80,7 +80,15 @@ class SpaceCanvas(Canvas):
     def paint(
         self, shape: DeformedBody, values: Array, colours: Colormap, end: float, *, by_cell: bool = False
     ) -> None:
-        """See :meth:`.Canvas.paint`; cells are in the colours of the scale itself, without light."""
+        """Draw the deformed body over the undeformed one; cells are in the colours of the scale itself, without light.
+
+        Args:
+            shape: the deformed body.
+            values: by vertex, (n,), or by cell, (c,).
+            colours: of the values, from zero.
+            end: the value at the end of the colours.
+            by_cell: whether they are by cell.
+        """
         body = shape.body
         look: dict[str, Any] = {"lighting": False} if by_cell else {"ambient": 0.6, "diffuse": 0.45}
         mesh = len(body.boundary) <= LEGIBLE and not by_cell
@@ -93,7 +101,12 @@ class SpaceCanvas(Canvas):
         self._reach(body.points[body.outermost])
 
     def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry]) -> None:
-        """The pressure on each part, with its scale."""
+        """The pressure on each part, with its scale.
+
+        Args:
+            shape: the body as it is drawn.
+            parts: those with contact or a law.
+        """
         if not parts:
             return
         values = np.nan_to_num(np.concatenate([geometry.part.pressure for geometry in parts]))
@@ -112,7 +125,13 @@ class SpaceCanvas(Canvas):
         self.bar(colours, low / unit.size, high / unit.size, words)
 
     def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
-        """See :meth:`.Canvas.show`."""
+        """Draw the body at rest, its regions in their tints.
+
+        Args:
+            shape: the body.
+            areas: its regions.
+            fill: the colour of a body without regions.
+        """
         body = shape.body
         owner = np.zeros(len(body.cells), dtype=np.int64)
         for number, area in enumerate(areas):
@@ -124,7 +143,14 @@ class SpaceCanvas(Canvas):
         self._edges(body.points, body.points, body.boundary, INK, 3)
 
     def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
-        """Name the parts, and colour them by what acts on them."""
+        """Name the parts, and colour them by what acts on them.
+
+        Args:
+            shape: the body as it is drawn.
+            sides: the parts.
+            contacts: the names of those with contact or a law.
+            held: the names of those with a support.
+        """
         body = shape.body
         words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
         for side in sides:
@@ -141,10 +167,20 @@ class SpaceCanvas(Canvas):
             self.key(Patch(fc=colour, ec=INK, label=words[colour]))
 
     def supports(self, shape: DeformedBody, found: Sequence[HeldSide]) -> None:
-        """Nothing: a picture of the scene colours them, others leave them out."""
+        """Nothing: a picture of the scene colours them, others leave them out.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides that are held.
+        """
 
     def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
-        """See :meth:`.Canvas.loads`."""
+        """Draw arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides with loads.
+        """
         size = shape.body.size
         for load in found:
             chosen = _sparse(shape.body.points[load.side.vertices], size)
@@ -165,7 +201,13 @@ class SpaceCanvas(Canvas):
             self.labels.append(Label(load.value, flat[np.argmax(flat[:, 1])], np.array([0.0, 1.0])))
 
     def ghost(self, body: BodyMesh, points: Array, ways: Array) -> None:
-        """See :meth:`.Canvas.ghost`; the way of the point farthest behind is left out."""
+        """Draw a body where a motion brings it, and the ways of some of its points but that farthest behind.
+
+        Args:
+            body: the body.
+            points: its points there, m, (n, 3).
+            ways: m, (j, k, 3).
+        """
         nearer = points + 1e-3 * body.size * self.toward  # where the two share a face, the ghost's is seen
         self._skin(nearer, body.boundary, color=VERMILION, opacity=0.16, lighting=False)
         self._edges(body.points, nearer, body.boundary, VERMILION, 4)
@@ -173,7 +215,7 @@ class SpaceCanvas(Canvas):
         self.follow(np.array([self.project(way) for way in ways[np.argsort(depths)[len(ways) > 1 :]]]))
 
     def finish(self) -> Figure:
-        """See :meth:`.Canvas.finish`."""
+        """Lay out the picture and write its labels; the figure."""
         (left, bottom), (right, top) = self.extent()
         plotter, wide = self.plotter, right - left
         middle = self.right * (left + right) / 2 + self.up * (bottom + top) / 2
