@@ -77,7 +77,7 @@ def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
         processes.die_with_parent(signal.SIGKILL)
         return mpirun.hand_over(_told(lambda: _run_on_ranks(options)))
     ranks = getattr(options, "np", None)
-    return mpirun.run(ranks, words) if ranks else _run_on_ranks(options)
+    return mpirun.run_under_mpirun(ranks, words) if ranks else _run_on_ranks(options)
 
 
 def _run_on_ranks(options: argparse.Namespace) -> int:

@@ -7,13 +7,13 @@ import os
 import resource
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from mpi4py import MPI
 
-from .mpi import on_this_machine, total
+from .mpi import total
 
 PHASES = ("jit", "mesh", "assembly", "existence", "setup", "solve", "certificate", "estimate", "output")
 
@@ -21,28 +21,24 @@ PHASES = ("jit", "mesh", "assembly", "existence", "setup", "solve", "certificate
 class Timer:
     """Adds up time (s) by phase; the time of an inner phase does not count for the one around it.
 
-    Args:
-        clock: seconds since any moment; by default wall time, ``time.perf_counter`` as it is when the timer is made.
-
     Attributes:
         seconds: by phase, s.
     """
 
-    def __init__(self, clock: Callable[[], float] | None = None) -> None:
-        self._clock = clock or time.perf_counter
+    def __init__(self) -> None:
         self.seconds = dict.fromkeys(PHASES, 0.0)
-        self._start = self._clock()
+        self._start = time.perf_counter()
         self._inner: list[float] = []
 
     @contextmanager
     def __call__(self, phase: str) -> Iterator[None]:
         """Time a block as one phase."""
-        start = self._clock()
+        start = time.perf_counter()
         self._inner.append(0.0)
         try:
             yield
         finally:
-            elapsed = self._clock() - start
+            elapsed = time.perf_counter() - start
             self.seconds[phase] += elapsed - self._inner.pop()
             if self._inner:
                 self._inner[-1] += elapsed
@@ -50,7 +46,7 @@ class Timer:
     @property
     def total(self) -> float:
         """Seconds since the timer was made."""
-        return self._clock() - self._start
+        return time.perf_counter() - self._start
 
     def report(self) -> dict[str, float]:
         """Seconds by phase, with the total."""
@@ -104,8 +100,9 @@ def free_memory() -> float:
 
 def memory_room(comm: MPI.Comm) -> float:
     """The memory of all machines that the ranks run on, as far as they may use it, MB. Collective."""
-    with on_this_machine(comm) as here:
-        machines = total(comm, _of_machine() if here.rank == 0 else 0.0)
+    here = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    machines = total(comm, _of_machine() if here.rank == 0 else 0.0)
+    here.Free()
     return min(machines, total(comm, _of_process()))
 
 

@@ -174,20 +174,6 @@ def largest(comm: MPI.Comm, value: float) -> float:
     return float(comm.allreduce(value, op=MPI.MAX))
 
 
-@contextmanager
-def on_this_machine(comm: MPI.Comm) -> Iterator[MPI.Comm]:
-    """The ranks of this rank's machine. Collective.
-
-    Args:
-        comm: all ranks.
-    """
-    here = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    try:
-        yield here
-    finally:
-        here.Free()
-
-
 def stop_on_signals(comm: MPI.Comm) -> Callable[[], bool]:
     """Have the first signal from now on be a request to stop: solvers end, the result is written; a second one ends.
 
@@ -202,6 +188,11 @@ def stop_on_signals(comm: MPI.Comm) -> Callable[[], bool]:
 
 
 def raise_second(number: int, frame: FrameType | None) -> None:
-    """A handler of signals: only one that is not the first interrupts."""
+    """A handler of signals: only one that is not the first interrupts.
+
+    Args:
+        number: of the signal.
+        frame: where it came.
+    """
     if processes.stop_asked() > 1:
         raise KeyboardInterrupt

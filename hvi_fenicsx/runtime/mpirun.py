@@ -27,7 +27,7 @@ _FOLDER = "PRTE_MCA_prte_local_tmpdir_base"
 """Where Open MPI's mpirun keeps its files, by process number: a killed one's would stop another of its number."""
 
 
-def run(ranks: int, words: Sequence[str]) -> int:
+def run_under_mpirun(ranks: int, words: Sequence[str]) -> int:
     """Run ``hvi WORDS`` on so many ranks; its exit code, that of an interruption after a signal.
 
     Args:
@@ -81,8 +81,6 @@ def _code(command: Sequence[str], folder: Path) -> int:
 def hand_over(code: int) -> int:
     """Give the exit code that all ranks agree on to the process that started mpirun.
 
-    Collective, where MPI has been started.
-
     Args:
         code: the same on all ranks.
 
@@ -91,16 +89,9 @@ def hand_over(code: int) -> int:
     """
     if code == 0 or processes.CODE_FILE not in os.environ:
         return code
-    from mpi4py import MPI
-
-    comm = MPI.COMM_WORLD
-    written = comm.bcast(_written(os.environ[processes.CODE_FILE], code) if comm.rank == 0 else False)
-    return 0 if written else code
-
-
-def _written(file: str, code: int) -> bool:
-    """Write the code into a file that is there; on another machine it is not."""
-    with contextlib.suppress(OSError), open(file, "r+", encoding="ascii") as stream:
-        stream.write(str(int(code)))
-        return True
-    return False
+    if processes.is_first_rank():
+        try:
+            Path(os.environ[processes.CODE_FILE]).write_text(str(int(code)), encoding="ascii")
+        except OSError:  # on another machine there is no such folder
+            return code
+    return 0

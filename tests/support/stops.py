@@ -70,7 +70,7 @@ def ended(number: int) -> int:
         second.watch()
         return once()
 
-    mpirun.run = command
+    mpirun.run_under_mpirun = command
     sys.stderr = sys.stdout = io.StringIO()
     try:
         code = cli.main(WORDS)
@@ -91,6 +91,6 @@ def twice() -> dict[int, int]:
 
 if __name__ == "__main__":
     if sys.argv[1] == "once":
-        mpirun.run = once
+        mpirun.run_under_mpirun = once
         raise SystemExit(cli.main(WORDS))
     print(json.dumps(twice()))

@@ -127,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("folder", type=Path, help="a finished result folder")
     folder = parser.parse_args(arguments).folder
     processes.die_with_parent()  # or it would write into the folder of the next run
-    processes.stand_back()  # the ranks may still be computing
+    processes.unbind()
     try:
         found, at_once = drawings_of(folder), os.cpu_count() or 1
     except HviError as error:
