@@ -1,20 +1,36 @@
-"""The command line. A command imports what it needs: help is instant."""
+"""The command line, also on N ranks (``--np N``). A command imports what it needs: help is instant.
+
+Open MPI kills the ranks 0.2 s after it gets a SIGINT or SIGTERM, too soon to write what was found; it passes SIGUSR1 on
+to them (mpirun(1), "Signal Propagation"; MPICH does too). So mpirun runs apart from the terminal, and for the first
+signal this process sends it SIGUSR1, which :func:`.mpi.stop_on_signals` catches, for a second one SIGTERM.
+
+mpirun prints a notice of its own when a rank ends with another code than 0, and no option silences it. So the ranks
+agree on the code, rank 0 writes it into a file, and all end with 0. A broken pipe would end mpirun and so the ranks:
+this process takes their lines and writes them.
+"""
 
 from __future__ import annotations
 
 import argparse
 import importlib
 import math
+import os
 import shlex
 import signal
+import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import Any, NoReturn
 
 from ..errors import ExitCode, HviError, InputError
 from ..runtime import log, processes
+
+_FOLDER = "PRTE_MCA_prte_local_tmpdir_base"
+"""Where Open MPI's mpirun keeps its files, by process number: a killed one's would stop another of its number."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,13 +87,11 @@ def _with_petsc_joined(words: Sequence[str]) -> list[str]:
 def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
     if options.command == "version":
         return _version()
-    from ..runtime import mpirun
-
     if processes.is_under_mpirun():
         processes.die_with_parent(signal.SIGKILL)
-        return mpirun.hand_over(_told(lambda: _run_on_ranks(options)))
+        return hand_over(_told(lambda: _run_on_ranks(options)))
     ranks = getattr(options, "np", None)
-    return mpirun.run_under_mpirun(ranks, words) if ranks else _run_on_ranks(options)
+    return run_under_mpirun(ranks, words) if ranks else _run_on_ranks(options)
 
 
 def _run_on_ranks(options: argparse.Namespace) -> int:
@@ -231,3 +245,73 @@ def _number(below: float, allowed: str, kind: Callable[[str], float] = float) ->
 _relative = _number(1.0, "a relative error between 0 and 1, like 1e-2")
 _seconds = _number(math.inf, "a number of seconds above 0")
 _ranks, _times = (_number(most + 1, f"a whole number from 1 to {most}, in digits like 2", int) for most in (4096, 1000))
+
+
+def run_under_mpirun(ranks: int, words: Sequence[str]) -> int:
+    """Run ``hvi WORDS`` on so many ranks; its exit code, that of an interruption after a signal.
+
+    Args:
+        ranks: how many.
+        words: the command line, which may have its ``--np``.
+
+    Raises:
+        InputError: there is no mpirun, or no room for its files.
+    """
+    command = [*processes.launcher(ranks), "-m", "hvi_fenicsx", *words]
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
+    except OSError as error:
+        raise InputError(f"--np: no temporary folder can be made ({error}); set TMPDIR to one with room") from None
+    with folder as name:
+        return _code(command, Path(name))
+
+
+def _code(command: Sequence[str], folder: Path) -> int:
+    """The exit code of mpirun, which keeps its files in an empty folder."""
+
+    def pass_on(number: int, frame: FrameType | None) -> None:
+        process.send_signal(signal.SIGUSR1 if processes.stop_asked() == 1 else signal.SIGTERM)
+
+    file = folder / "code"
+    file.touch()
+    chosen = any(name.endswith("tmpdir_base") for name in os.environ)
+    own = {processes.CODE_FILE: str(file)} | ({} if chosen else {_FOLDER: str(folder)})
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, **own},
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+        errors="backslashreplace",
+        start_new_session=True,
+        preexec_fn=processes.die_with_parent,
+    )
+    processes.catch(processes.STOP, pass_on)
+    for line in process.stdout or ():
+        log.say(line.rstrip("\r\n"))
+    ended, agreed = process.wait(), file.read_text(encoding="ascii")
+    if processes.stop_asked() and ended and not agreed:  # before the ranks could catch it
+        raise KeyboardInterrupt
+    if ended and not agreed:
+        room = f"where it says no more, make room in {tempfile.gettempdir()}, or set TMPDIR to another folder"
+        log.complain(f"hvi: --np: mpirun ended with code {ended}; {room}")
+    code = ended or int(agreed or 0)
+    return ExitCode.INTERRUPTED if processes.stop_asked() and code else code
+
+
+def hand_over(code: int) -> int:
+    """Give the exit code that all ranks agree on to the process that started mpirun.
+
+    Args:
+        code: the same on all ranks.
+
+    Returns:
+        What this rank shall end with: 0, or the code where nobody would read the file.
+    """
+    if code == 0 or processes.CODE_FILE not in os.environ:
+        return code
+    if processes.is_first_rank():
+        try:
+            Path(os.environ[processes.CODE_FILE]).write_text(str(int(code)), encoding="ascii")
+        except OSError:  # on another machine there is no such folder
+            return code
+    return 0

@@ -182,7 +182,7 @@ def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:
 
 
 def unbind() -> None:
-    """Have this process take any of the machine's processors: an mpirun may bind each rank, and its children, to one."""
+    """Have this process take any of the machine's processors: an mpirun may bind a rank, and its children, to one."""
     if sys.platform == "linux":
         with contextlib.suppress(OSError):
             os.sched_setaffinity(0, range(os.cpu_count() or 1))

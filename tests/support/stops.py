@@ -17,7 +17,7 @@ from types import FrameType
 from typing import Any
 
 from hvi_fenicsx.commands import cli
-from hvi_fenicsx.runtime import log, mpirun, processes
+from hvi_fenicsx.runtime import log, processes
 
 WATCHED = {str(Path(str(module.__file__))) for module in (cli, processes, log)}
 WORDS = ["run", "scene.toml", "--np", "2"]
@@ -70,7 +70,7 @@ def ended(number: int) -> int:
         second.watch()
         return once()
 
-    mpirun.run_under_mpirun = command
+    cli.run_under_mpirun = command
     sys.stderr = sys.stdout = io.StringIO()
     try:
         code = cli.main(WORDS)
@@ -91,6 +91,6 @@ def twice() -> dict[int, int]:
 
 if __name__ == "__main__":
     if sys.argv[1] == "once":
-        mpirun.run_under_mpirun = once
+        cli.run_under_mpirun = once
         raise SystemExit(cli.main(WORDS))
     print(json.dumps(twice()))
