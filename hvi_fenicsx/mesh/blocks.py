@@ -24,7 +24,7 @@ from .. import compat
 from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
 from .domain import DEFAULT, Domain, MeshThresholds
-from .transfer import InterpolationTransfer, Numbers, Rows, Transfer, mean_rows
+from .transfer import Numbers, Rows, Transfer, mean_rows, weighted_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -52,8 +52,8 @@ def block(
     def coarsening() -> tuple[Domain, Transfer]:
         assert coarser is not None
         nested = all(2 * few == n for few, n in zip(coarser, cells, strict=True))
-        transfer = NestedGridTransfer(size, coarser) if nested else InterpolationTransfer()
-        return block(comm, size, coarser, thresholds), transfer
+        transfer = NestedGridTransfer if nested else GridTransfer
+        return block(comm, size, coarser, thresholds), transfer(size, coarser)
 
     return Domain(
         mesh=grid,
@@ -307,6 +307,25 @@ class NestedGridTransfer(Transfer):
         parents = np.stack([_flat(end, cells) for end in (place // 2, (place + 1) // 2)], axis=1)
         pairs = _numbered(parents, coarse, far, self.size, cells)
         return mean_rows(pairs, fine.dofmap.index_map_bs)
+
+
+@dataclass(frozen=True)
+class GridTransfer(NestedGridTransfer):
+    """From a block to one of any other numbers of cells: linear interpolation."""
+
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+        """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
+        near, far = points
+        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
+        place = _grid_places(near, self.size, cells)
+        corner = np.clip(np.floor(place), 0, cells - 1).astype(PETSc.IntType)
+        within = np.clip(place - corner, 0.0, 1.0)
+        order = np.argsort(-within, axis=1)  # the path to the highest corner takes the largest coordinate first
+        falling = np.pad(np.take_along_axis(within, order, axis=1), ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
+        ways = np.pad(np.cumsum(np.eye(len(cells), dtype=PETSc.IntType)[order], axis=1), ((0, 0), (1, 0), (0, 0)))
+        numbers = _flat((corner[:, None] + ways).reshape(-1, len(cells)), cells).reshape(falling[:, 1:].shape)
+        numbers = _numbered(numbers, coarse, far, self.size, cells)
+        return weighted_rows(numbers, -np.diff(falling, axis=1), fine.dofmap.index_map_bs)
 
 
 def _grid_places(points: Array, size: Sequence[float], cells: Numbers) -> Array:
