@@ -20,7 +20,7 @@ import petsc_methods  # noqa: F401  (tao and ssls are known then)
 from mpi4py import MPI
 
 from hvi_fenicsx import read_scene
-from hvi_fenicsx.estimate.coupled_errors import ratio
+from hvi_fenicsx.estimate.estimator import ratio
 from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.model import Model
 from hvi_fenicsx.runtime import cost

@@ -47,7 +47,7 @@ _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_COMPARE: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
@@ -277,7 +277,7 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
             _check_call(name, len(args), text)
             children = args
         case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=yes, orelse=no) if (
-            type(op) in _COMPARE
+            type(op) in COMPARISONS
         ):
             children = [a, b, yes, no]
         case _:
@@ -333,7 +333,7 @@ def _render(node: ast.expr, x: Any, algebra: Algebra) -> Any:
         case ast.Call(func=ast.Name(id=name), args=args):
             return algebra.functions[name](*(_render(a, x, algebra) for a in args))
         case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=yes, orelse=no):
-            condition = _COMPARE[type(op)](_render(a, x, algebra), _render(b, x, algebra))
+            condition = COMPARISONS[type(op)](_render(a, x, algebra), _render(b, x, algebra))
             return algebra.where(condition, _render(yes, x, algebra), _render(no, x, algebra))
     raise AssertionError(f"unchecked node {ast.dump(node)}")  # _check has refused everything else
 

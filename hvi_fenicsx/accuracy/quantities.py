@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dolfinx import fem
 
     from ..certify.contact_state import ContactState
-    from ..estimate.coupled_errors import ContactErrors
+    from ..estimate.estimator import ContactErrors
     from .adaptive import AdaptiveLevel, AdaptiveStep
 
 
@@ -81,7 +81,7 @@ class ContactField(Observable):
         """See :meth:`.Quantity.error`; with its safety factor."""
         if not self.known_from_one_mesh:
             return super().error()
-        from ..estimate.coupled_errors import estimate_contact_errors
+        from ..estimate.estimator import estimate_contact_errors
 
         found, self._ahead = self._last.solution, None
         if found.solve_result is None or found.examination is None:

@@ -6,7 +6,6 @@ constraints are supports and contact.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -231,7 +230,8 @@ class LeastEnergy:
         self._bubbles, self._stiffness, self._under = bubbles, stiffness, under
         self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
         self._e = bubbles.x.array[: load.size].reshape(load.shape)
-        self._special = _union([*(p.blocks for p in under.bounds), *(p.blocks for p in under.prescribed)])
+        parts = (p.blocks for p in (*under.bounds, *under.prescribed))
+        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *parts]))
         for given in under.prescribed:
             self._e[given.blocks, given.component] = given.values
 
@@ -239,8 +239,7 @@ class LeastEnergy:
         """Find them; from the second time on from those that were found before. Collective."""
         stiffness, e = self._stiffness, self._e
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
-        rough = DEFAULT.rough_tolerance[nodes.degree(stiffness.problem.space) - 1]
-        tolerance = rough if self._begun else DEFAULT.tolerance
+        tolerance = DEFAULT.rough_tolerance if self._begun else DEFAULT.tolerance
         goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), DEFAULT.rounding**2)
         for _ in range(DEFAULT.rounds):
             self._put_on_bounds()
@@ -289,11 +288,6 @@ class LeastEnergy:
 
     def _descent(self, r: Array) -> Array:
         return self._stiffness.descent(r, (*self._under.prescribed, *self._parts), self._special)
-
-
-def _union(parts: Iterable[Entities]) -> Entities:
-    """All of some blocks, sorted."""
-    return np.unique(np.concatenate([np.empty(0, np.int32), *parts]))
 
 
 class VertexStiffness(BubbleStiffness):

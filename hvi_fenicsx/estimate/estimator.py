@@ -10,18 +10,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import fem
+from dolfinx import fem, la
+from mpi4py import MPI
 
 from ..certify.certificate import Examination
+from ..certify.contact_state import ContactState
+from ..certify.law_state import LawState
+from ..laws import Superpotential
 from ..problem.problem import Problem
 from ..runtime.log import percent
 from ..runtime.mpi import total
 from ..system.multigrid import Levels
 from ..system.system import System
 from ..typing import Array
-from . import coupled_errors, data_errors, defect, dual_norm
-from .bubbles import DEFAULT, BubbleStiffness
-from .law_traces import ErrorField, LawTraces
+from . import data_errors, defect, dual_norm
+from .bubbles import DEFAULT, BlockForces, BubbleStiffness, summed
+from .dual_norm import DualNorm
+from .law_traces import ErrorField, LawSprings, LawTraces
+from .traces import Trace
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,12 +62,12 @@ class Estimate:
     @property
     def relative(self) -> float:
         """The total over |||u_h|||; infinite where u_h is a rigid motion and the error is not 0."""
-        return coupled_errors.ratio(self.total, self.energy_norm)
+        return ratio(self.total, self.energy_norm)
 
     @property
     def coarse(self) -> bool:
         """Whether the mesh's error is so large that the numbers are rough."""
-        return coupled_errors.ratio(self.discretisation, self.energy_norm) > DEFAULT.coarse
+        return ratio(self.discretisation, self.energy_norm) > DEFAULT.coarse
 
     def as_dict(self) -> dict[str, float]:
         """The numbers by name, nondimensional."""
@@ -83,14 +89,14 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
     """
     problem = system.problem
     traces = LawTraces(problem, u, examination.states, exact=False)
-    inverse = dual_norm.DualNorm(system, levels, u)
+    inverse = DualNorm(system, levels, u)
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states)
     cells += data_errors.squares_at_ends(problem, traces.bubbles, u, examination, inverse)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance)
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
@@ -109,19 +115,19 @@ def _norm(square: float, rounding: float) -> float:
     return float(np.sqrt(square)) if square > rounding**2 else 0.0
 
 
-def _discretisation(traces: LawTraces, inverse: dual_norm.DualNorm, energy: float) -> tuple[ErrorField | None, Array]:
+def _discretisation(traces: LawTraces, inverse: DualNorm, energy: float) -> tuple[ErrorField | None, Array]:
     """The error, where it is known as a field, and η_K² of the owned cells; a(u_h, u_h) is the energy. Collective."""
     if traces.problem.bulk.averages_dilatation:
         return None, defect.squares(traces, inverse)
     stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), DEFAULT.coupled[traces.degree - 1]
-    if limit and not coupled_errors.within_facets(traces):
+    if limit and not within_facets(traces):
         cells = _between_nodes(traces, inverse, stiffness)
         if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:
             return None, cells
-    return coupled_errors.of_solution(traces, inverse, stiffness)
+    return of_solution(traces, inverse, stiffness)
 
 
-def _between_nodes(traces: LawTraces, inverse: dual_norm.DualNorm, stiffness: BubbleStiffness) -> Array:
+def _between_nodes(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> Array:
     """η_K² of the owned cells: of the bubbles, and of the nodal forces that the laws are taken for. Collective."""
     problem, u = traces.problem, traces.u
     load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
@@ -150,9 +156,263 @@ def warnings(errors: Estimate) -> tuple[str, ...]:
     """
     if not errors.coarse:
         return ()
-    share = coupled_errors.ratio(errors.discretisation, errors.energy_norm)
+    share = ratio(errors.discretisation, errors.energy_norm)
     size = f"{percent(share)} of the solution" if np.isfinite(share) else "as large as the solution"
     return (
         f"the mesh is coarse: its estimated error is {size} in the energy norm, although the equations on this mesh "
         "are solved and certified; refine the mesh",
     )
+
+
+def within_facets(traces: LawTraces) -> bool:
+    """Whether a law, as it is solved, drops between the nodes of a facet. Collective."""
+    found = [
+        bool(np.any(heights(traces.part(state.surface, law.term.directions), law, law.term.law)))
+        for state in traces.states
+        for law in state.laws
+    ]
+    return bool(traces.problem.domain.mesh.comm.allreduce(any(found), op=MPI.LOR))
+
+
+def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
+    """By how much the law drops within each facet, (f,). Collective.
+
+    Args:
+        points: of the law's part.
+        law: its state.
+        of: the law, as it is or as it is solved.
+    """
+    ends = points.interpolated(law.argument[:, None], "at_ends", along=not law.term.radial)[:, :, 0]
+    low, high = ends.min(axis=1, initial=np.inf), ends.max(axis=1, initial=-np.inf)
+    height = np.zeros(len(ends))
+    for kink, jump in zip(of.concave.kinks, of.concave.jumps, strict=True):
+        height += jump * ((low < kink) & (kink < high))
+    return height
+
+
+class Coupled:
+    """The forms and constraints of bubbles and nodes that are found together. Creation is collective.
+
+    Args:
+        traces: the laws between the nodes.
+        inverse: of the system.
+        stiffness: of the bubbles.
+
+    Attributes:
+        error: as it is known so far.
+    """
+
+    def __init__(self, traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> None:
+        problem, space = traces.problem, traces.bubbles
+        self._traces, self._inverse = traces, inverse
+        self._longest = 0.0
+        self.error = ErrorField(fem.Function(problem.space), fem.Function(space))
+        load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
+        self._laws, _ = traces.tested()
+        load[self._laws.blocks] -= self._laws.values
+        under = defect.constraints(problem, traces.u, space)
+        self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load)
+        self._moved = fem.Function(problem.space)
+        self._of_moved = problem.bulk.force_in(space, self._moved)
+        self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
+        self._shared, self._strongest = 0.0, 0.0
+        self._answer = summed((), problem.scales.dimension)
+        self._force: Array = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
+
+    @property
+    def size(self) -> float:
+        """The energy norm of the error. Collective."""
+        problem = self._traces.problem
+        relative = problem.relative(self.error.nodes.x.array)[: self._force.size]
+        of_nodes = total(problem.domain.mesh.comm, float(np.vdot(relative, self._force)))
+        return float(np.sqrt(max(self._least.energy + 2 * self._shared + of_nodes, 0.0)))
+
+    def find_bubbles(self) -> None:
+        """Find the bubbles that belong to the nodes. Collective."""
+        self._least.find_beside(LawSprings(self._traces, self.error))
+
+    def move_nodes(self) -> None:
+        """Move the nodes as the bubbles ask; the laws answer that, so it takes a few rounds. Collective."""
+        traces, inverse, nodes = self._traces, self._inverse, self.error.nodes
+        np.negative(nodes.x.array, out=self._moved.x.array)
+        of_bubbles = self._of_bubbles.values()
+        asked = traces.problem.combined(of_bubbles)
+        for number in range(DEFAULT.rounds):
+            _, laws = traces.tested(self.error)
+            if self._settled(laws) and number > 0:
+                break
+            unmet = -asked
+            unmet -= self._force
+            unmet[laws.blocks] += laws.values
+            step, length = inverse.solve(unmet, DEFAULT.rough_tolerance)
+            nodes.x.array[:] += step.x.array
+            self._force = inverse.force(nodes)
+            self._longest = max(self._longest, length)
+            if length <= DEFAULT.answer_change * self._longest:
+                break
+        if inverse.keep_within_bounds(nodes):
+            self._force = inverse.force(nodes)
+        self._moved.x.array[:] += nodes.x.array
+        work = float(np.vdot(nodes.x.array[: of_bubbles.size], of_bubbles))
+        self._shared = total(traces.problem.domain.mesh.comm, work)
+
+    def _settled(self, laws: BlockForces) -> bool:
+        """Whether the laws' force on the nodes is nearly the one before. Collective."""
+        comm = self._traces.problem.domain.mesh.comm
+        changed = np.sqrt(total(comm, float(np.sum((laws - self._answer).values ** 2))))
+        self._answer, self._strongest = laws, max(self._strongest, changed)
+        return bool(changed <= DEFAULT.coupled_change * self._strongest)
+
+    def tell_bubbles(self) -> None:
+        """Let the bubbles feel that nodes and laws have moved. Collective."""
+        before = self._laws
+        self._laws, _ = self._traces.tested(self.error)
+        fallen = before - self._laws
+        self._least.residual[fallen.blocks] += fallen.values
+        self._least.residual -= self._of_moved.values()
+
+
+def of_solution(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> tuple[ErrorField, Array]:
+    """Bubbles and nodes in turns, each under the influence of the other, until their energy settles. Collective.
+
+    Args:
+        traces: the laws between the nodes.
+        inverse: of the system.
+        stiffness: of the bubbles.
+
+    Returns:
+        The estimated error, and η_K² of the owned cells.
+    """
+    coupled, size = Coupled(traces, inverse, stiffness), 0.0
+    for _ in range(DEFAULT.coupled_rounds):
+        coupled.find_bubbles()
+        coupled.move_nodes()
+        before, size = size, coupled.size
+        if abs(size - before) <= DEFAULT.coupled_change * size:
+            break
+        coupled.tell_bubbles()
+    error = coupled.error
+    return error, traces.problem.bulk.energy_by_cell(error.nodes + error.bubbles)
+
+
+_PLACE = 1 / (2 * np.sqrt(12))
+"""Standard deviation, over the distance of two nodes, of the place of a drop that may be anywhere in half of it."""
+
+
+@dataclass(frozen=True)
+class ContactErrors:
+    """Estimated errors on Γc, relative.
+
+    Attributes:
+        slip: of the slip in L2.
+        friction: of -σ_t in L1; 0 without a law along Γc.
+        corrected: u_h with its estimated error at the nodes, nondimensional.
+    """
+
+    slip: float
+    friction: float
+    corrected: fem.Function
+
+
+def estimate_contact_errors(
+    system: System,
+    levels: Levels,
+    u: fem.Function,
+    examination: Examination,
+    known: ErrorField | None = None,
+) -> ContactErrors:
+    """Estimate the errors of slip and -σ_t, what smoothing changes included. Collective.
+
+    Nearly incompressible regions are not for this: their averaged pressure is not in the bubbles' force.
+
+    Args:
+        system: what was solved.
+        levels: its coarser levels; none where there is no mesh hierarchy.
+        u: its solution, nondimensional, ghosts updated.
+        examination: of the same u.
+        known: the estimated error, where it is known as a field (:attr:`.Estimate.field`).
+    """
+    traces = LawTraces(system.problem, u, examination.states, exact=True)
+    inverse = DualNorm(system, levels, u)
+    error = known or of_solution(traces, inverse, BubbleStiffness(system.problem, traces.bubbles))[0]
+    uncertain = _uncertainty(traces, inverse)
+    inverse.destroy()
+    slips = [_slip(traces, state, error, uncertain) for state in examination.states]
+    frictions = [
+        _friction(traces, state, law, error, uncertain)
+        for state in examination.states
+        for law in state.laws
+        if law.term.direction.tangential
+    ]
+    comm = system.comm
+    apart, whole = (total(comm, sum(pair[i] for pair in slips)) for i in (0, 1))
+    seen, unseen, carried = (total(comm, sum(sizes[i] for sizes in frictions)) for i in (0, 1, 2))
+    away = float(np.hypot(seen, unseen))
+    corrected = fem.Function(system.problem.space)
+    corrected.x.array[:] = error.nodes.x.array + u.x.array
+    return ContactErrors(float(np.sqrt(ratio(apart, whole))), ratio(away, carried), corrected)
+
+
+def ratio(part: float, whole: float) -> float:
+    """Part over whole; infinite where only the whole is 0, and 0 where both are.
+
+    Args:
+        part: not negative.
+        whole: not negative.
+    """
+    return part / whole if whole > 0 else (np.inf if part > 0 else 0.0)
+
+
+def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
+    """What the nodes may move because bubbles do not see where between two nodes a drop lies. Collective.
+
+    The facets' places are independent of each other, so n of them add up to a root of n times the effect of one.
+    """
+    problem, count = traces.problem, 0
+    d, comm, force = problem.scales.dimension, problem.domain.mesh.comm, fem.Function(problem.space)
+    for state in traces.states:
+        for law in state.laws:
+            points, tau = _drops(traces, state, law)
+            dropped = points.tested(tau)[1]
+            force.x.array.reshape(-1, d)[dropped.blocks] += dropped.values
+            count += int(np.count_nonzero(np.any(tau, axis=(1, 2))))
+    force.x.scatter_reverse(la.InsertMode.add)
+    owned = problem.space.dofmap.index_map.size_local
+    field, _ = inverse.solve(force.x.array.reshape(-1, d)[:owned])
+    field.x.array[:] /= np.sqrt(max(comm.allreduce(count), 1))
+    return field
+
+
+def _drops(traces: LawTraces, state: ContactState, law: LawState) -> tuple[Trace, Array]:
+    """A law's drops on the facets within which they lie, spread over their uncertain share of them, (f, q, k)."""
+    points = traces.part(state.surface, law.term.directions)
+    height = heights(points, law, law.term.exact)
+    slip = points.of_field(traces.u)
+    along = law.term.gradient(slip.reshape(-1, slip.shape[2])).reshape(slip.shape) if law.term.radial else np.sign(slip)
+    multiplier = points.interpolated(law.term.multiplier[:, None])
+    return points, _PLACE / traces.degree * height[:, None, None] * multiplier * along
+
+
+def _slip(traces: LawTraces, state: ContactState, error: ErrorField, uncertain: fem.Function) -> tuple[float, float]:
+    """∫ of the squares of the slip's error and of the slip over this rank's share of a part. Collective."""
+    points = traces.part(state.surface, state.surface.tangents)
+    added, slip = points.of_field(error.nodes) + points.of_bubbles(error.bubbles), points.of_field(traces.u)
+    fields = added, points.of_field(uncertain), slip
+    squares = [float(np.sum(points.weights * np.sum(values**2, axis=2))) for values in fields]
+    return squares[0] + squares[1], squares[2]
+
+
+def _friction(
+    traces: LawTraces, state: ContactState, law: LawState, error: ErrorField, uncertain: fem.Function
+) -> tuple[float, float, float]:
+    """∫ of the law's change against the interpolated nodal tractions, of its uncertainty, of those. Collective."""
+    further = fem.Function(traces.problem.space)
+    further.x.array[:] = error.nodes.x.array + uncertain.x.array
+    found = traces.of_law(state, law, error)
+    other = traces.of_law(state, law, ErrorField(further, error.bubbles))
+    fields = found.traction - found.nodal, other.traction - found.traction, found.nodal
+    tangents = state.slip.shape[1]
+    known, unknown, carried = (
+        float(np.sum(found.points.weights * np.linalg.norm(values[:, :, -tangents:], axis=2))) for values in fields
+    )
+    return known, unknown, carried

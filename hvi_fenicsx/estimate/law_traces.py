@@ -214,15 +214,15 @@ class LawTraces:
         """What u_h gives a law. Collective."""
         if id(law) not in self._solved:
             points = self.part(state.surface, law.term.directions)
-            on_kink = points.from_node_to_node(law.on_convex_kink()[:, None].astype(float))
-            stretch = points.from_node_to_node(law.term.stretch[:, None])
+            on_kink = points.interpolated(law.on_convex_kink()[:, None].astype(float), "hats")
+            stretch = points.interpolated(law.term.stretch[:, None], "hats")
             solved = _Solved(
                 points=points,
                 multiplier=points.interpolated(law.term.multiplier[:, None]),
                 stretch=stretch,
-                nodal=points.interpolated_components(law.carried),
+                nodal=points.interpolated(law.carried, along=True),
                 sticks=np.asarray(on_kink > 1 - CERTIFICATE.near),
-                nodewise=points.of_field_from_node_to_node(self.u) / stretch,
+                nodewise=points.of_field(self.u, "hats") / stretch,
                 slip=points.of_field(self.u) / stretch,
             )
             self._solved[id(law)] = law, solved
@@ -259,7 +259,7 @@ class LawTraces:
         if (interface := self.problem.interface_of(state.surface)) is not None and interface.curved:
             axes = frames(state.surface)
         points = self.part(state.surface, axes)
-        return points.tested(points.interpolated_components(np.einsum("mkd,md->mk", axes, force)))[0]
+        return points.tested(points.interpolated(np.einsum("mkd,md->mk", axes, force), along=True))[0]
 
 
 class LawSprings:

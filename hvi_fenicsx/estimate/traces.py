@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from dolfinx import fem, la
@@ -106,6 +107,10 @@ class PartPoints:
         return np.array(local[self._surface.blocks])
 
 
+Basis = Literal["functions", "hats", "at_ends"]
+"""By what values at nodes are interpolated."""
+
+
 class Trace:
     """Displacements along k directions at quadrature points. Creation is collective.
 
@@ -143,42 +148,27 @@ class Trace:
         back = rotations_between(normals, np.broadcast_to(one[facets, None], normals.shape))
         return np.asarray(self._on_facets(self._points.functions, alike) @ back)
 
-    def interpolated(self, values: Array) -> Array:
-        """The function with coefficients at the owned nodes (m, k) at the points, (f, q, k). Collective."""
-        return self._on_facets(self._points.functions, self._points.of_nodes(values))
+    def interpolated(self, values: Array, by: Basis = "functions", *, along: bool = False) -> Array:
+        """Values at the owned nodes (m, k), interpolated at the points, (f, q, k). Collective.
 
-    def interpolated_components(self, values: Array) -> Array:
-        """As :meth:`interpolated`, of components along the directions. Collective."""
-        return self._components(self._points.functions, values)
+        Args:
+            values: at the nodes.
+            by: the elements' functions; those that are linear from node to node ("hats"); the elements' functions at
+                the ends of facets in the place of the points ("at_ends").
+            along: whether they are components along the directions.
+        """
+        there = self._points.of_nodes(values)
+        return self._on_facets(getattr(self._points, by), turned(self._rotations, there) if along else there)
 
-    def at_nodes(self, values: Array) -> Array:
-        """The function with coefficients at the owned nodes at the ends of facets, (f, e, k). Collective."""
-        return self._on_facets(self._points.at_ends, self._points.of_nodes(values))
+    def of_field(self, u: fem.Function, by: Basis = "functions") -> Array:
+        """The values of a displacement of the problem's space, (f, q, k). Collective.
 
-    def components_at_nodes(self, values: Array) -> Array:
-        """As :meth:`at_nodes`, of components along the directions. Collective."""
-        return self._components(self._points.at_ends, values)
-
-    def from_node_to_node(self, values: Array) -> Array:
-        """Values at the owned nodes (m, k), linear from node to node; (f, q, k). Collective."""
-        return self._on_facets(self._points.hats, self._points.of_nodes(values))
-
-    def of_field(self, u: fem.Function) -> Array:
-        """The values of a displacement of the problem's space, (f, q, k). Collective."""
-        return self.interpolated_components(self._along(u))
-
-    def of_field_from_node_to_node(self, u: fem.Function) -> Array:
-        """Its coefficients, linear from node to node, (f, q, k). Collective."""
-        return self._components(self._points.hats, self._along(u))
-
-    def _along(self, u: fem.Function) -> Array:
-        """The coefficients of a displacement along the directions at the owned nodes, (m, k). Collective."""
+        Args:
+            u: the displacement.
+            by: as for :meth:`interpolated`.
+        """
         there = self._surface.values(self._problem.relative(u.x.array))
-        return np.asarray(np.einsum("mkd,md->mk", self._directions, there))
-
-    def _components(self, functions: Array, values: Array) -> Array:
-        """Sums of functions (f, q, n) times components at the owned nodes (m, k). Collective."""
-        return self._on_facets(functions, turned(self._rotations, self._points.of_nodes(values)))
+        return self.interpolated(np.einsum("mkd,md->mk", self._directions, there), by, along=True)
 
     def _on_facets(self, functions: Array, values: Array) -> Array:
         """Sums of functions (f, q, n) times values of nodes (facets, n, k, ...)."""

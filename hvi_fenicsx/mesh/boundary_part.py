@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,18 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..formula import Formula
+from ..formula import COMPARISONS, NUMPY, Formula
 from ..typing import Array, Entities, Mask
 
 if TYPE_CHECKING:
     from .domain import Domain
 
-_COMPARE: Mapping[type[ast.cmpop], Callable[[Array, Array], Any]] = {
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-}
 _JOIN: Mapping[type[ast.boolop], Any] = {ast.And: np.logical_and, ast.Or: np.logical_or}
 _LONGEST = 500
 _NONE = '"{}" is no inequality; write one like "x > 0.3" or "0.1 < x < 0.2 and y < 1"'
@@ -76,9 +69,9 @@ class Inequalities:
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 inner = self._read(operand)
                 return lambda points: ~inner(points)
-            case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARE for op in ops):
+            case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in COMPARISONS for op in ops):
                 sides = [Formula(ast.get_source_segment(self.source, side) or "") for side in (left, *others)]
-                signs = [_COMPARE[type(op)] for op in ops]
+                signs = [NUMPY.compare[COMPARISONS[type(op)]] for op in ops]
                 return lambda points: _hold([side.at(points) for side in sides], signs)
         raise InputError(_NONE.format(self.source))
 

@@ -23,7 +23,7 @@ from ..typing import Array, Entities, Integers
 from . import nodes, transfer
 from .domain import DEFAULT, Domain, MeshThresholds
 
-_MORE_SWEEPS = 2
+_SWEEPS = 3
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
 
 
@@ -60,9 +60,9 @@ def _curved(domain: Domain, names: Collection[str], least: float) -> CurvedMesh:
     space = fem.functionspace(domain.mesh, ("Lagrange", 2))
     before, d = nodes.points(space)[:, : domain.dimension], domain.dimension
     on = {name: np.unique(nodes.facet_nodes(space, domain.sides[name])) for name in names}
-    after = onto_curves(space.dofmap.index_map, before, on, domain.curves)
-    for _ in range(_MORE_SWEEPS if domain.dimension == 3 else 0):  # in space sides share edges
-        after = onto_curves(space.dofmap.index_map, after, _shared(on), domain.curves)
+    after = before
+    for _ in range(_SWEEPS if domain.dimension == 3 else 1):  # in space sides share edges
+        after = onto_curves(space.dofmap.index_map, after, on, domain.curves)
     after, straight = _straightened(space, before, after, least)
     points = np.pad(after, ((0, 0), (0, 3 - d)))
     return CurvedMesh(compat.quadratic_mesh(domain.mesh, space.dofmap, points), straight)
@@ -88,12 +88,6 @@ def _straightened(space: fem.FunctionSpace, before: Array, after: Array, least: 
         back.scatter_reverse(la.InsertMode.add)
         back.scatter_forward()
         after, count = np.where(back.array[:, None] > 0.0, before, after), count + found
-
-
-def _shared(on: Mapping[str, Entities]) -> dict[str, Entities]:
-    """Those of the nodes of each side that are on several of them."""
-    found, count = np.unique(np.concatenate(list(on.values())), return_counts=True)
-    return {name: np.intersect1d(nodes_of, found[count > 1]) for name, nodes_of in on.items()}
 
 
 def onto_curves(

@@ -115,10 +115,7 @@ class Domain:
         Raises:
             InputError: a name that the domain does not have (the same on all ranks).
         """
-        for name in names:
-            if name not in self.sides:
-                raise InputError(f"the domain has no boundary part {name!r}; it has {', '.join(sorted(self.sides))}")
-        return np.unique(np.concatenate([self.sides[name] for name in names])).astype(np.int32)
+        return _together(self.sides, names, "boundary part")
 
     def cells(self, names: Sequence[str]) -> Entities:
         """Local cells of the named regions together, sorted.
@@ -126,11 +123,15 @@ class Domain:
         Raises:
             InputError: a name that the domain does not have (the same on all ranks).
         """
-        for name in names:
-            if name not in self.regions:
-                known = ", ".join(sorted(self.regions)) or "no named regions"
-                raise InputError(f"the domain has no region {name!r}; it has {known}")
-        return np.unique(np.concatenate([self.regions[name] for name in names])).astype(np.int32)
+        return _together(self.regions, names, "region")
+
+
+def _together(known: Mapping[str, Entities], names: Sequence[str], kind: str) -> Entities:
+    """The entities of some names, sorted."""
+    for name in names:
+        if name not in known:
+            raise InputError(f"the domain has no {kind} {name!r}; it has {', '.join(sorted(known)) or 'none'}")
+    return np.unique(np.concatenate([known[name] for name in names])).astype(np.int32)
 
 
 Coarsening: TypeAlias = Callable[[], tuple[Domain, Transfer]]

@@ -169,12 +169,19 @@ def _piece(domain: Domain, within: Mask) -> Piece:
     parents = cells[order].astype(np.int32)
     own = np.empty(len(mesh.geometry.x), dtype=np.int64)
     own[compat.geometry_dofmap(mesh)] = compat.geometry_dofmap(whole)[parents]
+    here = np.arange(len(parents), dtype=np.int32)
+    sides = {n: cell_facets.in_copies(side, whole, parents, mesh, here) for n, side in domain.sides.items()}
+    regions = {n: np.flatnonzero(np.isin(parents, own)).astype(np.int32) for n, own in domain.regions.items()}
+    present = (_present(whole.comm, found) for found in (sides, regions))
     return Piece(
-        domain=Domain.from_mesh(
-            mesh, _sides(domain, parents, mesh), _regions(domain, parents), domain.curves, one_piece=True
-        ),
+        domain=Domain.from_mesh(mesh, *present, domain.curves, one_piece=True),
         numbers=np.asarray(whole.geometry.input_global_indices, dtype=np.int64)[own],
     )
+
+
+def _present(comm: MPI.Comm, found: Mapping[str, Entities]) -> dict[str, Entities]:
+    """Those that some rank has. Collective."""
+    return {name: found[name] for name in sorted(found) if total(comm, len(found[name])) > 0}
 
 
 def _numbered(mesh: dmesh.Mesh, corners: Entities) -> tuple[Integers, Entities]:
@@ -196,27 +203,3 @@ def _numbered(mesh: dmesh.Mesh, corners: Entities) -> tuple[Integers, Entities]:
     numbers = np.zeros(len(used.array), dtype=np.int64)
     numbers[points] = np.arange(len(points)) + (mesh.comm.exscan(len(points)) or 0)
     return of_owners(index_map, numbers), points.astype(np.int32)
-
-
-def _sides(domain: Domain, parents: Entities, mesh: dmesh.Mesh) -> dict[str, Entities]:
-    """The facets of a piece on each side that it has a part of. Collective.
-
-    Args:
-        domain: the whole.
-        parents: the cell of the whole that each cell of the piece is, (c,).
-        mesh: of the piece.
-    """
-    own = np.arange(len(parents), dtype=np.int32)
-    sides = {n: cell_facets.in_copies(side, domain.mesh, parents, mesh, own) for n, side in domain.sides.items()}
-    return _present(mesh.comm, sides)
-
-
-def _regions(domain: Domain, parents: Entities) -> dict[str, Entities]:
-    """The cells of a piece in each region that it has a part of. Collective."""
-    found = {n: np.flatnonzero(np.isin(parents, cells)).astype(np.int32) for n, cells in domain.regions.items()}
-    return _present(domain.mesh.comm, found)
-
-
-def _present(comm: MPI.Comm, found: Mapping[str, Entities]) -> dict[str, Entities]:
-    """Those that some rank has. Collective."""
-    return {name: found[name] for name in sorted(found) if total(comm, len(found[name])) > 0}

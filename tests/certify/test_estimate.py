@@ -18,8 +18,7 @@ from scenes import Table, block, model, quadratic_linear, solved, solved_system
 
 from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.certify.certificate import examine
-from hvi_fenicsx.estimate.coupled_errors import estimate_contact_errors
-from hvi_fenicsx.estimate.estimator import Estimate, estimate
+from hvi_fenicsx.estimate.estimator import Estimate, estimate, estimate_contact_errors
 from hvi_fenicsx.problem.problem import Problem
 from hvi_fenicsx.workflow import finish
 
