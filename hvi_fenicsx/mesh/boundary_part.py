@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..formula import COMPARISONS, NUMPY, Formula
+from ..formula import COMPARISONS, Formula
 from ..typing import Array, Entities, Mask
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Inequalities:
                 return lambda points: ~inner(points)
             case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in COMPARISONS for op in ops):
                 sides = [Formula(ast.get_source_segment(self.source, side) or "") for side in (left, *others)]
-                signs = [NUMPY.compare[COMPARISONS[type(op)]] for op in ops]
+                signs = [COMPARISONS[type(op)] for op in ops]
                 return lambda points: _hold([side.at(points) for side in sides], signs)
         raise InputError(_NONE.format(self.source))
 
