@@ -114,7 +114,7 @@ def _environment() -> jinja2.Environment:
     found = jinja2.Environment(
         loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    ways: list[Callable[..., str]] = [units.number, units.quantity, units.percent, units.thousands, said, two_digits]
+    ways: list[Callable[..., str]] = [units.number, units.quantity, units.thousands, said, two_digits]
     found.filters |= {way.__name__: way for way in ways}
     found.filters |= {"file_name": lambda path: PurePath(str(path)).name, "named": _named}
     return found

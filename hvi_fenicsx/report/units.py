@@ -97,11 +97,6 @@ def unless_noise(value: float, beside: float) -> float:
     return value if abs(value) > ROUNDING * beside else 0.0
 
 
-def percent(share: float) -> str:
-    """A share of one as a percentage, to two digits."""
-    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{number(100.0 * share, 2)} %"
-
-
 def thousands(whole: int) -> str:
     """A whole number, its thousands apart."""
     return f"{whole:,}".replace(",", _NARROW)

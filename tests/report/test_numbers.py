@@ -15,12 +15,5 @@ def test_a_number_has_neither_a_hyphen_nor_a_letter(value: float, digits: int, t
     assert units.number(value, digits) == text
 
 
-@pytest.mark.parametrize(
-    ("share", "text"), [(4.126, "413 %"), (0.13, "13 %"), (0.0042, "0.42 %"), (1e-9, "10⁻⁷ %"), (0.0, "0 %")]
-)
-def test_a_percentage_has_two_digits_or_all_before_the_point(share: float, text: str) -> None:
-    assert units.percent(share) == text
-
-
 def test_a_force_that_is_rounding_beside_the_largest_is_zero() -> None:
     assert [units.unless_noise(value, 1.5e4) for value in (-83e-9, -2.0e-5, 3.0)] == [0.0, -2.0e-5, 3.0]

@@ -20,7 +20,6 @@ from .shape import (
     PartGeometry,
     deform,
     escaping,
-    followed,
     held_sides,
     loaded_sides,
     part_geometries,
@@ -135,9 +134,10 @@ def stress_end(body: BodyMesh) -> float:
     """Where the scale of the stress ends, N/m²: at the largest one, or where a share ``PEAK`` of the body has more."""
     values = body.von_mises
     assert values is not None
-    order = np.argsort(values)
-    share = np.cumsum(body.volumes[order]) / body.volumes.sum()
-    end, largest = float(values[order][np.searchsorted(share, 1.0 - PEAK)]), float(values.max())
+    end, largest = (
+        float(np.quantile(values, 1.0 - PEAK, weights=body.volumes, method="inverted_cdf")),
+        float(values.max()),
+    )
     return end if 0.0 < 1.25 * end < largest else largest
 
 
@@ -148,10 +148,7 @@ def escape(result: Result) -> Figure:
     canvas.supports(rest, held_sides(result))
     canvas.loads(rest, loaded_sides(result))
     mover = rest.as_drawn.moving()
-    motion = escaping(mover)
-    posts = followed(mover, motion)
-    ways = np.stack([motion.at(posts, part) for part in np.linspace(0.0, 1.0, 25)], axis=1)
-    canvas.ghost(mover, motion.at(mover.points), ways)
+    canvas.ghost(mover, *escaping(mover))
     words = f"the body at rest, {rest.stretched}" if rest.stretched else "the body at rest"
     ghost = Patch(fc="#fbe3d3", ec=VERMILION, ls="--", label="its ghost, on its way")
     canvas.key(Patch(fc=PALE, ec=INK, label=words), ghost)

@@ -16,7 +16,7 @@ from pathlib import Path
 from ...runtime import manifest, processes, writing
 from ..solution_arrays import ReportError
 
-UNFINISHED = ".part.png"
+UNFINISHED = ".png.part"
 """How the name of a picture ends that is being written."""
 COMPLAINT = "pictures: "
 """How the child's message to its caller begins."""

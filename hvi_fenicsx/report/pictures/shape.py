@@ -148,52 +148,27 @@ def _stretch(body: BodyMesh) -> Array:
     return stretch
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A finite rigid motion, x → exp(t A) x in homogeneous coordinates.
+def escaping(body: BodyMesh) -> tuple[Array, Array]:
+    """Where a finite motion along the escape mode brings the vertices, (n, 3): unlike that, it keeps the body's shape.
 
-    Attributes:
-        generator: A, (4, 4): the velocity at x is A x.
+    Returns:
+        These, and the ways there of vertices that move, one far out in each diagonal direction, (j, 25, 3).
     """
+    from scipy.linalg import expm
 
-    generator: Array
-
-    def at(self, points: Array, part: float = 1.0) -> Array:
-        """Where points are after a part of the motion, m, (n, 3).
-
-        Args:
-            points: at rest, m, (n, 3).
-            part: of the motion, 0 to 1.
-        """
-        from scipy.linalg import expm
-
-        way = expm(part * self.generator)
-        return np.asarray(points @ way[:3, :3].T + way[:3, 3])
-
-
-def escaping(body: BodyMesh) -> Motion:
-    """The motion whose velocity is the body's escape mode: unlike that, it keeps the body's shape."""
     assert body.escape_mode is not None
     used = np.unique(body.cells)
     points, mode = np.column_stack([body.points[used], np.ones(len(used))]), body.escape_mode[used]
     reach = 3 * VISIBLE * body.size / (float(np.linalg.norm(mode, axis=1).max()) or 1.0)
-    generator = np.zeros((4, 4))
-    generator[:3] = reach * np.linalg.lstsq(points, mode)[0].T
-    return Motion(generator)
-
-
-def followed(body: BodyMesh, motion: Motion) -> Array:
-    """Points to follow on their way: one far out in each diagonal direction that moves, (j, 3).
-
-    Args:
-        body: the body at rest.
-        motion: that it makes.
-    """
+    velocity = np.zeros((4, 4))  # of x in homogeneous coordinates
+    velocity[:3] = reach * np.linalg.lstsq(points, mode)[0].T
+    ways = [expm(part * velocity)[:3] for part in np.linspace(0.0, 1.0, 25)]
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * body.dimension)).reshape(body.dimension, -1).T
-    points = body.points[body.outermost]
-    far = points[np.unique(np.argmax((points - points.mean(axis=0))[:, : body.dimension] @ signs.T, axis=0))]
-    way = np.linalg.norm(motion.at(far) - far, axis=1)
-    return np.asarray(far[way > VISIBLE * way.max()])  # not the one that the body turns about
+    outer = body.points[body.outermost]
+    far = outer[np.unique(np.argmax((outer - outer.mean(axis=0))[:, : body.dimension] @ signs.T, axis=0))]
+    followed = np.stack([far @ way[:, :3].T + way[:, 3] for way in ways], axis=1)
+    lengths = np.linalg.norm(followed[:, -1] - far, axis=1)  # not the one that the body turns about
+    return body.points @ ways[-1][:, :3].T + ways[-1][:, 3], followed[lengths > VISIBLE * lengths.max()]
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,7 @@ sized to be read on a telephone, where it is shown at a third of that. Below the
 
 from __future__ import annotations
 
-import os
 import textwrap
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
@@ -27,7 +24,6 @@ from ..page import CAPTION
 from ..reader import Result
 from ..solution_arrays import NOTHING
 from ..units import thousands
-from .draw import UNFINISHED
 
 WIDTH, DPI, HEADING = 8.0, 150, 0.95
 """Width and height of the heading in inches, and pixels per inch."""
@@ -168,18 +164,6 @@ def _verdict(result: Result) -> tuple[str, str]:
     return "✗ NOT certified", VERMILION
 
 
-@contextmanager
-def unfinished(path: Path) -> Iterator[Path]:
-    """A name to write to; renamed to ``path`` when all went well, else removed."""
-    aside = path.with_name(f".{path.stem}.{os.getpid()}{UNFINISHED}")
-    with writing.told(path):
-        try:
-            yield aside
-            os.replace(aside, path)
-        finally:
-            aside.unlink(missing_ok=True)
-
-
 def save(fig: Figure, path: Path, caption: str = "") -> None:
     """Write a picture, whole or not at all; without an alpha channel, which nothing needs, it is a quarter smaller.
 
@@ -196,5 +180,5 @@ def save(fig: Figure, path: Path, caption: str = "") -> None:
     image, words = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"), PngInfo()
     if caption:
         words.add_itxt(CAPTION, caption)
-    with unfinished(path) as aside:  # more compression takes half as long again for a tenth of the size
-        image.save(aside, dpi=(DPI, DPI), compress_level=4, pnginfo=words)
+    with writing.whole(path) as aside:  # more compression takes half as long again for a tenth of the size
+        image.save(aside, "PNG", dpi=(DPI, DPI), compress_level=4, pnginfo=words)
