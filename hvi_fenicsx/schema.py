@@ -200,6 +200,12 @@ class Table(BaseModel):
         except ValidationError as error:
             raise validation_error(mistakes_of(error, cls)) from None
 
+    def files(self) -> tuple[Path, ...]:
+        """The files that it reads: those among its fields, and of the tables in it."""
+        values = [value for _, value in self]
+        inner = (file for table in values if isinstance(table, Table) for file in table.files())
+        return (*(value for value in values if isinstance(value, Path)), *inner)
+
     @classmethod
     def allowed_keys(cls) -> list[str]:
         """All keys that it may have."""

@@ -175,9 +175,8 @@ def follow(
     """
     path, solver = _by_table(options)
     prepared = check(model, comm, **solver)
-    scene = _with_path(prepared.scene, path if to is None else {**path, "to": to})
-    assert scene.path is not None
-    run = PathRun(replace(prepared, scene=scene), scene.path)
+    table = (prepared.scene.path or PathTable()).changed(**(path if to is None else {**path, "to": to}))
+    run = PathRun(replace(prepared, scene=prepared.scene.changed(path=table)), table)
     return ModelPath(**fields_of(run.follow(Control())), run=run)
 
 
@@ -190,8 +189,3 @@ def _by_table(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
             raise InputError(unknown("key", key, known))
     of_path, of_solver = ({key: value for key, value in options.items() if key in table} for table in tables)
     return of_path, of_solver
-
-
-def _with_path(model: Model, changes: dict[str, Any]) -> Model:
-    """The model with a load path, of which some keys are changed."""
-    return model.changed(path=(model.path or PathTable()).changed(**changes))

@@ -115,7 +115,7 @@ def check(
     """
     ranks = ranks_of(model, comm)
     domain = None if model.from_file else _domain(model)
-    model = _with_options(model, options)
+    model = model.with_solver(**options) if options else model
     return ModelPreparation(**fields_of(workflow.prepare(model, ranks, domain=domain, thresholds=thresholds)))
 
 
@@ -152,10 +152,6 @@ def ranks_of(model: Any, comm: MPI.Comm | None) -> MPI.Comm:
     if not isinstance(model, Model):
         raise InputError(f"{model!r} is no model; a scene file is read by hvi.read_scene(path)")
     return model.body.comm or comm or MPI.COMM_WORLD
-
-
-def _with_options(model: Model, options: dict[str, Any]) -> Model:
-    return model.with_solver(**options) if options else model
 
 
 def _domain(model: Model) -> Domain:

@@ -11,7 +11,6 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
@@ -569,10 +568,6 @@ class Effect(Table):
             points: m, (n, 3).
         """
         raise NotImplementedError
-
-    def files(self) -> tuple[Path, ...]:
-        """The files that it reads."""
-        return ()
 
     def superpotentials(self) -> tuple[Superpotential, ...]:
         """The laws that it brings: those among its fields."""

@@ -151,10 +151,6 @@ class Obstacle(Table):
         """The unit vector towards it, where that is the same for all points."""
         return None if self.direction is None else tuple(map(float, unit(self.direction)))
 
-    def files(self) -> tuple[Path, ...]:
-        """The files that it reads."""
-        return ()
-
     def gap(self, points: Array) -> Array:
         """The distances of points from where it has been moved."""
         points = self._seen(points)
@@ -299,10 +295,6 @@ class TriangulatedSurface(Obstacle):
     @override
     def nearest(self, points: Array) -> tuple[Array, Array]:
         raise NotImplementedError("it has a direction")
-
-    @override
-    def files(self) -> tuple[Path, ...]:
-        return (self.file,)
 
     @override
     def ahead(self, points: Array, direction: Array) -> Array:
@@ -486,11 +478,6 @@ class Contact(Effect):
         towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction is not None else None
         lower = self.lower if self.gap is None else self.gap.negative()
         return NormalBounds(lower=lower, upper=self.upper, towards=towards)
-
-    @override
-    def files(self) -> tuple[Path, ...]:
-        """The obstacle's."""
-        return () if self.obstacle is None else self.obstacle.files()
 
     @override
     def check(self, dimension: int) -> None:

@@ -276,18 +276,10 @@ class Orthotropic(_ByMatrix):
 
     def stiffness(self) -> Array:
         """The inverse of the compliance; plane strain leaves out what only z would need."""
-        normal = self.held()
-        g = self.shear_moduli
-        if self.model == "three_dimensional":
-            return _blocks(normal, np.diag([g[2], g[1], g[0]]))
-        return _blocks(normal[:2, :2], np.diag(g))
+        from scipy.linalg import block_diag
 
-
-def _blocks(normal: Array, shear: Array) -> Array:
-    n = len(normal)
-    c = np.zeros((n + len(shear), n + len(shear)))
-    c[:n, :n], c[n:, n:] = normal, shear
-    return c
+        normal = self.dimension() or 2
+        return np.asarray(block_diag(self.held()[:normal, :normal], np.diag(self.shear_moduli[::-1])))
 
 
 class Anisotropic(_ByMatrix):

@@ -221,10 +221,6 @@ class PolylineInUnits(PolylineLaw, register=False):
         length, energy = self.law.length_scale, self.law.energy_scale
         return length / self.length, energy / (self.length * self.traction)
 
-    @override
-    def scaled(self, length: float, traction: float) -> Superpotential:
-        return PolylineInUnits(self.law, self.length * length, self.traction * traction)
-
 
 def _limit(traction: npt.ArrayLike, slope: float) -> float:
     """Limit of a ray that starts at the given traction with the given slope."""

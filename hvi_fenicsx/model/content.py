@@ -222,7 +222,11 @@ _NAME = re.compile(r"\w[\w.-]{0,99}")
 
 def contradictions(model: Content) -> list[Mistake]:
     """All that does not fit; the finer checks are made only where the coarse ones find nothing."""
-    return list(_names(model)) or list(_coarse(model)) or list(_fine(model))
+    coarse = (_unknown_sides, _interfaces, _regions, _one_by_one, _start, _path)
+    for checks in ((_names,), coarse, (_smoothing, _sides)):
+        if found := [mistake for check in checks for mistake in check(model)]:
+            return found
+    return []
 
 
 def _names(model: Content) -> Iterator[Mistake]:
@@ -233,17 +237,7 @@ def _names(model: Content) -> Iterator[Mistake]:
             yield Mistake(("interface" if name in model.body.interfaces else "boundary", name), text)
 
 
-def _coarse(model: Content) -> Iterator[Mistake]:
-    yield from _unknown_sides(model)
-    yield from _interfaces(model)
-    yield from _regions(model)
-    yield from _one_by_one(model)
-    yield from _start(model)
-    yield from _path(model)
-
-
-def _fine(model: Content) -> Iterator[Mistake]:
-    yield from _smoothing(model)
+def _sides(model: Content) -> Iterator[Mistake]:
     own = [(model.parts[e.name], e) for e in model.effects if model.table(e) == "boundary"]
     places = dict.fromkeys((side, part.where) for part, _ in own for side in part.on)
     for side, where in places:

@@ -15,7 +15,7 @@ from ..effects import Effect, Place, in_words
 from ..errors import InputError
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.shapes import DomainShape
-from ..schema import Mistake, unknown
+from ..schema import Mistake, Table, unknown
 from . import content
 from .body import Body
 from .content import TABLES, WHOLE, Content, PathTable, SolverTable, dotted
@@ -43,7 +43,9 @@ class Model(Content):
     """
 
     def __init__(self, body: Body, effects: Sequence[Effect], title: str = "") -> None:
-        self.body, self.title = _checked_body(body), title
+        if not isinstance(body, Body):
+            raise InputError(f"model: {body!r} is no body; make one of a mesh: hvi.Body(mesh, facets=..., names=...)")
+        self.body, self.title = body, title
         listed = [self._placed(effect) for effect in _listed("model", effects)]
         if not any(effect.place is Place.MATERIAL for effect in listed):
             raise InputError("model: no effect is a material; add one, such as hvi.Isotropic(youngs_modulus=..., ...)")
@@ -51,7 +53,8 @@ class Model(Content):
         for effect in named:
             if effect.where is not None and effect.where[0] in body.interfaces and effect.name not in body.interfaces:
                 raise InputError(f"{effect.where[0]}: {effect.key} acts there already; give it once")
-        parts = {e.name: body.pieces.get(e.name) or BoundaryPart(e.where or ()) for e in named if _is_on_side(body, e)}
+        on_sides = [e for e in named if e.place is Place.BOUNDARY and e.name not in body.interfaces]
+        parts = {e.name: body.pieces.get(e.name) or BoundaryPart(e.where or ()) for e in on_sides}
         self._complete(named, parts)
 
     @classmethod
@@ -178,7 +181,10 @@ class Model(Content):
             folder: from which the paths of mesh files and plugins are given; None: absolute paths.
         """
         context = None if folder is None else {"folder": folder}
-        write = functools.partial(_written, context=context)
+
+        def write(table: Table) -> dict[str, Any]:
+            return table.model_dump(mode="json", exclude_none=True, context=context)
+
         found: dict[str, Any] = {"title": self.title}
         if self.plugins:
             found["plugins"] = [path if folder is None else os.path.relpath(path, folder) for path in self.plugins]
@@ -198,7 +204,7 @@ class Model(Content):
                 own |= {"elasticity": effect.key, **write(effect)}
             else:
                 own[effect.key] = write(effect)
-        found |= {table: _flat(named) for table, named in effects.items() if named}
+        found |= {table: named.get(WHOLE, named) for table, named in effects.items() if named}
         path = {} if self.path is None else {"path": write(self.path)}
         return found | {"solver": write(self.solver), **path}
 
@@ -249,24 +255,8 @@ def is_portable(model: Model) -> bool:
     return model.from_file or all(effect.is_portable(model.body.mesh) for effect in model.effects)
 
 
-def _written(table: Any, context: Any) -> Any:
-    return table.model_dump(mode="json", exclude_none=True, context=context)
-
-
 def _one_or_list(names: Sequence[str]) -> Any:
     return names[0] if len(names) == 1 else list(names)
-
-
-def _flat(named: dict[str, Any]) -> dict[str, Any]:
-    """``[material]`` instead of ``[material.""]``."""
-    whole: dict[str, Any] | None = named.get(WHOLE)
-    return named if whole is None else whole
-
-
-def _checked_body(body: Any) -> Body:
-    if not isinstance(body, Body):
-        raise InputError(f"model: {body!r} is no body; make one of a mesh: hvi.Body(mesh, facets=..., names=...)")
-    return body
 
 
 def _listed(user: str, effects: Any) -> tuple[Effect, ...]:
@@ -278,10 +268,6 @@ def _listed(user: str, effects: Any) -> tuple[Effect, ...]:
         if not isinstance(one, Effect) or (one.place is Place.BOUNDARY and one.where is None):
             raise InputError(f'{user}: {one!r} is no effect with a place, such as hvi.Friction("floor", law)')
     return listed
-
-
-def _is_on_side(body: Body, effect: Effect) -> bool:
-    return effect.place is Place.BOUNDARY and effect.name not in body.interfaces
 
 
 def _check_place(body: Body, effect: Effect) -> None:

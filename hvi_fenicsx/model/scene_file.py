@@ -40,14 +40,12 @@ def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> M
     require_path("path", path)
     source = _Source.read(Path(path), overrides)
     try:
-        if huge := [Mistake(place, _HUGE) for place, value in _places(source.tables) if _is_huge(value)]:
-            raise Mistakes(huge)
+        huge = "is a whole number beyond 64 bits, which TOML does not have; write 1e20 for 100000000000000000000"
+        if wrong := [p for p, value in _places(source.tables) if isinstance(value, int) and abs(value) >= 2**63]:
+            raise Mistakes([Mistake(place, huge) for place in wrong])
         return read_tables(source.tables, source.file.absolute().parent)
     except Mistakes as error:
         raise InputError(source.listed(error.found)) from None
-
-
-_HUGE = "is a whole number beyond 64 bits, which TOML does not have; write 1e20 for 100000000000000000000"
 
 
 def with_place(message: str, path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> str:
@@ -208,10 +206,6 @@ def lines_of(text: str) -> Mapping[Keys, int]:
             found.setdefault(place if is_table else (*table, *place), first)
         statement, first = "", number + 1
     return found
-
-
-def _is_huge(value: Any) -> bool:
-    return isinstance(value, int) and not -(2**63) <= value < 2**63
 
 
 def _places(value: Any, place: Keys = ()) -> Iterator[tuple[Keys, Any]]:

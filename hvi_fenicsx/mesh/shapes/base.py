@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from ...class_registry import enter
@@ -144,7 +143,3 @@ class DomainShape(Table):
             length: of the body, m.
         """
         return (f"the body is {length:.4g} m long; is it in m?",) if length > LARGEST_BODY else ()
-
-    def files(self) -> tuple[Path, ...]:
-        """The files whose content the mesh depends on."""
-        return ()

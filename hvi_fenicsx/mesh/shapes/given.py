@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import ConfigDict, Field
@@ -102,10 +101,6 @@ class MeshFile(FixedMesh):
             f"domain.file: the body is {length:.3g} m long, and meshes are often in mm: give scale = 1e-3, or "
             "scale = 1.0 if the file is in m",
         )
-
-    def files(self) -> tuple[Path, ...]:
-        """The mesh file."""
-        return (self.file,)
 
 
 class GivenMesh(FixedMesh):
