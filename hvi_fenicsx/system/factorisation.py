@@ -185,6 +185,9 @@ class Factorisation:
         """
         rows = held + self._matrix.getOwnershipRange()[0]
         self._matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
+        if self.pc.getFailedReason():  # MUMPS does not factorise again what has failed
+            self.pc.reset()
+            self.pc.setOperators(self._matrix)
         with default_options(self._options, self._own_prefix):
             self.pc.setFromOptions()
             self.pc.setUp()

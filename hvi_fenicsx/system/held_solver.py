@@ -74,6 +74,7 @@ class HeldPreconditioner:
         self.system.jacobian.hold(held if self.settings.kind in ("mg", "mixed") else held[:0])
         if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
             return
+        self._held = None  # what fails to be made fits nothing
         with self._timer("setup"):
             self._build(held)
         self._held, self._rates = held.copy(), self.system.jacobian.rates
