@@ -1,7 +1,7 @@
 """Nonmonotone laws: superpotentials as objects, the catalogue, and base classes of your own laws (docs/laws.md)."""
 
 from ..class_registry import load_modules
-from .base import LawThresholds, Superpotential
+from .base import ConvexPart, DifferentiablePart, Directional, LawThresholds, Superpotential
 from .catalogue import (
     Exponential,
     Graph,
@@ -12,7 +12,6 @@ from .catalogue import (
     Tresca,
     WeakeningLaw,
 )
-from .convex_parts import ConvexPart, DifferentiablePart, Directional
 from .lengths import BenzeggaghKenane, Length, Mixity, PowerLaw, mixities
 from .polyline import PolylineLaw, PolylinePart, SampledLaw, sample_traction
 from .registry import available, create, describe

@@ -18,8 +18,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..typing import Array
-from .base import DEFAULT, Superpotential, Units
-from .convex_parts import ConvexPart, DifferentiablePart, Directional
+from .base import DEFAULT, ConvexPart, DifferentiablePart, Directional, Superpotential, Units
 from .polyline import PolylineLaw, PolylinePart
 from .registry import require_number, require_ordered, require_positive
 from .traction_graph import TractionGraph

@@ -15,8 +15,7 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..typing import Array, Integers
-from .base import DEFAULT, Superpotential
-from .convex_parts import ConvexPart, Directional
+from .base import DEFAULT, ConvexPart, Directional, Superpotential
 from .traction_graph import TractionGraph
 
 

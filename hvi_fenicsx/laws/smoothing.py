@@ -31,9 +31,8 @@ from typing_extensions import override
 from ..class_registry import enter, hint
 from ..errors import InputError
 from ..typing import Array, Integers
-from .base import Superpotential
+from .base import ConvexPart, DifferentiablePart, Directional, Superpotential, quotient
 from .catalogue import QuadraticLinear
-from .convex_parts import ConvexPart, DifferentiablePart, Directional, quotient
 from .polyline import PolylinePart
 from .traction_graph import TractionGraph
 

@@ -1,6 +1,6 @@
 """Rigid motions: the kernel of a scene, the name of each motion, and whether the load can be borne."""
 
-from ..laws.convex_parts import Directional
+from ..laws.base import Directional
 from .least_energy import OneSidedSupports, RestingPosition, least_energy
 from .limit_analysis import analyse, gives_way, load_factors
 from .motions import (

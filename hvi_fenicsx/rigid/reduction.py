@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..laws import Length
-from ..laws.convex_parts import Directional
+from ..laws.base import Directional
 from ..typing import Array
 from .cutting_planes import Functional, SlipIntegral, merged
 from .motions import NEGLIGIBLE, FixedDirections, Mode, MotionFields, Movable, Places, fields_at, kernel

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from ..laws import Superpotential
-from ..laws.convex_parts import Directional
+from ..laws.base import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..problem.thresholds import DEFAULT
