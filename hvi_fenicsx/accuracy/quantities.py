@@ -1,27 +1,20 @@
-"""The target quantities: the energy norm, slip and friction on Γc, the contact force, the load factors.
-
-This module loads neither PETSc nor MPI: the functions that read a solution import what they need.
-"""
+"""The target quantities: the energy norm, slip and friction on Γc, the contact force, the load factors."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from dolfinx import fem
 
+from ..certify.contact_state import ContactState
 from ..class_registry import hint
 from ..errors import InputError
+from ..estimate.estimator import estimate_contact_errors
 from ..typing import Array
+from .adaptive import AdaptiveLevel, AdaptiveStep
 from .quantity_base import Observable, Quantity, contact_norm
-
-if TYPE_CHECKING:
-    from dolfinx import fem
-
-    from ..certify.contact_state import ContactState
-    from ..estimate.estimator import ContactErrors
-    from .adaptive import AdaptiveLevel, AdaptiveStep
 
 
 class EnergyNorm(Quantity):
@@ -54,15 +47,13 @@ class ContactField(Observable):
 
     Class attributes:
         safety: what the estimate is multiplied with: on coarse meshes it may be too small.
+        field: its name among the estimated errors on Γc.
     """
 
     estimated = True
     safety: ClassVar[float]
+    field: ClassVar[str]
     _ahead: fem.Function | None = None
-
-    @abstractmethod
-    def pick(self, errors: ContactErrors) -> float:
-        """Its own among the estimated errors on Γc."""
 
     @property
     def known_from_one_mesh(self) -> bool:
@@ -81,17 +72,13 @@ class ContactField(Observable):
         """See :meth:`.Quantity.error`; with its safety factor."""
         if not self.known_from_one_mesh:
             return super().error()
-        from ..estimate.estimator import estimate_contact_errors
-
-        found, self._ahead = self._last.solution, None
+        last, found, self._ahead = self._last, self._last.solution, None
         if found.solve_result is None or found.examination is None:
             return np.inf
-        last = self._last
-        u, examination = found.solve_result.u, found.examination
-        known = None if found.estimate is None else found.estimate.field
-        errors = estimate_contact_errors(last.prepared.system, last.levels, u, examination, known=known)
+        u, known = found.solve_result.u, None if found.estimate is None else found.estimate.field
+        errors = estimate_contact_errors(last.prepared.system, last.levels, u, found.examination, known=known)
         self._ahead = errors.corrected
-        return self.safety * self.pick(errors)
+        return self.safety * float(getattr(errors, self.field))
 
     def ahead(self) -> fem.Function | None:
         """See :meth:`.Quantity.ahead`; known once the error is."""
@@ -112,6 +99,7 @@ class Slip(ContactField):
     name = "u_t"
     description = "the slip on Γc in L2"
     safety = 1.7
+    field = "slip"
 
     def missing(self, level: AdaptiveLevel) -> str | None:
         """A part with contact or a law."""
@@ -121,10 +109,6 @@ class Slip(ContactField):
         """u_t, m."""
         return _tangential(level, lambda state: state.slip, level.prepared.problem.scales.displacement)
 
-    def pick(self, errors: ContactErrors) -> float:
-        """The slip's."""
-        return errors.slip
-
 
 class FrictionTraction(ContactField):
     """-σ_t on Γc."""
@@ -133,6 +117,7 @@ class FrictionTraction(ContactField):
     description = "-σ_t on Γc in L1"
     power = 1
     safety = 1.5
+    field = "friction"
 
     def missing(self, level: AdaptiveLevel) -> str | None:
         """A law of the slip."""
@@ -143,15 +128,13 @@ class FrictionTraction(ContactField):
         """-σ_t, N/m²."""
         return _tangential(level, lambda state: state.friction, level.prepared.problem.scales.stress)
 
-    def pick(self, errors: ContactErrors) -> float:
-        """The friction's."""
-        return errors.friction
-
     def smoothing_change(self) -> float:
         """The distance from the unsmoothed law at the same slip, relative. Collective."""
         level = self._last
-        whole = contact_norm(level, self.read(level).x.array, self.power)
-        return _from_true_law(level) * level.prepared.problem.scales.stress / (whole or 1.0)
+        whole, apart = contact_norm(level, self.read(level).x.array, self.power), 0.0
+        for law in (law for state in _states(level) for law in state.laws if law.term.direction.tangential):
+            apart += float(np.sum(law.term.weights * law.true_distance()))
+        return float(level.comm.allreduce(apart)) * level.prepared.problem.scales.stress / (whole or 1.0)
 
 
 class Resultant(Observable):
@@ -204,11 +187,6 @@ class PeakFactor(LoadFactor):
     description = "the peak strength"
 
 
-def names() -> tuple[str, ...]:
-    """The names of all quantities, the user's own among them."""
-    return tuple(Quantity.registry)
-
-
 def find(name: str) -> type[Quantity]:
     """The quantity of a name.
 
@@ -216,7 +194,8 @@ def find(name: str) -> type[Quantity]:
         InputError: there is none.
     """
     if name not in Quantity.registry:
-        raise InputError(f"--quantity: unknown name {name!r}{hint(name, names())}; allowed: {', '.join(names())}")
+        known = tuple(Quantity.registry)
+        raise InputError(f"--quantity: unknown name {name!r}{hint(name, known)}; allowed: {', '.join(known)}")
     return Quantity.registry[name]
 
 
@@ -227,21 +206,9 @@ def _states(level: AdaptiveLevel) -> tuple[ContactState, ...]:
 
 def _tangential(level: AdaptiveLevel, read: Callable[[ContactState], Array], unit: float) -> fem.Function:
     """Tangential vectors (m, d-1) of each part as a field."""
-    from dolfinx import fem
-
     field = fem.Function(level.prepared.problem.space)
     rows = field.x.array.reshape(-1, level.solution.scene.dimension)
     for state in _states(level):
         rows[state.surface.blocks] = np.einsum("mk,mkd->md", read(state), state.surface.tangents) * unit
     field.x.scatter_forward()
     return field
-
-
-def _from_true_law(level: AdaptiveLevel) -> float:
-    """∫ of the distance of -σ_t from the unsmoothed law's graph over Γc, nondimensional. Collective."""
-    found = 0.0
-    for state in _states(level):
-        for law in state.laws:
-            if law.term.direction.tangential:
-                found += float(np.sum(law.term.weights * law.true_distance()))
-    return float(level.comm.allreduce(found))

@@ -1,7 +1,7 @@
 """What a target quantity is: what an accuracy may be asked of, and how its error is estimated.
 
 A new quantity is a subclass of :class:`Observable` with a ``name``: known to ``--quantity`` as soon as its module is
-loaded. This module loads neither PETSc nor MPI.
+loaded.
 """
 
 from __future__ import annotations
@@ -9,19 +9,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from dolfinx import fem
+from scipy.optimize import brentq
 
 from ..class_registry import enter
 from ..errors import InputError
 from ..typing import Array
-
-if TYPE_CHECKING:
-    from dolfinx import fem
-
-    from .adaptive import AdaptiveLevel, AdaptiveStep
+from .adaptive import AdaptiveLevel, AdaptiveStep
 
 ORDERS = (0.5, 2.0)
 """The orders of convergence in h that are believed of a quantity: P1 has no larger one."""
@@ -99,17 +96,8 @@ class Quantity(ABC):
         return 0.0 if found is None else found.smoothing / (found.energy_norm or 1.0)
 
 
-@dataclass(frozen=True)
-class MeshValue:
-    """A quantity on one level, SI.
-
-    Attributes:
-        size: mean mesh size, up to a factor.
-        value: numbers, or a P1 vector field that is zero off Γc, taken to the mesh of the last level.
-    """
-
-    size: float
-    value: fem.Function | Array
+Value = fem.Function | Array
+"""A quantity, SI: numbers, or a P1 vector field that is zero off Γc."""
 
 
 class Observable(Quantity):
@@ -126,17 +114,17 @@ class Observable(Quantity):
 
     def __init__(self) -> None:
         super().__init__()
-        self._values: list[MeshValue] = []
+        self._values: list[tuple[float, Value]] = []  # behind the mean mesh size, up to a factor
 
     @abstractmethod
-    def read(self, level: AdaptiveLevel) -> fem.Function | Array:
+    def read(self, level: AdaptiveLevel) -> Value:
         """Its value on a level in SI: numbers (n,), or a P1 vector field that is zero off Γc. Collective."""
 
     def missing(self, level: AdaptiveLevel) -> str | None:
         """What the scene lacks to have this quantity, for a message; None where it lacks nothing. Collective."""
         return None
 
-    def value(self, level: AdaptiveLevel) -> fem.Function | Array:
+    def value(self, level: AdaptiveLevel) -> Value:
         """As :meth:`read`. Collective.
 
         Raises:
@@ -151,13 +139,13 @@ class Observable(Quantity):
         if level.solution.examination is None:
             self._values = []
             return
-        self._values = [MeshValue(v.size, self._on(level, v.value)) for v in self._values]
+        self._values = [
+            (size, value if isinstance(value, np.ndarray) else prolong(value, level, self._last))
+            for size, value in self._values
+        ]
         size = float(level.dofs) ** (-1.0 / level.solution.scene.dimension)
-        self._values.append(MeshValue(size, self.value(level)))
+        self._values.append((size, self.value(level)))
         super().add(level)
-
-    def _on(self, level: AdaptiveLevel, value: fem.Function | Array) -> fem.Function | Array:
-        return value if isinstance(value, np.ndarray) else prolong(value, level, self._last)
 
     def error(self) -> float:
         """See :meth:`Quantity.error`; infinite before a second mesh."""
@@ -165,22 +153,24 @@ class Observable(Quantity):
 
     def _change(self) -> float:
         """The error without smoothing's part. Collective."""
-        own, *others = reversed(self._values)
-        apart = [other for other in others if other.size >= _APART * own.size]
+        (size, own), *others = reversed(self._values)
+        apart = [one for one in others if one[0] >= _APART * size]
         if not apart:
             return np.inf
-        near = apart[0]
-        far = next((v for v in apart if v.size >= _APART * near.size), None)
+        near, far = apart[0], next((one for one in apart if one[0] >= _APART * apart[0][0]), None)
         largest = self._norm(own, None) or 1.0
-        change = self._norm(own, near) / largest
-        further = None if far is None else self._norm(own, far) / largest
-        return extrapolated((own.size, near.size, far.size if far else np.nan), change, further)
+        change = self._norm(own, near[1]) / largest
+        further = None if far is None else self._norm(own, far[1]) / largest
+        return extrapolated((size, near[0], far[0] if far else np.nan), change, further)
 
-    def _norm(self, own: MeshValue, other: MeshValue | None) -> float:
-        if isinstance(own.value, np.ndarray):
-            return float(np.linalg.norm(own.value - (0.0 if other is None else other.value)))
-        difference = own.value.x.array - (0.0 if other is None else other.value.x.array)  # type: ignore[union-attr]
-        return contact_norm(self._last, difference, self.power)
+    def _norm(self, own: Value, other: Value | None) -> float:
+        """Of a quantity, or of its difference from another one."""
+        difference = own.x.array if isinstance(own, fem.Function) else own
+        if other is not None:
+            difference = difference - (other.x.array if isinstance(other, fem.Function) else other)
+        if isinstance(own, fem.Function):
+            return contact_norm(self._last, difference, self.power)
+        return float(np.linalg.norm(difference))
 
 
 def extrapolated(sizes: Sequence[float], change: float, further: float | None) -> float:
@@ -199,8 +189,6 @@ def extrapolated(sizes: Sequence[float], change: float, further: float | None) -
 
 def _order(sizes: Sequence[float], ratio: float) -> float:
     """The order p at which (h3^p - h1^p)/(h2^p - h1^p) has this value, within what P1 can have."""
-    from scipy.optimize import brentq
-
     near, far = sizes[1] / sizes[0], sizes[2] / sizes[0]
 
     def excess(order: float) -> float:

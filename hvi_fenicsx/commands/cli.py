@@ -16,6 +16,7 @@ import importlib
 import math
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -257,7 +258,11 @@ def run_under_mpirun(ranks: int, words: Sequence[str]) -> int:
     Raises:
         InputError: there is no mpirun, or no room for its files.
     """
-    command = [*processes.launcher(ranks), "-m", "hvi_fenicsx", *words]
+    mpirun = shutil.which("mpirun")
+    if mpirun is None:
+        raise InputError("--np: there is no mpirun on the PATH; install Open MPI or MPICH, or leave --np out")
+    # `-m mpi4py` ends all ranks when one fails.
+    command = [mpirun, "-n", str(ranks), *processes.PYTHON, "-m", "mpi4py", "-m", "hvi_fenicsx", *words]
     try:
         folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
     except OSError as error:

@@ -57,7 +57,7 @@ def execute(options: argparse.Namespace) -> int:
 def _run(call: Session) -> int:
     """Search, write and tell; the exit code. Collective."""
     options, kept = call.options, _StateFile(call)
-    saved = on_root(COMM, kept.saved)
+    saved = next(iter(on_root(COMM, lambda: call.journal(JOURNAL))), None)
     prepared = prepare(call.scene, COMM, call.timer)
     say(console.heading(prepared, COMM.size))
     bodies, late = Equilibria(prepared, interrupted=call.interrupted), time_over(COMM, options.limit)
@@ -88,12 +88,6 @@ class _StateFile:
     def __init__(self, call: Session) -> None:
         self._call, self._identity = call, on_root(COMM, lambda: call.identity)
         self._next, self._broken = time.monotonic() + KEPT_EVERY, False
-
-    def saved(self) -> Saved | None:
-        """What an earlier search has left, if this one shall go on from it. Rank 0 only."""
-        if not self._call.options.resume:
-            return None
-        return next(iter(writing.read_journal(self._call.folder.target / JOURNAL, self._identity)), None)
 
     def keep(self, state: Callable[[], Saved]) -> None:
         """Write what is left, if it is time.

@@ -37,8 +37,8 @@ def execute(options: argparse.Namespace) -> int:
 def _run(call: Session) -> int:
     """Follow, write and tell; the exit code. Collective."""
     assert call.scene.path is not None
-    kept = _StateFile(call)
-    known = on_root(COMM, kept.known)
+    known = on_root(COMM, lambda: call.journal(path_files.JOURNAL))
+    kept = _StateFile(call, known)
     prepared = prepare(call.scene, COMM, call.timer)
     say(console.heading(prepared, COMM.size))
     run = PathRun(prepared, call.scene.path, call.interrupted)
@@ -56,14 +56,8 @@ def _run(call: Session) -> int:
 class _StateFile:
     """Keeps each new state in the folder of the result; the file is opened with the first of them."""
 
-    def __init__(self, call: Session) -> None:
-        self._call, self._journal, self._known = call, list[Journal](), list[writing.Record]()
-
-    def known(self) -> list[writing.Record]:
-        """The states of a path that was begun and shall go on. Rank 0 only."""
-        if self._call.options.resume:
-            self._known = writing.read_journal(self._call.folder.target / path_files.JOURNAL, self._call.identity)
-        return self._known
+    def __init__(self, call: Session, known: list[writing.Record]) -> None:
+        self._call, self._journal, self._known = call, list[Journal](), known
 
     def keep(self, record: writing.Record) -> None:
         """Keep a state. Collective."""

@@ -17,7 +17,7 @@ from .. import console, results
 from ..model import Model, dump_scene, read_scene
 from ..report.page import NAME as PAGE
 from ..results.output_folder import existing, inputs_of, read_finished
-from ..runtime import log
+from ..runtime import log, writing
 from ..runtime.cost import Timer
 from ..runtime.manifest import __version__
 from ..runtime.mpi import on_root, stop_on_signals
@@ -58,6 +58,10 @@ class Session:
         target = self.folder.target
         parts = [__version__, COMM.size, dump_scene(self.scene, target), sorted(inputs_of(self.scene, target).items())]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+    def journal(self, name: str) -> list[writing.Record]:
+        """What an unfinished result has left in a journal, if this call shall go on from it. Rank 0 only."""
+        return writing.read_journal(self.folder.target / name, self.identity) if self.options.resume else []
 
 
 def execute(

@@ -11,7 +11,6 @@ import contextlib
 import ctypes
 import os
 import resource
-import shutil
 import signal
 import struct
 import subprocess
@@ -23,7 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 
-from ..errors import InputError, Interrupted
+from ..errors import Interrupted
 
 PYTHON = (sys.executable, "-P")
 """Python as our children run it: the current folder is not on its path."""
@@ -158,18 +157,6 @@ def raise_on_stop() -> None:
         raise KeyboardInterrupt
 
     catch(STOP, stop)
-
-
-def launcher(ranks: int) -> list[str]:
-    """The command that starts Python on so many ranks; `-m mpi4py` ends all ranks when one fails.
-
-    Raises:
-        InputError: there is no mpirun.
-    """
-    mpirun = shutil.which("mpirun")
-    if mpirun is None:
-        raise InputError("--np: there is no mpirun on the PATH; install Open MPI or MPICH, or leave --np out")
-    return [mpirun, "-n", str(ranks), *PYTHON, "-m", "mpi4py"]
 
 
 def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:
