@@ -21,7 +21,6 @@ from mpi4py import MPI
 
 from hvi_fenicsx import read_scene
 from hvi_fenicsx.estimate.estimator import ratio
-from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.model import Model
 from hvi_fenicsx.runtime import cost
 from hvi_fenicsx.runtime.cost import Timer
@@ -78,7 +77,7 @@ def linear(scene: Model, kind: str) -> Figures:
 def assembled(scene: Model, timer: Timer) -> System:
     """The scene's system, on its mesh with its mesh hierarchy."""
     with timer("mesh"):
-        domain = scene.domain.build_hierarchy(COMM, scene.dimension, Thresholds())
+        domain = scene.domain.build_hierarchy(COMM, scene.dimension)
     return assemble(domain, scene.formulation(), timer)
 
 

@@ -15,7 +15,6 @@ from petsc4py import PETSc
 
 from ..estimate import bubbles, data_errors
 from ..mesh import nodes, refinement
-from ..mesh.domain import DEFAULT as MESH
 from ..mesh.domain import Domain
 from ..mesh.refinement import Refinement
 from ..model import Model
@@ -108,7 +107,7 @@ class AdaptiveSolver:
         """
         scene = scene.changed(domain=scene.domain.coarsest())
         with self.timer("mesh"):
-            domain = scene.domain.build_hierarchy(comm, scene.dimension, MESH)
+            domain = scene.domain.build_hierarchy(comm, scene.dimension)
         prepared = prepare(scene, comm, self.timer, domain)
         while prepared.system.dofs < CONTROL.small:
             cells = _unresolved(prepared.problem)

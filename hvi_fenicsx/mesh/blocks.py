@@ -23,19 +23,14 @@ from petsc4py import PETSc
 from .. import compat
 from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
-from .domain import DEFAULT, Domain, MeshThresholds
+from .domain import DEFAULT, Domain
 from .transfer import Numbers, Rows, Transfer, mean_rows, weighted_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
 
 
-def block(
-    comm: MPI.Comm,
-    size: Sequence[float],
-    cells: Sequence[int],
-    thresholds: MeshThresholds = DEFAULT,
-) -> Domain:
+def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain:
     """The rectangle or box [0, size], in cells cut into triangles or tetrahedra. Collective.
 
     Each coarser level of its mesh hierarchy has half the cells each way, or nearly (:func:`coarser_cells`).
@@ -44,16 +39,15 @@ def block(
         comm: the ranks that share it.
         size: lengths of the edges, m, (d,).
         cells: cells each way, (d,).
-        thresholds: how coarse the coarsest level is.
     """
     grid, upper = mesh(comm, size, cells), np.asarray(size, dtype=float)
-    coarser = coarser_cells(cells, thresholds)
+    coarser = coarser_cells(cells)
 
     def coarsening() -> tuple[Domain, Transfer]:
         assert coarser is not None
         nested = all(2 * few == n for few, n in zip(coarser, cells, strict=True))
         transfer = NestedGridTransfer if nested else GridTransfer
-        return block(comm, size, coarser, thresholds), transfer(size, coarser)
+        return block(comm, size, coarser), transfer(size, coarser)
 
     return Domain(
         mesh=grid,
@@ -66,7 +60,7 @@ def block(
     )
 
 
-def coarser_cells(cells: Sequence[int], thresholds: MeshThresholds = DEFAULT) -> list[int] | None:
+def coarser_cells(cells: Sequence[int]) -> list[int] | None:
     """The cells each way of the next coarser block; None where it would not pay.
 
     They are halved, so that the blocks are nested. Of a large block of which they cannot be halved, the coarser one has
@@ -74,15 +68,14 @@ def coarser_cells(cells: Sequence[int], thresholds: MeshThresholds = DEFAULT) ->
 
     Args:
         cells: cells each way, (d,).
-        thresholds: how coarse the coarsest level is, and what is large.
     """
     if all(n % 2 == 0 for n in cells):
         fewer = [n // 2 for n in cells]
-    elif len(cells) * math.prod(n + 1 for n in cells) >= thresholds.coarsest:
+    elif len(cells) * math.prod(n + 1 for n in cells) >= DEFAULT.coarsest:
         fewer = [4 * round(n / 8) for n in cells]
     else:
         return None
-    return fewer if min(fewer) >= thresholds.coarsest_block else None
+    return fewer if min(fewer) >= DEFAULT.coarsest_block else None
 
 
 def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.Mesh:

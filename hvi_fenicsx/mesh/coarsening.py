@@ -26,7 +26,7 @@ from ..runtime.mpi import agree, on_root, total
 from ..typing import Array, Entities, Integers, Mask
 from . import facets as cell_facets
 from . import gmsh_process, refinement
-from .domain import DEFAULT, Domain, MeshThresholds
+from .domain import DEFAULT, Domain
 
 
 @dataclass(frozen=True)
@@ -61,22 +61,21 @@ class _Surface:
     on: Mask
 
 
-def coarsen(domain: Domain, factor: float, thresholds: MeshThresholds = DEFAULT) -> Domain | None:
+def coarsen(domain: Domain, factor: float) -> Domain | None:
     """The body on a mesh of larger cells. Collective.
 
     Args:
         domain: the body.
         factor: by which edges get longer, about.
-        thresholds: how long gmsh may take, and how far volume and areas may differ.
 
     Returns:
         None where gmsh fails, or where volume or areas differ too much.
     """
     comm, d = domain.mesh.comm, domain.dimension
-    cells, surface = _sample(domain, thresholds), _surface(domain)
+    cells, surface = _sample(domain), _surface(domain)
     if surface is None:
         return None
-    found = on_root(comm, lambda: (_in_plane if d == 2 else _in_space)(surface, cells, factor, thresholds))
+    found = on_root(comm, lambda: (_in_plane if d == 2 else _in_space)(surface, cells, factor))
     if found is None:
         return None
     points, corners = found
@@ -84,13 +83,13 @@ def coarsen(domain: Domain, factor: float, thresholds: MeshThresholds = DEFAULT)
     mesh = compat.simplex_mesh(comm, mine, points[: len(points) * (comm.rank == 0)], domain.mesh.topology.cell_name())
     sides, regions = _sides(domain, mesh, surface), _regions(domain, mesh, cells)
     coarse = replace(domain, mesh=mesh, sides=sides, regions=regions, shared=None)
-    return coarse if _similar(domain, coarse, thresholds.remeshed_size) else None
+    return coarse if _similar(domain, coarse) else None
 
 
-def _sample(domain: Domain, thresholds: MeshThresholds) -> _CellSample:
+def _sample(domain: Domain) -> _CellSample:
     """The same cells in the same order for any number of ranks. Collective."""
     comm, topology, d = domain.mesh.comm, domain.mesh.topology, domain.dimension
-    every = max(1, topology.index_map(d).size_global // thresholds.hierarchy_from)
+    every = max(1, topology.index_map(d).size_global // DEFAULT.hierarchy_from)
     numbers = np.asarray(topology.original_cell_index, dtype=np.int64)
     chosen = np.flatnonzero(numbers % every == 0)
     corners = owned_corners(domain.mesh)[chosen]
@@ -145,9 +144,7 @@ def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     return np.take_along_axis(nodes, (first[:, None] + np.arange(3)) % 3, axis=1)
 
 
-def _in_plane(
-    surface: _Surface, cells: _CellSample, factor: float, thresholds: MeshThresholds
-) -> tuple[Array, Integers] | None:
+def _in_plane(surface: _Surface, cells: _CellSample, factor: float) -> tuple[Array, Integers] | None:
     """Vertices (n, 2) and triangles (c, 3) within the thinned outline, each of whose edges is one of a triangle.
 
     None where the outline touches itself: gmsh would work on crossing edges for ever. On rank 0.
@@ -157,7 +154,7 @@ def _in_plane(
         return None
     unit = float(np.ptp(surface.corners, axis=(0, 1)).max())
     rings = [shapely.get_coordinates(ring) / unit for ring in (body.exterior, *body.interiors)]
-    thinned = [_thinned(ring, factor, thresholds.outline_turn) for ring in rings]
+    thinned = [_thinned(ring, factor, DEFAULT.outline_turn) for ring in rings]
     if not shapely.Polygon(thinned[0], thinned[1:]).is_valid:
         return None
     try:
@@ -189,9 +186,7 @@ def _thinned(ring: Array, factor: float, most: float) -> Array:
     return np.vstack([found, found[:1]])
 
 
-def _in_space(
-    surface: _Surface, cells: _CellSample, factor: float, thresholds: MeshThresholds
-) -> tuple[Array, Integers] | None:
+def _in_space(surface: _Surface, cells: _CellSample, factor: float) -> tuple[Array, Integers] | None:
     """Vertices (n, 3) and cells (c, 4), or None where gmsh fails, or takes too long. On rank 0.
 
     It works in a process of its own: for a surface that it cannot parametrise it may take any time, or end its process.
@@ -202,10 +197,10 @@ def _in_space(
         return None
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "surface.npz")
-        wanted = {"places": cells.midpoints, "sizes": factor * cells.sizes, "turn": 2.0 * thresholds.outline_turn}
+        wanted = {"places": cells.midpoints, "sizes": factor * cells.sizes, "turn": 2.0 * DEFAULT.outline_turn}
         np.savez(source, points=surface.corners.reshape(-1, 3)[first], triangles=triangles, **wanted)
         try:
-            done = processes.run(gmsh_process.__name__, [os.fspath(source)], thresholds.gmsh_seconds)
+            done = processes.run(gmsh_process.__name__, [os.fspath(source)], DEFAULT.gmsh_seconds)
         except subprocess.TimeoutExpired:
             return None
     if done.returncode or not done.stdout:
@@ -237,10 +232,10 @@ def _regions(domain: Domain, mesh: dmesh.Mesh, cells: _CellSample) -> dict[str, 
     return {name: np.flatnonzero(within[:, i]).astype(np.int32) for i, name in enumerate(sorted(domain.regions))}
 
 
-def _similar(fine: Domain, coarse: Domain, difference: float) -> bool:
-    """Whether volume and areas differ by no more than this part, and no region is lost. Collective."""
+def _similar(fine: Domain, coarse: Domain) -> bool:
+    """Whether volume and areas differ by little, and no region is lost. Collective."""
     (before, after) = (measures(domain) for domain in (fine, coarse))
-    return all(abs(after[name] - size) <= difference * size for name, size in before.items())
+    return all(abs(after[name] - size) <= DEFAULT.remeshed_size * size for name, size in before.items())
 
 
 def measures(domain: Domain) -> dict[tuple[str, str], float]:

@@ -21,7 +21,7 @@ from ..geometry import ROUNDING, Curve, spot
 from ..runtime.mpi import agree, total
 from ..typing import Array, Entities, Integers
 from . import nodes, transfer
-from .domain import DEFAULT, Domain, MeshThresholds
+from .domain import DEFAULT, Domain
 
 _SWEEPS = 3
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
@@ -43,32 +43,31 @@ class CurvedMesh(dmesh.Mesh):
         self.straight_cells = straight_cells
 
 
-def mesh_of(domain: Domain, degree: int, thresholds: MeshThresholds = DEFAULT) -> dmesh.Mesh:
+def mesh_of(domain: Domain, degree: int) -> dmesh.Mesh:
     """The mesh that displacements of a degree live on. Collective.
 
     Args:
         domain: the body.
         degree: of the elements; at degree 1 cells are straight.
-        thresholds: how much a cell may be bent; a cell that would be bent more has straight edges.
     """
     if degree == 1 or not (domain.curves and domain.bends):
         return domain.mesh
-    return domain.once("curved cells", None, lambda: _curved(domain, sorted(domain.curves), thresholds.least_jacobian))
+    return domain.once("curved cells", None, lambda: _curved(domain, sorted(domain.curves)))
 
 
-def _curved(domain: Domain, names: Collection[str], least: float) -> CurvedMesh:
+def _curved(domain: Domain, names: Collection[str]) -> CurvedMesh:
     space = fem.functionspace(domain.mesh, ("Lagrange", 2))
     before, d = nodes.points(space)[:, : domain.dimension], domain.dimension
     on = {name: np.unique(nodes.facet_nodes(space, domain.sides[name])) for name in names}
     after = before
     for _ in range(_SWEEPS if domain.dimension == 3 else 1):  # in space sides share edges
         after = onto_curves(space.dofmap.index_map, after, on, domain.curves)
-    after, straight = _straightened(space, before, after, least)
+    after, straight = _straightened(space, before, after)
     points = np.pad(after, ((0, 0), (0, 3 - d)))
     return CurvedMesh(compat.quadratic_mesh(domain.mesh, space.dofmap, points), straight)
 
 
-def _straightened(space: fem.FunctionSpace, before: Array, after: Array, least: float) -> tuple[Array, int]:
+def _straightened(space: fem.FunctionSpace, before: Array, after: Array) -> tuple[Array, int]:
     """The nodes (n, d), those of cells back that would be bent too much, and the number of these. Collective.
 
     A straight edge changes the cells beside it, so they are looked at again.
@@ -78,7 +77,7 @@ def _straightened(space: fem.FunctionSpace, before: Array, after: Array, least: 
     while True:
         moved = np.flatnonzero(np.any((after != before)[space.dofmap.list], axis=(1, 2)))
         cells = space.dofmap.list[moved]
-        turned = np.any(_jacobians(after[cells]) < least * _jacobians(before[cells]), axis=1)
+        turned = np.any(_jacobians(after[cells]) < DEFAULT.least_jacobian * _jacobians(before[cells]), axis=1)
         found = round(total(space.mesh.comm, np.count_nonzero(moved[turned] < owned)))
         if found == 0:
             return after, count

@@ -22,7 +22,7 @@ from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
 from ..typing import Entities
 from . import curved, gmsh_process
-from .domain import DEFAULT, Domain, MeshThresholds, check_affordable
+from .domain import DEFAULT, Domain, check_affordable
 from .gmsh_arrays import MeshArrays, extract, session
 
 _SCRIPTS = (".geo", ".geo_unrolled")
@@ -30,9 +30,7 @@ _HEADER = b"$MeshFormat"
 """How a mesh begins; all else gmsh would take for a script."""
 
 
-def read(
-    comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0, thresholds: MeshThresholds = DEFAULT
-) -> Domain:
+def read(comm: MPI.Comm, path: Path, dimension: int, scale: float = 1.0) -> Domain:
     """The mesh of a file, its physical groups being sides and regions. Collective.
 
     Args:
@@ -40,7 +38,6 @@ def read(
         path: the file.
         dimension: of the cells, 2 or 3.
         scale: m per unit of the file's coordinates.
-        thresholds: how long gmsh may take.
 
     Raises:
         InputError: on all ranks alike: not readable, no mesh nor harmless script, no named groups, wrong dimension, no
@@ -48,16 +45,14 @@ def read(
         Interrupted: on all ranks alike: a signal came.
     """
     found: list[MeshArrays] = []
-    names, vertices = on_root(comm, lambda: _read(path, dimension, scale, found, thresholds))
+    names, vertices = on_root(comm, lambda: _read(path, dimension, scale, found))
     check_affordable(comm, dimension * vertices, dimension, "domain.file", "mesh the body coarser")
     mesh, sides, regions = distribute(comm, found, dimension, names)
     mesh.geometry.x[:] *= scale
     return Domain.from_mesh(*curved.straightened(mesh, sides, regions, f"mesh file {path}"))
 
 
-def _read(
-    path: Path, dimension: int, scale: float, found: list[MeshArrays], thresholds: MeshThresholds
-) -> tuple[dict[int, dict[str, int]], int]:
+def _read(path: Path, dimension: int, scale: float, found: list[MeshArrays]) -> tuple[dict[int, dict[str, int]], int]:
     """Read the file in a process of its own. Rank 0 only.
 
     Args:
@@ -65,7 +60,6 @@ def _read(
         dimension: of the cells.
         scale: m per unit of the file's coordinates.
         found: the mesh is added here.
-        thresholds: how long gmsh may take.
 
     Returns:
         The physical groups by dimension and name, and the number of vertices.
@@ -73,10 +67,10 @@ def _read(
     kind = "script" if _is_script(path) else "mesh"
     words = [str(path.absolute()), kind, str(dimension), str(cost.free_memory())]
     try:
-        done = processes.run(gmsh_process.__name__, words, thresholds.gmsh_seconds)
+        done = processes.run(gmsh_process.__name__, words, DEFAULT.gmsh_seconds)
     except subprocess.TimeoutExpired:
         text = (
-            f"gmsh has not done with it after {thresholds.gmsh_seconds:g} s; look for an endless loop, or give "
+            f"gmsh has not done with it after {DEFAULT.gmsh_seconds:g} s; look for an endless loop, or give "
             "the .msh that gmsh saves"
         )
         raise InputError(f"mesh file {path}: {text}") from None

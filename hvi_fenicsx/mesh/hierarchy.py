@@ -43,7 +43,7 @@ def with_hierarchy(domain: Domain, thresholds: MeshThresholds = DEFAULT) -> Doma
         return _in_pieces(domain, found, thresholds)
     domain = replace(domain, one_piece=True)  # known from now on
     factor = 2.0 ** max(1, round(np.log2(unknowns / thresholds.coarsest) / d))
-    coarsest = coarsen(domain, factor, thresholds)
+    coarsest = coarsen(domain, factor)
     if coarsest is None:
         return domain
     growth = unknowns / _unknowns(coarsest)  # round bodies may need more vertices

@@ -17,7 +17,7 @@ from .. import compat
 from ..geometry import ROUNDING, Curve
 from ..typing import Array, Entities
 from . import curved
-from .domain import DEFAULT, Domain, MeshThresholds, check_affordable
+from .domain import DEFAULT, Domain, check_affordable
 from .facets import cell_facets
 from .transfer import Halves, ParentCellTransfer, Transfer
 
@@ -71,19 +71,18 @@ def _with_coarser(coarse: Domain, step: Refinement) -> Domain:
     return replace(step.domain, coarsening=coarsening)
 
 
-def marked(domain: Domain, cells: Entities, thresholds: MeshThresholds = DEFAULT) -> Refinement:
-    """Bisect the long edges of the marked cells, and others as far as a conforming mesh needs it. Collective.
+def marked(domain: Domain, cells: Entities) -> Refinement:
+    """Bisect the long edges of the marked cells (in the plane all three), and others as far as a conforming mesh needs it. Collective.
 
     Args:
         domain: the body on the mesh to be refined.
         cells: the marked cells, local indices.
-        thresholds: which edges count as long; in the plane all three.
     """
     topology = domain.mesh.topology
     topology.create_entities(1)
     topology.create_connectivity(domain.dimension, 1)
     lengths = _edge_lengths(domain.mesh, cells)
-    least = thresholds.bisected_edges if domain.dimension == 3 else 0.0
+    least = DEFAULT.bisected_edges if domain.dimension == 3 else 0.0
     long = lengths >= least * lengths.max(axis=1, keepdims=True)
     edges = topology.connectivity(domain.dimension, 1).array.reshape(-1, lengths.shape[1])[cells]
     return _refined(domain, np.unique(edges[long]).astype(np.int32))

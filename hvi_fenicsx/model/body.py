@@ -233,9 +233,7 @@ class Body:
         """The mesh with its named sides and regions, and coarser meshes. Collective when first used."""
         from mpi4py import MPI
 
-        from ..mesh.domain import DEFAULT
-
-        return _remembering(self.shape.build_hierarchy(self.comm or MPI.COMM_WORLD, self.dimension, DEFAULT))
+        return _remembering(self.shape.build_hierarchy(self.comm or MPI.COMM_WORLD, self.dimension))
 
     @property
     def mesh(self) -> dmesh.Mesh:

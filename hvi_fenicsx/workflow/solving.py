@@ -15,7 +15,6 @@ from ..errors import SolverError
 from ..estimate import estimator
 from ..estimate.estimator import estimate
 from ..mesh import nodes
-from ..mesh.domain import DEFAULT as MESH
 from ..mesh.domain import Domain, check_affordable
 from ..model import Model
 from ..model.content import SolverTable
@@ -140,7 +139,7 @@ def prepare(
 
 def _meshed(scene: Model, comm: MPI.Comm) -> Domain:
     """The body on its mesh; each shape knows what its own vertices take, but neither other bodies nor the degree."""
-    domain, degree = scene.domain.build_hierarchy(comm, scene.dimension, MESH), scene.solver.degree or 1
+    domain, degree = scene.domain.build_hierarchy(comm, scene.dimension), scene.solver.degree or 1
     place, mend = ("solver.degree", "use degree 1, or fewer cells") if degree > 1 else ("domain", "use fewer cells")
     unknowns = domain.dimension * nodes.count(domain.mesh, degree)
     check_affordable(comm, unknowns, domain.dimension, place, mend)

@@ -46,7 +46,7 @@ def from_file(path: Path, body: str) -> Domain:
 
 
 def _nested(given: Model) -> workflow.Solution:
-    domain = given.domain.build_hierarchy(COMM, 2, COARSER)
+    domain = with_hierarchy(given.domain.build(COMM, 2), COARSER)
     return workflow.finish(workflow.prepare(given, domain=domain, thresholds=NESTED))
 
 

@@ -77,7 +77,7 @@ def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
 def test_what_is_solved_does_not_change(bored: Path) -> None:
     thresholds = SolverThresholds(nested_from=500)
     scene = read_tables(LIFTED | {"domain": {"shape": "file", "file": str(bored)}})
-    domain = scene.domain.build_hierarchy(COMM, 3, COARSER)
+    domain = with_hierarchy(scene.domain.build(COMM, 3), COARSER)
     nested = workflow.finish(workflow.prepare(scene, domain=domain, thresholds=thresholds))
     alone = workflow.finish(workflow.prepare(scene, domain=replace(domain, coarsening=None), thresholds=thresholds))
     assert [s.solve_result.levels for s in (nested, alone)] == [2, 1]  # type: ignore[union-attr]

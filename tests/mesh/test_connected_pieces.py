@@ -15,6 +15,7 @@ from runs import LONG_RANKS, on_ranks
 
 from hvi_fenicsx import read_tables, workflow
 from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
+from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.system.thresholds import Thresholds as SolverThresholds
 
 COARSER = Thresholds(hierarchy_from=500, coarsest=100)
@@ -50,10 +51,10 @@ def test_each_body_has_its_own_coarser_mesh(dimension: int, size: float, ranks: 
 def test_what_is_solved_does_not_change(tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "two.msh", meshes.TOUCHING.format(size=0.05, dimension=2))
     scene = read_tables(JOINT | {"domain": {"shape": "file", "file": str(file)}})
-    thresholds = SolverThresholds(nested_from=500)
+    thresholds, made = SolverThresholds(nested_from=500), scene.domain.build(MPI.COMM_WORLD, 2)
     nested, alone = (
         workflow.finish(workflow.prepare(scene, domain=domain, thresholds=thresholds))
-        for domain in (scene.domain.build_hierarchy(MPI.COMM_WORLD, 2, COARSER), scene.domain.build(MPI.COMM_WORLD, 2))
+        for domain in (with_hierarchy(made, COARSER), made)
     )
     assert nested.solve_result.levels > alone.solve_result.levels == 1  # type: ignore[union-attr]
     assert nested.converged

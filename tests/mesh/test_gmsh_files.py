@@ -12,6 +12,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from unittest import mock
 
 import meshes
 import numpy as np
@@ -41,7 +42,8 @@ def written(path: Path, text: str) -> Path:
 
 
 def read(path: Path, seconds: float = 60.0) -> Domain:
-    return gmsh_file.read(MPI.COMM_WORLD, path, 2, thresholds=Thresholds(gmsh_seconds=seconds))
+    with mock.patch.object(gmsh_file, "DEFAULT", Thresholds(gmsh_seconds=seconds)):
+        return gmsh_file.read(MPI.COMM_WORLD, path, 2)
 
 
 def test_a_script_under_the_name_of_a_mesh_is_refused(tmp_path: Path) -> None:

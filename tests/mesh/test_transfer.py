@@ -17,7 +17,6 @@ from scenes import NESTED, solved_system
 
 from hvi_fenicsx import InputError, read_scene, workflow
 from hvi_fenicsx.mesh.blocks import block
-from hvi_fenicsx.mesh.domain import DEFAULT as MESH
 from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.solvers.active_set import ActiveSetSolver
 from hvi_fenicsx.solvers.resting_start import contact_dofs
@@ -85,7 +84,7 @@ def test_a_refined_file_is_solved_from_level_to_level(body: str, tmp_path: Path)
         read_scene(DEMOS / "strong_law.toml", [*convex, f'domain={{shape="file", file="{file}", {more}}}', *solver])
         for more, solver in (("refinements=3", []), ("scale=1.0", ['solver={linear_solver="lu"}']))
     )
-    mesh = replace(scene.domain.build_hierarchy(MPI.COMM_WORLD, 2, MESH), coarsening=None)
+    mesh = replace(scene.domain.build_hierarchy(MPI.COMM_WORLD, 2), coarsening=None)
     direct = workflow.finish(workflow.prepare(alone, domain=mesh, thresholds=NESTED))
     found = workflow.solve(scene, thresholds=NESTED)
     assert found.solve_result is not None

@@ -11,7 +11,6 @@ from mpi4py import MPI
 from scenes import model
 
 from hvi_fenicsx import InputError, prepare, read_tables
-from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.shapes import DomainShape
 from hvi_fenicsx.runtime import cost
 
@@ -55,9 +54,9 @@ def test_a_mesh_of_any_shape_that_memory_cannot_hold_is_refused(
     measured = unknowns * {2: 1.3, 3: 2.6}[dimension] / 1024
     monkeypatch.setattr(cost, "memory_room", lambda comm: 0.8 * measured)
     with pytest.raises(InputError, match=r"domain\.\w+: .* unknowns need .* GB or more; there are"):
-        shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
+        shape.build_hierarchy(MPI.COMM_WORLD, dimension)
     monkeypatch.setattr(cost, "memory_room", lambda comm: 1.5 * measured)
-    shape.build_hierarchy(MPI.COMM_WORLD, dimension, Thresholds())
+    shape.build_hierarchy(MPI.COMM_WORLD, dimension)
 
 
 SQUARE = {"shape": "rectangle", "size": [1.0, 1.0], "cells": [30, 30]}

@@ -18,7 +18,7 @@ from ...schema import Table
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..domain import Domain, MeshThresholds
+    from ..domain import Domain
 
 
 FEWEST_ADAPTIVE = 3
@@ -74,20 +74,19 @@ class DomainShape(Table):
             InputError: on all ranks alike, when the mesh cannot be made, or memory cannot suffice.
         """
 
-    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The meshed body with coarser meshes below it, where it is large enough for that to pay. Collective.
 
         Args:
             comm: the ranks that share the mesh.
             dimension: of the scene, 2 or 3.
-            thresholds: when coarser meshes are made, and which are used.
 
         Raises:
             InputError: on all ranks alike, when the mesh cannot be made, or memory cannot suffice.
         """
         from ..hierarchy import with_hierarchy
 
-        return with_hierarchy(self.build(comm, dimension), thresholds)
+        return with_hierarchy(self.build(comm, dimension))
 
     @abstractmethod
     def coarsest(self) -> Self:

@@ -19,7 +19,7 @@ from .base import FEWEST_ADAPTIVE, FEWEST_STUDY, LARGEST_PART, DomainShape
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..domain import Domain, MeshThresholds
+    from ..domain import Domain
 
 _MOST_UNKNOWNS = 2**31 - 1
 """What PETSc's default integers can number."""
@@ -52,7 +52,7 @@ class Block(DomainShape):
         domain.check_affordable(comm, self._unknowns(), self.dimension, "domain.cells", "use fewer cells")
         return blocks.block(comm, self.size, self.cells)
 
-    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The block, which has coarser ones of its own. Collective."""
         return self.build(comm, dimension)
 

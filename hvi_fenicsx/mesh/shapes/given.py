@@ -15,7 +15,7 @@ from .base import UNKNOWNS_OF_FILE, DomainShape
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..domain import Domain, MeshThresholds
+    from ..domain import Domain
 
 
 MOST_REFINEMENTS = 10
@@ -30,11 +30,11 @@ class FixedMesh(DomainShape):
     if TYPE_CHECKING:  # each shape says where it stands among its keys
         refinements: int
 
-    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh refined so often, with coarser meshes below it. Collective."""
         from .. import refinement
 
-        return refinement.repeated(super().build_hierarchy(comm, dimension, thresholds), self.refinements)
+        return refinement.repeated(super().build_hierarchy(comm, dimension), self.refinements)
 
     def coarsest(self) -> Self:
         """The mesh as it is given."""
@@ -134,7 +134,7 @@ class GivenMesh(FixedMesh):
 class OnlyMesh(GivenMesh):
     """A mesh that exists already and cannot be another, since a model has data on it."""
 
-    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The mesh with the coarser ones that it has."""
         return self.build(comm, dimension)
 

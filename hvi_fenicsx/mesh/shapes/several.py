@@ -26,7 +26,7 @@ from .base import DomainShape
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..domain import Domain, MeshThresholds
+    from ..domain import Domain
     from ..joined import PlacedBody
 
 Coordinate = Annotated[float, Field(ge=-LONGEST, le=LONGEST)]
@@ -185,12 +185,12 @@ class SeveralBodies(DomainShape):
         """The meshed bodies. Collective."""
         return self._joined(comm, [body.form.build(comm, dimension) for body in self.bodies.values()])
 
-    def build_hierarchy(self, comm: MPI.Comm, dimension: int, thresholds: MeshThresholds) -> Domain:
+    def build_hierarchy(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The meshed bodies, with the coarser meshes of each. Collective."""
         from ..hierarchy import with_hierarchies
 
-        domains = [body.form.build_hierarchy(comm, dimension, thresholds) for body in self.bodies.values()]
-        return self._joined(comm, with_hierarchies(domains, thresholds))
+        domains = [body.form.build_hierarchy(comm, dimension) for body in self.bodies.values()]
+        return self._joined(comm, with_hierarchies(domains))
 
     def _joined(self, comm: MPI.Comm, domains: Sequence[Domain]) -> Domain:
         from ..joined import check_places, joined
