@@ -72,7 +72,7 @@ def _with_coarser(coarse: Domain, step: Refinement) -> Domain:
 
 
 def marked(domain: Domain, cells: Entities) -> Refinement:
-    """Bisect the long edges of the marked cells (in the plane all three), and others as far as a conforming mesh needs it. Collective.
+    """Bisect the long edges of the marked cells, in the plane all, and others as far as needed. Collective.
 
     Args:
         domain: the body on the mesh to be refined.
