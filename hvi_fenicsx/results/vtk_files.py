@@ -114,25 +114,20 @@ def _write_piece(path: Path, grid: Grid) -> int | None:
 
 
 def _vtk_grid(grid: Grid) -> Any:
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
+    from vtkmodules.numpy_interface.dataset_adapter import WrapDataObject
+    from vtkmodules.vtkCommonCore import vtkDataArray
+    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 
     count, corners = grid.cells.shape
-    made, points, cells = vtkUnstructuredGrid(), vtkPoints(), vtkCellArray()
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(grid.points), deep=True))
-    offsets = np.arange(0, (count + 1) * corners, corners, dtype=np.int64)
-    connectivity = np.ascontiguousarray(grid.cells, dtype=np.int64).ravel()
-    cells.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(connectivity, deep=True))
-    made.SetPoints(points)
-    made.SetCells(_CELLS[corners], cells)
-    for fields, data in ((grid.at_points, made.GetPointData()), (grid.in_cells, made.GetCellData())):
+    made = WrapDataObject(vtkUnstructuredGrid())
+    made.SetPoints(np.ascontiguousarray(grid.points))
+    kinds, sizes = np.full(count, _CELLS[corners], dtype=np.ubyte), np.full((count, 1), corners)
+    made.SetCells(kinds, np.arange(count) * (corners + 1), np.hstack([sizes, grid.cells]).astype(np.int64).ravel())
+    for fields, data in ((grid.at_points, made.PointData), (grid.in_cells, made.CellData)):
         for name, values in fields.items():
-            array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
-            array.SetName(name)
-            array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), grid.units.get(name, "1"))
-            data.AddArray(array)
-    return made
+            data.append(np.ascontiguousarray(values), name)
+            data.VTKObject.GetArray(name).GetInformation().Set(vtkDataArray.UNITS_LABEL(), grid.units.get(name, "1"))
+    return made.VTKObject
 
 
 def _write_pieces(path: Path, grid: Grid, pieces: list[Path]) -> None:
