@@ -248,14 +248,15 @@ def located_error(error: ValidationError) -> InputError:
     return InputError("\n".join(f"{where}: {text}" if where else text for where, text in found))
 
 
-def choose(data: Any, key: str, classes: Mapping[str, type[Kind]], context: Any = None) -> Any:
+def choose(data: Any, key: str, classes: Mapping[str, type[Kind]], context: Any = None, default: str = "") -> Any:
     """The table read by the class that its ``key`` names.
 
     Args:
         data: a table, or what shall be one.
-        key: whose value is the name of the class.
+        key: whose value is the name of the class; of classes without such a field it is taken out.
         classes: the classes by name.
         context: handed on to pydantic.
+        default: the name where there is none.
 
     Raises:
         ValidationError: no table, no such key, an unknown name, or what the class itself refuses.
@@ -264,12 +265,13 @@ def choose(data: Any, key: str, classes: Mapping[str, type[Kind]], context: Any 
         return data
     if not isinstance(data, dict):
         raise validation_error([Mistake((), f"must be a table with a {key} (is {shown(data)})")])
-    name = data.get(key)
-    if name is None:
-        raise validation_error([Mistake((key,), f"is missing; allowed: {', '.join(classes)}")])
+    name = data.get(key, default)
     if not isinstance(name, str) or name not in classes:
-        raise validation_error([Mistake((key,), unknown(key, name, classes))])
-    return classes[name].model_validate(data, context=context)
+        text = unknown(key, name, classes) if name != "" else f"is missing; allowed: {', '.join(classes)}"
+        raise validation_error([Mistake((key,), text)])
+    kind = classes[name]
+    own = {k: value for k, value in data.items() if k != key or key in kind.model_fields}
+    return kind.model_validate(own, context=context)
 
 
 @dataclass(frozen=True)

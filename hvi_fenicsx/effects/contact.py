@@ -21,7 +21,7 @@ from ..class_registry import enter
 from ..errors import InputError
 from ..formula import Computed, Formula, SpatialValue
 from ..geometry import ROUNDING
-from ..schema import ExistingFile, Finite, Positive, Table, refusal, unknown
+from ..schema import ExistingFile, Finite, Positive, Table, choose, refusal
 from ..typing import Array
 from .base import (
     BodySizes,
@@ -308,17 +308,10 @@ def _obstacle(value: Any, info: ValidationInfo) -> Obstacle:
         value: what a scene has, or an obstacle.
         info: its context has the folder of the scene.
     """
-    if isinstance(value, Obstacle):
-        return value
     if isinstance(value, list) and len(value) == 2:
         value = {"point": value[0], "normal": value[1]}
-    if not isinstance(value, dict):
-        raise refusal("must be a table, like { point = [0, 0], normal = [0, 1] }")
-    keys = dict(value)
-    name = keys.pop("shape", Plane.shape)
-    if not isinstance(name, str) or name not in Obstacle.registry:
-        raise refusal(unknown("shape", name, Obstacle.registry))
-    return Obstacle.registry[name].model_validate(keys, context=info.context)
+    found: Obstacle = choose(value, "shape", Obstacle.registry, info.context, Plane.shape)
+    return found
 
 
 ObstacleField = Annotated[Obstacle, BeforeValidator(_obstacle), PlainSerializer(lambda o, info: o.table(info.context))]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -442,10 +442,6 @@ class ScaledLaw(Superpotential, register=False):
         return self.law.piece(x * self.length)
 
 
-_Objective = Callable[[Array, Array, Array], Array]
-"""Objective f(lo, hi, |x|) of an interval of tractions lo..hi and a displacement."""
-
-
 def extremes(law: Superpotential, thresholds: LawThresholds = DEFAULT) -> tuple[Directional, float]:
     """The largest resistance and c4 of a law known only by its split j = H - G: bounds from above by bisection.
 
@@ -460,43 +456,36 @@ def extremes(law: Superpotential, thresholds: LawThresholds = DEFAULT) -> tuple[
     unit, kinks = law.length_scale, np.abs(law.kinks)
     ends = thresholds.resolution * unit, thresholds.resolution**-2 * max(unit, 1.0, *kinks)
     ahead = np.unique(np.concatenate([[0.0], kinks, np.geomspace(*ends, thresholds.samples)]))
-    behind = -ahead[::-1]
-    both = np.append(behind[:-1], ahead)
-    minus = _supremum(law, both, lambda lo, hi, r: -lo, thresholds)
-    plus = _supremum(law, both, lambda lo, hi, r: hi, thresholds)
-    against = (
-        _supremum(law, ahead, lambda lo, hi, r: np.where(r > 0, -lo, 0.0), thresholds),
-        _supremum(law, behind, lambda lo, hi, r: np.where(r > 0, hi, 0.0), thresholds),
-    )
-    return Directional(max(law.growth.minus, minus), max(law.growth.plus, plus)), max(0.0, *against)
+    (low,), (high,) = law.interval(np.zeros(1))
+    plus, against = (_supremum(law, ahead, sign, thresholds) for sign in (1.0, -1.0))
+    along, minus = (_supremum(law, -ahead[::-1], sign, thresholds) for sign in (1.0, -1.0))
+    peak = Directional(max(law.growth.minus, -low, against, minus), max(law.growth.plus, high, plus, along))
+    return peak, max(0.0, against, along)
 
 
-def _supremum(law: Superpotential, grid: Array, objective: _Objective, thresholds: LawThresholds) -> float:
-    """A bound from above of the objective's supremum over the range of the grid."""
-    a, b = grid[:-1], grid[1:]
-    lo, hi = law.interval(grid)
-    best, size = _sample(law, grid, objective), np.maximum(np.abs(lo), np.abs(hi))
-    typical = float(np.abs(objective(-size, size, np.abs(grid))).max())  # so that the tolerance is never zero
-    tolerance = thresholds.resolution * max(abs(best), typical)
-    while (undecided := (bound := _bound(law, a, b, objective)) > best + tolerance).any():
+def _supremum(law: Superpotential, grid: Array, sign: float, thresholds: LawThresholds) -> float:
+    """A bound from above of the traction, times a sign, over the range of the grid but for 0."""
+    a, b, off = grid[:-1], grid[1:], grid[grid != 0.0]
+    best = _sample(law, off, sign)
+    tolerance = thresholds.resolution * max(abs(best), float(np.abs(law.interval(off)).max()))
+    while (undecided := (bound := _bound(law, a, b, sign)) > best + tolerance).any():
         a, b = a[undecided], b[undecided]
         middle = 0.5 * (a + b)
         if a.size > thresholds.samples**2 or np.any((middle == a) | (middle == b)):
             break
-        best = max(best, _sample(law, middle, objective))
+        best = max(best, _sample(law, middle, sign))
         a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
     if undecided.any():
         return float(bound.max())
     return best + tolerance if best > 0 else best
 
 
-def _sample(law: Superpotential, x: Array, objective: _Objective) -> float:
-    return float(objective(*law.interval(x), np.abs(x)).max())
+def _sample(law: Superpotential, x: Array, sign: float) -> float:
+    return float((sign * np.stack(law.interval(x))).max())
 
 
-def _bound(law: Superpotential, a: Array, b: Array, objective: _Objective) -> Array:
-    lo = law.convex.right(a) - law.concave.left(b)
-    hi = law.convex.left(b) - law.concave.right(a)
-    nearest = np.minimum(np.abs(a), np.abs(b))
-    # The interval is open: where it starts at zero, it is not the excluded point x = 0 that counts.
-    return objective(lo, hi, np.where(nearest > 0, nearest, np.finfo(float).tiny))
+def _bound(law: Superpotential, a: Array, b: Array, sign: float) -> Array:
+    """Of the traction, times a sign, on the open intervals (a, b)."""
+    if sign > 0.0:
+        return law.convex.left(b) - law.concave.right(a)
+    return law.concave.left(b) - law.convex.right(a)

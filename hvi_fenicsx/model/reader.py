@@ -34,7 +34,6 @@ from ..schema import (
     mistakes_of,
     refusal,
     shown,
-    unknown,
     validation_error,
     vector,
 )
@@ -170,16 +169,7 @@ class MaterialTable(Table):
 
 def _material(data: Any, info: ValidationInfo) -> Effect:
     """The material of a table, in its region, read by the class that `elasticity` names."""
-    if not isinstance(data, dict):
-        raise refusal(f"must be a table (is {shown(data)})")
-    kinds, named = Effect.registry[Place.MATERIAL], data.get("elasticity", DEFAULT_ELASTICITY)
-    if not isinstance(named, str) or named not in kinds:
-        raise validation_error([Mistake(("elasticity",), unknown("elasticity", named, kinds))])
-    allowed = [*kinds[named].model_fields, "elasticity"]
-    if wrong := [Mistake((key,), unknown("key", key, allowed)) for key in data if key not in allowed]:
-        raise validation_error(wrong)
-    rest = {key: value for key, value in data.items() if key != "elasticity"}
-    found = kinds[named].model_validate(rest, context=info.context)
+    found: Effect = choose(data, "elasticity", Effect.registry[Place.MATERIAL], info.context, DEFAULT_ELASTICITY)
     if getattr(found, "model", "") is None:
         raise validation_error([Mistake(("model",), "is missing: the kind of elastic problem, such as plane_stress")])
     return found

@@ -72,7 +72,7 @@ REFUSED = {
         "poisson_ratio",
         "colour = 3\npoisson_ratio",
         's.toml:9: material.colour: unknown key "colour"; allowed: region, model, '
-        "thermal_expansion, youngs_modulus, poisson_ratio, elasticity",
+        "thermal_expansion, youngs_modulus, poisson_ratio",
     ),
     "misspelt side": (
         '"bottom"',
