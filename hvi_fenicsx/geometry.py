@@ -16,6 +16,11 @@ ROUNDING = 1e-9
 """What is so small beside the numbers that it is made of is none."""
 
 
+def in_space(vectors: Array) -> Array:
+    """Vectors (n, d) with zeros for what they lack of three components."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+
+
 class Curve(Protocol):
     """What a side that is not straight lies on, in d dimensions."""
 

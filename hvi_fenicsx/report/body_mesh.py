@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry import chains
+from ..geometry import chains, in_space
 from ..typing import Array, Integers
 from .solution_arrays import SolutionArrays
 
@@ -130,16 +130,11 @@ class BodyMesh:
 def body_mesh(arrays: SolutionArrays) -> BodyMesh:
     """The body of a solution."""
     fields = (arrays.displacement, arrays.escape_mode)
-    displacement, escape_mode = (None if field is None else _in_space(field) for field in fields)
+    displacement, escape_mode = (None if field is None else in_space(field) for field in fields)
     return BodyMesh(
-        points=_in_space(arrays.points),
+        points=in_space(arrays.points),
         cells=arrays.cells,
         displacement=displacement,
         escape_mode=escape_mode,
         von_mises=None if arrays.von_mises is None else arrays.von_mises.astype(np.float64),
     )
-
-
-def _in_space(vectors: Array) -> Array:
-    """Vectors (n, d) with zeros for what they lack of three components."""
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))

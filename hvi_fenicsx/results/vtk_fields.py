@@ -14,6 +14,7 @@ from dolfinx import fem, la
 
 from ..certify import placed_forces
 from ..certify.contact_state import ContactState
+from ..geometry import in_space
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
@@ -101,7 +102,7 @@ def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[st
     return Grid(
         points=problem.positions[used],
         cells=cells,
-        at_points={name: _spatial(values[used]) for name, values in at_points.items()},
+        at_points={name: in_space(values[used]) for name, values in at_points.items()},
         in_cells={name: _in_rows(values).astype(np.float32) for name, values in in_cells.items()},
         units=_units(problem),
     )
@@ -142,11 +143,6 @@ def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, flo
 def _units(problem: Problem) -> dict[str, str]:
     """The units of the fields that have one, by name."""
     return _UNITS | {"reaction": "N/m" if problem.scales.dimension == 2 else "N"}
-
-
-def _spatial(vectors: Array) -> Array:
-    """Vectors (n, d) with three components."""
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def _in_rows(values: Array) -> Array:
@@ -207,7 +203,7 @@ def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -
 
 def _second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:
     """The tractions on the second sides of interfaces at all local nodes, N/m², (n, 3). Collective."""
-    owned = _spatial(placed_forces.second_tractions(problem, states)) * problem.scales.stress
+    owned = in_space(placed_forces.second_tractions(problem, states)) * problem.scales.stress
     found = la.vector(problem.space.dofmap.index_map, 3)
     found.array[: owned.size] = owned.ravel()
     found.scatter_forward()
@@ -234,8 +230,8 @@ def _fields(problem: Problem, state: ContactState) -> dict[str, Array]:
     found: dict[str, Array] = dict.fromkeys(("gap", "contact"), np.full(len(state.pressure), np.nan))
     found |= {name: values for name, values in columns_of(problem, state).items() if name not in ("x", "y", "z")}
     tangents = np.moveaxis(state.surface.tangents, 1, 0)
-    found |= {"normal": _spatial(state.surface.normals)}
-    found |= {f"t{i + 1}": _spatial(np.asarray(tangent)) for i, tangent in enumerate(tangents)}
+    found |= {"normal": in_space(state.surface.normals)}
+    found |= {f"t{i + 1}": in_space(np.asarray(tangent)) for i, tangent in enumerate(tangents)}
     if (both := state.of_both_modes) is not None:
         found["mode_mixity"] = both.slip_share
     distances = [law.term.multiplier * law.distance for law in state.laws] or [0.0 * state.pressure]

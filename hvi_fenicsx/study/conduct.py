@@ -26,6 +26,7 @@ from ..results import ResultFolder
 from ..results.gathering import solution_arrays
 from ..results.output_folder import Existing
 from ..results.summary import summary
+from ..results.whole import write_table
 from ..runtime import log, writing
 from ..runtime.cost import Timer
 from ..runtime.manifest import MARKS, __version__
@@ -108,7 +109,8 @@ def conduct(
 def _fill(work: Path, study: Study) -> list[str]:
     """Write tables, pictures and page of a study; what could not be done, in words. Rank 0 only."""
     pictures.draw(study, work)
-    writing.text(work / "study.csv", study.as_csv())
+    lines = study.lines()
+    write_table(work / "study.csv", list(lines[0]), ([*line.values()] for line in lines))
     text = json.dumps(study.as_data(), indent=1, ensure_ascii=False, allow_nan=False)
     writing.text(work / MARKS["study"], f"{text}\n")
     try:

@@ -20,6 +20,7 @@ from scipy import sparse, spatial
 from scipy.sparse import csgraph
 
 from .. import compat
+from ..geometry import in_space
 from ..mesh import nodes, transfer
 from ..problem import spaces
 from ..report.solution_arrays import ContactPart, SolutionArrays
@@ -280,7 +281,7 @@ class _Body:
         mesh = compat.simplex_mesh(
             MPI.COMM_SELF, local.reshape(cells.shape), vertices[self._kept], _KINDS[d], degree=degree
         )
-        self._points = _in_space(points)
+        self._points = in_space(points)
         self._cells = transfer.containing_cells(mesh, self._points).astype(np.int32)
         self._field = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, (d,))))
         self._nodes = self._kept[mesh.geometry.input_global_indices[compat.geometry_dofmap(mesh)]]
@@ -317,14 +318,10 @@ def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.
     line = compat.simplex_mesh(MPI.COMM_SELF, local.reshape(-1, d), source.points[kept], _KINDS[d - 1])
     tree = geometry.bb_tree(line, d - 1)
     middles = geometry.create_midpoint_tree(line, d - 1, np.arange(len(part.facets), dtype=np.int32))
-    nearest = geometry.compute_closest_entity(tree, middles, line, _in_space(points))
+    nearest = geometry.compute_closest_entity(tree, middles, line, in_space(points))
     corners = part.facets[line.topology.original_cell_index[nearest]]
     weights = transfer.clipped(transfer.barycentric_weights(source.points[corners], points))
     starts = np.arange(0, corners.size + 1, d)
     return sparse.csr_array(
         (weights.ravel(), rows_of(source, part)[corners].ravel(), starts), (len(points), len(part.vertices))
     )
-
-
-def _in_space(points: Array) -> Array:
-    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -255,13 +253,9 @@ class Study:
             "versions": versions(),
         }
 
-    def as_csv(self) -> str:
-        """One line for each point; empty where there is nothing; errors in columns ``error_QUANTITY``."""
-        text, lines = io.StringIO(), [_flat(r) for r in self.rows]
-        writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(lines)
-        return text.getvalue()
+    def lines(self) -> list[dict[str, Any]]:
+        """The lines of ``study.csv``, one for each point; errors are in columns ``error_QUANTITY``."""
+        return [_flat(r) for r in self.rows]
 
 
 _ITERATIONS = ("newton", "linear", "levels", "branch")
