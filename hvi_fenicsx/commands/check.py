@@ -45,14 +45,8 @@ def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> st
     factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:
         return json.dumps(console.as_data(prepared, factors) | {"sizes": sizes}, indent=2, ensure_ascii=False)
-    lines = [
-        *console.heading(prepared, COMM.size),
-        *_size_lines(**sizes),
-        *console.load_factors(factors),
-        *console.effects(prepared),
-        *console.history(prepared),
-    ]
-    return "\n".join(lines)
+    begin, end = [*console.heading(prepared, COMM.size), *_size_lines(**sizes)], console.load_factors(factors)
+    return "\n".join([*begin, *end, *console.effects(prepared), *console.history(prepared)])
 
 
 def _sizes(prepared: Preparation) -> dict[str, Any]:

@@ -85,17 +85,12 @@ def peak_memory(comm: MPI.Comm) -> float:
     return total(comm, found / 2**20 if sys.platform == "darwin" else found / 2**10)
 
 
-def memory_limit() -> float:
-    """The memory that this process may use, MB: the machine's, or what its cgroup or ``ulimit`` leaves of it."""
-    return min(_of_machine(), _of_process())
-
-
 def free_memory() -> float:
-    """What of :func:`memory_limit` no process of this machine uses now, MB, as far as the machine tells."""
+    """What no process uses now of the memory that this one may use, MB, as far as the machine tells."""
     table = Path("/proc/meminfo")
     lines = table.read_text(encoding="ascii").splitlines() if table.is_file() else []
     found = [int(line.split()[1]) / 2**10 for line in lines if line.startswith("MemAvailable:")]
-    return min([memory_limit(), *found])
+    return min([_of_machine(), _of_process(), *found])
 
 
 def memory_room(comm: MPI.Comm) -> float:
