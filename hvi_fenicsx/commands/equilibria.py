@@ -17,7 +17,7 @@ from ..equilibrium_search.stationarity import StationaryPoint
 from ..errors import ExitCode, NotWrittenError
 from ..model import dump_scene
 from ..report import page
-from ..report.pictures.draw import draw as draw_pictures
+from ..report.page import draw as draw_pictures
 from ..results import plain, whole
 from ..results.summary import common
 from ..results.whole import made, write_record, write_whole

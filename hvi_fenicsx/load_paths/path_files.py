@@ -14,7 +14,7 @@ from ..model import dump_scene
 from ..paths.load_path import LoadPath
 from ..paths.state import End, Event
 from ..report import page
-from ..report.pictures.draw import draw as draw_pictures
+from ..report.page import draw as draw_pictures
 from ..results import vtk_fields, whole
 from ..results.gathering import contact_parts
 from ..results.output_folder import ResultFolder

@@ -1,4 +1,7 @@
-"""``report.html`` beside a result: one file that a colleague reads without the program, made from the folder alone.
+"""``report.html`` beside a result: one file that a colleague reads without the program; and its pictures.
+
+Both are made from the finished folder alone. A child process draws: what goes wrong in it (VTK aborts where it finds no
+display) costs a picture, never a run. Nothing here imports a plotting library; the child does.
 
 The templates in ``html/`` have the words; here is what they are given, and how numbers are written in them.
 """
@@ -6,10 +9,13 @@ The templates in ``html/`` have the words; here is what they are given, and how 
 from __future__ import annotations
 
 import base64
+import contextlib
 import functools
 import json
+import os
 import re
 import shlex
+import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
@@ -17,10 +23,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ExitCode
-from ..runtime import manifest, writing
+from ..runtime import manifest, processes, writing
 from . import reader, units
 from .reader import Result
-from .solution_arrays import ContactPart, ResultError
+from .solution_arrays import ContactPart, ReportError, ResultError
 from .units import unless_noise
 
 if TYPE_CHECKING:
@@ -35,6 +41,10 @@ _FIRST = ("escape", "scene", "body", "stress", "work_precision", "error_h", "err
 """The pictures that are shown first, in this order; what is not named here comes after, by its name."""
 _ABSOLUTE = re.compile(r"""(?P<before>^|=|=["'])/(?:[^/"']*/)*(?P<name>[^/"']*)""")
 """A path from the root as a word of a command line, or after an equals sign in it."""
+UNFINISHED = ".png.part"
+"""How the name of a picture ends that is being written."""
+COMPLAINT = "pictures: "
+"""How the child's message to its caller begins."""
 
 
 def write(folder: Path) -> Path:
@@ -253,3 +263,62 @@ def _reproduce(result: Result) -> dict[str, Any]:
         "download": f"data:application/toml;base64,{base64.b64encode(text.encode()).decode()}",
         "files": [PurePath(file).name for file in files],
     }
+
+
+class PictureError(ReportError):
+    """A picture could not be drawn; those that could are in the folder."""
+
+
+def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
+    """Draw all pictures of a result folder into it; for rank 0 alone.
+
+    Args:
+        folder: a finished result.
+        timeout: seconds after which the child is ended.
+
+    Returns:
+        The pictures, as paths.
+
+    Raises:
+        PictureError: the child failed; its message says which picture and why.
+        NotWrittenError: there is no room for a picture.
+    """
+    command = [*processes.PYTHON, "-m", f"{__package__}.pictures.drawings", os.path.abspath(folder)]
+    with _child(command, folder) as child:
+        try:
+            names, errors = child.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            raise PictureError(f"not drawn within {timeout:g} s; {shlex.join(command)} tries again") from None
+    writing.raise_handed_over(child.returncode, errors)
+    if child.returncode != 0:
+        raise PictureError(_message(errors, child.returncode))
+    manifest.add(folder, names.splitlines())
+    return [folder / name for name in names.splitlines()]
+
+
+@contextlib.contextmanager
+def _child(command: list[str], folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """What draws; whatever happens, of it nothing remains: no process (it leads a group), no half-written file."""
+    # One thread for linear algebra: the child forks, and what it draws needs none.
+    alone, pipe = {**processes.environment(), "OMP_NUM_THREADS": "1"}, subprocess.PIPE
+    try:  # in the result's folder: in the current one matplotlib would read a file of settings
+        child = subprocess.Popen(
+            command, env=alone, cwd=folder, start_new_session=True, stdin=subprocess.DEVNULL,
+            stdout=pipe, stderr=pipe, text=True,
+        )  # fmt: skip
+    except OSError as error:
+        raise PictureError(f"no process draws: {error.strerror or error}") from None
+    try:
+        yield child
+    finally:
+        if child.returncode != 0:
+            processes.end(child)
+            for file in folder.glob(f".*{UNFINISHED}"):
+                file.unlink(missing_ok=True)
+
+
+def _message(errors: str, code: int) -> str:
+    """The child's own words are the lines that begin so; before them there may be a library's noise."""
+    own = [line.removeprefix(COMPLAINT) for line in errors.splitlines() if line.startswith(COMPLAINT)]
+    noise = errors.strip().splitlines()[-1:]
+    return "; ".join(own or [f"the drawing process ended with {code}", *noise])

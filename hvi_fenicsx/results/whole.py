@@ -21,7 +21,7 @@ from ..problem import references, spaces
 from ..problem.stress import stress_of_parts
 from ..problem.vectors import NodalForces
 from ..report import page, solution_arrays
-from ..report.pictures.draw import draw
+from ..report.page import draw
 from ..report.solution_arrays import ContactPart, ReportError, SolutionArrays
 from ..runtime import writing
 from ..runtime.cost import Timer

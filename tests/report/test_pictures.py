@@ -29,9 +29,9 @@ from scenes import model
 
 from hvi_fenicsx import compat
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.report import reader
+from hvi_fenicsx.report import page, reader
 from hvi_fenicsx.report.body_mesh import BodyMesh, body_mesh
-from hvi_fenicsx.report.pictures import bodies, draw, shape
+from hvi_fenicsx.report.pictures import bodies, shape
 from hvi_fenicsx.report.solution_arrays import FILE, ContactPart, LoadArrays, SolutionArrays, load, save
 from hvi_fenicsx.runtime import processes
 
@@ -164,7 +164,7 @@ def assert_drawn(paths: list[Path], *names: str) -> None:
         assert image.shape[1] == 1200
         assert 500 <= image.shape[0] <= 2000
         assert image[..., :3].std() > 0.05
-        assert not list(path.parent.glob(f".*{draw.UNFINISHED}"))
+        assert not list(path.parent.glob(f".*{page.UNFINISHED}"))
 
 
 @pytest.fixture
@@ -198,14 +198,14 @@ def test_a_plane_result_has_its_body_and_its_contact(
     tmp_path: Path, value: Callable[[Array], Array], summary: dict[str, Any]
 ) -> None:
     folder = result(tmp_path / "r", square(), value, **summary)
-    assert_drawn(draw.draw(folder), "body.png", "contact.png")
+    assert_drawn(page.draw(folder), "body.png", "contact.png")
 
 
 @pytest.mark.parametrize("value", [pressed, peeled], ids=lambda f: f.__name__)
 def test_so_has_a_result_in_space_and_no_x_server_remains(
     tmp_path: Path, value: Callable[[Array], Array], left_running: Callable[[], list[str]]
 ) -> None:
-    assert_drawn(draw.draw(result(tmp_path / "r", box(), value)), "body.png", "contact.png")
+    assert_drawn(page.draw(result(tmp_path / "r", box(), value)), "body.png", "contact.png")
     assert left_running() == []
 
 
@@ -218,7 +218,7 @@ def test_so_has_a_result_in_space_and_no_x_server_remains(
 def test_an_escape_is_drawn_as_a_motion(
     tmp_path: Path, body: Callable[[], mesh.Mesh], value: Callable[[Array], Array]
 ) -> None:
-    assert_drawn(draw.draw(escaping(tmp_path / "r", body(), value)), "escape.png")
+    assert_drawn(page.draw(escaping(tmp_path / "r", body(), value)), "escape.png")
 
 
 def write_sides(folder: Path, body: mesh.Mesh, **on: Callable[[Array], npt.NDArray[np.bool_]]) -> None:
@@ -249,10 +249,10 @@ def test_a_slanted_side_is_held_along_its_own_normal(tmp_path: Path) -> None:
 def test_each_part_has_its_picture_and_a_scene_without_contact_has_its_body(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(), peeled)
     change(folder, parts={"a.b": floor(square(), peeled), "floor": floor(square(), pressed)})
-    assert_drawn(draw.draw(folder), "body.png", "contact_a.b.png", "contact_floor.png")
+    assert_drawn(page.draw(folder), "body.png", "contact_a.b.png", "contact_floor.png")
     bare = result(tmp_path / "bare", square(), pressed)
     change(bare, parts={})
-    assert_drawn(draw.draw(bare), "body.png")
+    assert_drawn(page.draw(bare), "body.png")
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path, damage: Callab
     folder = result(tmp_path / "r", square(4), pressed)
     damage(folder)
     with pytest.raises(HviError, match=words) as caught:
-        draw.draw(folder)
+        page.draw(folder)
     assert "\n" not in str(caught.value)
     assert "Traceback" not in str(caught.value)
 
@@ -303,12 +303,12 @@ def test_a_child_that_takes_too_long_is_ended_with_its_server(
 ) -> None:
     folder = result(tmp_path / "r", box(), pressed)
     with pytest.raises(HviError, match="not drawn within"):
-        draw.draw(folder, timeout=0.8)
+        page.draw(folder, timeout=0.8)
     deadline = time.monotonic() + 5.0
     while left_running() and time.monotonic() < deadline:
         time.sleep(0.1)
     assert left_running() == []
-    assert not list(folder.glob(f".*{draw.UNFINISHED}"))
+    assert not list(folder.glob(f".*{page.UNFINISHED}"))
 
 
 def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
@@ -316,9 +316,9 @@ def test_the_child_is_no_rank_and_the_package_loads_no_plotting(
 ) -> None:
     monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
     monkeypatch.setenv("PMIX_RANK", "1")
-    assert_drawn(draw.draw(result(tmp_path / "r", square(4), pressed)), "body.png", "contact.png")
+    assert_drawn(page.draw(result(tmp_path / "r", square(4), pressed)), "body.png", "contact.png")
     code = (
-        "import sys, hvi_fenicsx.report.pictures.draw; "
+        "import sys, hvi_fenicsx.report.page; "
         "print([m for m in ('pyvista', 'matplotlib', 'mpi4py') if m in sys.modules])"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
@@ -376,7 +376,7 @@ def test_a_result_that_is_written_is_read_as_it_was(tmp_path: Path) -> None:
 def test_a_picture_carries_its_caption(tmp_path: Path) -> None:
     folder = result(tmp_path / "r", square(4), pressed)
     change(folder, parts={"a": floor(square(4), peeled), "“b”": floor(square(4), pressed)})
-    captions = {path.name: Image.open(path).info["Description"] for path in draw.draw(folder)}
+    captions = {path.name: Image.open(path).info["Description"] for path in page.draw(folder)}
     assert captions["body.png"] == "The deformed body, its displacements magnified, with what acts on it."
     assert captions["contact_“b”.png"] == "Along ““b””: displacement, friction and pressure."
 

@@ -28,9 +28,9 @@ from matplotlib.figure import Figure
 from ...errors import HviError, NotWrittenError
 from ...runtime import processes, writing
 from .. import reader
+from ..page import COMPLAINT, PictureError
 from ..reader import Result
 from . import bodies, charts, contact
-from .draw import COMPLAINT, PictureError
 from .style import save
 
 READY_WITHIN = 15
