@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar
 
@@ -19,6 +20,7 @@ from .base import (
     Condition,
     Contribution,
     Drive,
+    Effect,
     Evaluate,
     FormContext,
     Place,
@@ -31,15 +33,20 @@ from .elasticity import Elasticity, strain, voigt
 from .values import FormulaField, Listed, OneValue, Value, Vector, as_value
 
 
-class Traction(Listed):
-    """A surface traction t (N/m²): a list of formulas, one for each component."""
+class Load(Effect):
+    """What acts on a boundary part by a traction; a subclass gives it."""
 
-    key: ClassVar[str] = "traction"
     place: ClassVar[Place] = Place.BOUNDARY
     drive: ClassVar[Drive] = Drive.LOAD
-    term: ClassVar[str] = "<g, v> += ∫ t·v ds"
 
-    values: tuple[FormulaField, ...]
+    @abstractmethod
+    def traction(self, context: FormContext, part: str) -> Any:
+        """The traction in UFL, nondimensional.
+
+        Args:
+            context: what it may see of the problem.
+            part: where it acts.
+        """
 
     @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
@@ -47,8 +54,24 @@ class Traction(Listed):
         import ufl  # here and below: a scene is read without it
 
         part = where or ""
-        vector = ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
-        return Contribution(linear=(ufl.inner(vector, context.test) * context.facets(part, *self.values),))
+        work = ufl.inner(self.traction(context, part), context.test)
+        return Contribution(linear=(work * context.facets(part, *self.spatial_values()),))
+
+
+class Traction(Load, Listed):
+    """A surface traction t (N/m²): a list of formulas, one for each component."""
+
+    key: ClassVar[str] = "traction"
+    term: ClassVar[str] = "<g, v> += ∫ t·v ds"
+
+    values: tuple[FormulaField, ...]
+
+    @override
+    def traction(self, context: FormContext, part: str) -> Any:
+        """By its components."""
+        import ufl
+
+        return ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
 
     @override
     def surface_load(self) -> SurfaceLoad:
@@ -134,22 +157,16 @@ class Displacement(Listed):
         return max((largest(f) for f in self.values if f != "free"), default=0.0) * sizes.modulus / sizes.length
 
 
-class Pressure(OneValue):
+class Pressure(Load, OneValue):
     """A pressure p (N/m²) against the boundary: a number or a formula; negative: suction."""
 
     key: ClassVar[str] = "pressure"
-    place: ClassVar[Place] = Place.BOUNDARY
-    drive: ClassVar[Drive] = Drive.LOAD
     term: ClassVar[str] = "<g, v> += -∫ p v·n ds"
 
     @override
-    def contribute(self, context: FormContext, where: str | None) -> Contribution:
-        """The linear form over its part."""
-        import ufl
-
-        pressure = context.render(self.value) / context.number(context.stress)
-        work = -pressure * ufl.inner(context.normal, context.test)
-        return Contribution(linear=(work * context.facets(where or "", self.value),))
+    def traction(self, context: FormContext, part: str) -> Any:
+        """Against the normal."""
+        return -context.render(self.value) / context.number(context.stress) * context.normal
 
     @override
     def surface_load(self) -> SurfaceLoad:
@@ -162,11 +179,9 @@ class Pressure(OneValue):
         return largest(self.value)
 
 
-class _Total(Listed):
+class _Total(Load, Listed):
     """A load that is stated as a sum over its part; one of a single number is written without brackets."""
 
-    place: ClassVar[Place] = Place.BOUNDARY
-    drive: ClassVar[Drive] = Drive.LOAD
     is_sum: ClassVar[bool] = True
 
     values: tuple[Finite, ...]
@@ -193,14 +208,12 @@ class Force(_Total):
     term: ClassVar[str] = "<g, v> += ∫ F/|part| · v ds"
 
     @override
-    def contribute(self, context: FormContext, where: str | None) -> Contribution:
-        """The linear form over its part."""
+    def traction(self, context: FormContext, part: str) -> Any:
+        """The force over the area."""
         import ufl
 
-        part = where or ""
         scale = context.side_moments(part).area * context.stress
-        mean = ufl.as_vector([context.number(force / scale) for force in self.values])
-        return Contribution(linear=(ufl.inner(mean, context.test) * context.facets(part),))
+        return ufl.as_vector([context.number(force / scale) for force in self.values])
 
     @override
     def spread_at(self, moments: SideMoments, points: Array) -> Array:
@@ -236,15 +249,14 @@ class Moment(_Total):
             raise InputError(f"moment has {len(self.values)} components; in {dimension}D it is {wanted}")
 
     @override
-    def contribute(self, context: FormContext, where: str | None) -> Contribution:
-        """The linear form over its part.
+    def traction(self, context: FormContext, part: str) -> Any:
+        """A x r.
 
         Raises:
             InputError: no traction of this kind has the moment: the part has no extent across it.
         """
         import ufl
 
-        part = where or ""
         moments = context.side_moments(part)
         rate, met = _rotation(moments.second, self.values)
         if not met:
@@ -254,10 +266,8 @@ class Moment(_Total):
         r = [x[i] - context.number(c) for i, c in enumerate(moments.centroid)]
         a = [context.number(c / context.stress) for c in rate]
         if context.dimension == 2:
-            traction = ufl.as_vector([-a[2] * r[1], a[2] * r[0]])
-        else:
-            traction = ufl.cross(ufl.as_vector(a), ufl.as_vector(r))
-        return Contribution(linear=(ufl.inner(traction, context.test) * context.facets(part),))
+            return ufl.as_vector([-a[2] * r[1], a[2] * r[0]])
+        return ufl.cross(ufl.as_vector(a), ufl.as_vector(r))
 
     @override
     def spread_at(self, moments: SideMoments, points: Array) -> Array:

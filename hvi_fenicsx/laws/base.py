@@ -485,7 +485,7 @@ def _sample(law: Superpotential, x: Array, sign: float) -> float:
 
 
 def _bound(law: Superpotential, a: Array, b: Array, sign: float) -> Array:
-    """Of the traction, times a sign, on the open intervals (a, b)."""
+    """A bound of the traction, times a sign, on the open intervals (a, b)."""
     if sign > 0.0:
         return law.convex.left(b) - law.concave.right(a)
     return law.concave.left(b) - law.convex.right(a)

@@ -97,11 +97,6 @@ class Tresca(PolylineLaw):
         require_positive(self._title, yield_traction=self.yield_traction, reference_slip=self.reference_slip)
 
     @override
-    @property
-    def reference_length(self) -> float:
-        return self.reference_slip
-
-    @override
     def build(self) -> TractionGraph:
         return TractionGraph.from_points([(0.0, self.yield_traction)])
 
@@ -117,11 +112,6 @@ class LinearSpring(PolylineLaw):
 
     def __post_init__(self) -> None:
         require_positive(self._title, stiffness=self.stiffness, reference_slip=self.reference_slip)
-
-    @override
-    @property
-    def reference_length(self) -> float:
-        return self.reference_slip
 
     @override
     def build(self) -> TractionGraph:

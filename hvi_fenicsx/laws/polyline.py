@@ -50,17 +50,14 @@ class PolylinePart(ConvexPart):
 class PolylineLaw(Superpotential):
     """A law given by a `TractionGraph`. A subclass writes `build`; all else follows.
 
-    `reference_length` (m) is a displacement to be taken as typical where the graph has no break off zero.
+    `reference_slip` (m) is a displacement to be taken as typical where the graph has no break off zero.
     """
+
+    reference_slip: float = 1e-6
 
     @abstractmethod
     def build(self) -> TractionGraph:
         """The graph of the traction over displacement."""
-
-    @property
-    def reference_length(self) -> float:
-        """Typical displacement of a graph without a break off zero, m."""
-        return 1e-6
 
     @override
     @cached_property
@@ -173,7 +170,7 @@ class PolylineLaw(Superpotential):
 
         The energy is the triangle ½ a max |traction| over |x| ≤ a: for the quadratic-linear law γ2 δ.
         """
-        candidates = [self.kinks, self._corners, np.array([self.reference_length])]
+        candidates = [self.kinks, self._corners, np.array([self.reference_slip])]
         lengths = np.concatenate([np.unique(np.abs(c[c != 0.0])) for c in candidates])
         for a in lengths:
             traction = self._largest(float(a))
