@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from ..effects import Direction
 from ..mesh import facets, nodes
 from ..mesh.curved import CurvedMesh
-from ..problem import thresholds as composition
+from ..problem import scaling as composition
 from ..problem.contact_surface import largest_turn
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem

@@ -33,7 +33,7 @@ from ..problem.contact_surface import Surface
 from ..problem.elastic_operator import stiffness_tensor
 from ..problem.interface_sides import outward
 from ..problem.problem import Bounds, PrescribedComponent, Problem
-from ..problem.thresholds import DEFAULT as composition
+from ..problem.scaling import DEFAULT as composition
 from ..runtime.mpi import total
 from ..typing import Array, Entities, Mask
 from .bubbles import DEFAULT, gathered, of_facet, quadrature, shape, summed

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Bounds, Problem
-from ..problem.thresholds import DEFAULT as composition
+from ..problem.scaling import DEFAULT as composition
 from ..runtime import forms
 from ..typing import Array, Entities, Mask
 from .bubbles import DEFAULT, BubbleStiffness, Springs, of_cell

@@ -21,9 +21,8 @@ from . import contact_surface, interface_sides
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .problem import Bounds, BoundsForce, BoundsMove, PlacedContribution
-from .scaling import Scales
+from .scaling import DEFAULT, Scales
 from .spaces import contact_rule, edge_share
-from .thresholds import DEFAULT
 
 
 def make_surfaces(

@@ -20,7 +20,7 @@ from ..geometry import spot, tangents
 from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
 from . import facet_overlaps
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 from .vectors import nodal
 
 

@@ -17,7 +17,7 @@ from typing_extensions import override
 from ..typing import Array, Integers, Mask
 from . import facet_overlaps, facet_polygons, spaces
 from .facet_overlaps import Facets, OverlapPoints, Overlaps
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 
 
 def places(nodes: Array, barycentric: Array) -> Array:

@@ -26,9 +26,8 @@ from ..rigid import RigidBody, rigid_fields
 from ..runtime import forms
 from ..typing import Array, Entities
 from . import spaces
-from .scaling import Scales
+from .scaling import DEFAULT, Scales
 from .spaces import Dilatation, coefficients_of
-from .thresholds import DEFAULT
 from .vectors import LinearForm, nodal, nodal_sum, nodal_values
 
 ROUNDING = 1e-10

@@ -17,7 +17,7 @@ from .. import compat
 from ..mesh import nodes
 from ..typing import Array, Entities, Integers, Mask
 from . import spaces
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 
 _DEGREE = 12
 """Degree of the quadrature: areas are square roots of polynomials, nearly constant ones."""

@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from ..geometry import tangents
 from ..typing import Array, Integers, Mask
 from .facet_overlaps import Facets, Overlaps
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 """The triangle that clips."""

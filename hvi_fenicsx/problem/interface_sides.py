@@ -20,7 +20,7 @@ from . import curved_overlaps, facet_overlaps, facet_polygons, spaces
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .facet_overlaps import Facets, Overlaps, is_curved
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 
 
 def refuse(comm: MPI.Comm, surfaces: Iterable[Surface], length: float) -> None:

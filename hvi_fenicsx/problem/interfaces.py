@@ -26,7 +26,7 @@ from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
 from .facet_overlaps import Facets, Overlaps
 from .interface_sides import Pair
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 
 
 def check_facing(pair: Pair, overlaps: Overlaps) -> None:

@@ -18,8 +18,7 @@ from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .law_term import LawTerm
 from .problem import PlacedContribution
-from .scaling import Scales
-from .thresholds import DEFAULT
+from .scaling import DEFAULT, Scales
 
 Modification = Callable[[Superpotential], Superpotential]
 """The law that is solved in the place of a law, SI: the same law, smoothed for example."""

@@ -22,7 +22,7 @@ from ..typing import Array, Entities, Mask
 from . import facet_overlaps, spaces
 from .law_term import LawTerm
 from .problem import Problem
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dolfinx import fem
 
 from ..typing import Array, Integers
 from .problem import Problem
-from .thresholds import DEFAULT
+from .scaling import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)

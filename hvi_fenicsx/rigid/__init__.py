@@ -11,6 +11,7 @@ from .motions import (
     MotionFields,
     Movable,
     RigidBody,
+    RigidThresholds,
     fields_at,
     kernel,
     modes,
@@ -19,4 +20,3 @@ from .motions import (
 )
 from .reduction import ContactCone, Resistance, RigidProblem, pressed, without_obstacles
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided
-from .thresholds import RigidThresholds

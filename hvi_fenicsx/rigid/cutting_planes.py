@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import SolverError
 from ..laws import Length
 from ..typing import Array
-from .thresholds import DEFAULT, RigidThresholds
+from .motions import DEFAULT, RigidThresholds
 
 _DIGITS = 12
 """To which directions of rows are compared; all other errors of the programme are larger."""

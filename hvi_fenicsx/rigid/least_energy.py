@@ -18,7 +18,7 @@ from mpi4py import MPI
 
 from ..runtime.mpi import on_root
 from ..typing import Array
-from .thresholds import DEFAULT, RigidThresholds
+from .motions import DEFAULT, RigidThresholds
 
 Energy = Callable[[Array], tuple[Array, Array]]
 """The convex energies of parts at amplitudes (k,): values (p,) and a subgradient of each, (p, k). Collective."""

@@ -15,10 +15,9 @@ from ..runtime.mpi import on_root
 from ..typing import Array
 from .branch_and_bound import GlobalProgramme
 from .cutting_planes import CuttingPlanes, Functional, Minimum, Polytope, ball, cross, vertices
-from .motions import Mode, mode_of, modes, natural_basis, null_space, triangle
+from .motions import DEFAULT, Mode, RigidThresholds, mode_of, modes, natural_basis, null_space, triangle
 from .reduction import ReducedProblem, RigidProblem, reduce
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to, undecided
-from .thresholds import DEFAULT, RigidThresholds
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,18 @@ from ..laws import Length
 from ..laws.base import Directional
 from ..typing import Array
 from .cutting_planes import Functional, SlipIntegral, merged
-from .motions import NEGLIGIBLE, FixedDirections, Mode, MotionFields, Movable, Places, fields_at, kernel
-from .thresholds import DEFAULT, RigidThresholds
+from .motions import (
+    DEFAULT,
+    NEGLIGIBLE,
+    FixedDirections,
+    Mode,
+    MotionFields,
+    Movable,
+    Places,
+    RigidThresholds,
+    fields_at,
+    kernel,
+)
 
 
 @dataclass(frozen=True)

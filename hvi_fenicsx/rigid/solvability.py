@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from .motions import Mode
-from .thresholds import DEFAULT
+from .motions import DEFAULT, Mode
 
 ExistenceState = Literal["held", "metastable", "escapes", "borderline", "undecided"]
 WORST_FIRST: tuple[ExistenceState, ...] = ("escapes", "undecided", "metastable", "borderline", "held")

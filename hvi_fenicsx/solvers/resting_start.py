@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from ..laws import Superpotential
 from ..problem.law_term import LawTerm
 from ..rigid import OneSidedSupports, RestingPosition, least_energy
-from ..rigid.thresholds import DEFAULT as RIGID
+from ..rigid.motions import DEFAULT as RIGID
 from ..runtime.mpi import agree
 from ..system import existence, rigid_motions
 from ..system.equations import Cells, LawModel, TangentAtRest, VertexModel
