@@ -25,8 +25,8 @@ from . import boundary_parts, constraints, elastic_operator, interfaces, part_la
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .part_laws import Modification, unchanged
-from .problem import PlacedContribution, PrescribedComponent, Problem
-from .scaling import Placed, Scales
+from .problem import PrescribedComponent, Problem
+from .scaling import Placed, PlacedContribution, Scales
 from .spaces import coefficients_of
 
 _BETWEEN = ", between the vertices of the mesh"

@@ -20,8 +20,8 @@ from ..typing import Array, Entities
 from . import contact_surface, interface_sides
 from .contact_surface import Surface
 from .domain_forms import DomainForms
-from .problem import Bounds, BoundsForce, BoundsMove, PlacedContribution
-from .scaling import DEFAULT, Scales
+from .problem import Bounds, BoundsForce, BoundsMove
+from .scaling import DEFAULT, PlacedContribution, Scales
 from .spaces import contact_rule, edge_share
 
 

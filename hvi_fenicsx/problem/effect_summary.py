@@ -15,7 +15,8 @@ import numpy as np
 from ..effects import BoundaryLaw, Contribution, Direction, Effect, Place
 from ..laws import Superpotential, describe
 from .contact_surface import Surface
-from .problem import PlacedContribution, Problem
+from .problem import Problem
+from .scaling import PlacedContribution
 
 Role = dict[str, Any]
 """One effect's role, ready for JSON:

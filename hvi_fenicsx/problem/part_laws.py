@@ -17,8 +17,7 @@ from ..typing import Array, Entities
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .law_term import LawTerm
-from .problem import PlacedContribution
-from .scaling import DEFAULT, Scales
+from .scaling import DEFAULT, PlacedContribution, Scales
 
 Modification = Callable[[Superpotential], Superpotential]
 """The law that is solved in the place of a law, SI: the same law, smoothed for example."""

@@ -9,13 +9,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from ..effects import Contribution, Effect
 from ..formula import SpatialValue
 from ..mesh import nodes
 from ..mesh.boundary_part import BoundaryPart
@@ -29,23 +28,9 @@ from .contact_surface import Surface
 from .elastic_operator import Bulk
 from .interfaces import Coupling, Interface, coupled
 from .law_term import LawTerm
-from .scaling import Scales
+from .scaling import PlacedContribution, Scales
 
 T = TypeVar("T")
-
-
-class PlacedContribution(NamedTuple):
-    """An effect, its place and its contribution.
-
-    Attributes:
-        where: boundary part or region; None for the whole body.
-        effect: the effect.
-        contribution: its forms, conditions, bounds and laws.
-    """
-
-    where: str | None
-    effect: Effect
-    contribution: Contribution
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from ..effects import BodySizes, Drive, Effect, Evaluate, Place
+from ..effects import BodySizes, Contribution, Drive, Effect, Evaluate, Place
 from ..errors import InputError
 
 
@@ -156,3 +157,17 @@ class CompositionThresholds:
 
 
 DEFAULT = CompositionThresholds()
+
+
+class PlacedContribution(NamedTuple):
+    """An effect, its place and its contribution.
+
+    Attributes:
+        where: boundary part or region; None for the whole body.
+        effect: the effect.
+        contribution: its forms, conditions, bounds and laws.
+    """
+
+    where: str | None
+    effect: Effect
+    contribution: Contribution

@@ -17,7 +17,7 @@ from scenes import Table, solved
 from hvi_fenicsx import Solution, prepare, read_tables
 from hvi_fenicsx.effects import Contribution
 from hvi_fenicsx.problem import elastic_operator, stress
-from hvi_fenicsx.problem.problem import PlacedContribution
+from hvi_fenicsx.problem.scaling import PlacedContribution
 from hvi_fenicsx.problem.stress import stress_of_parts
 
 Array = npt.NDArray[np.float64]
