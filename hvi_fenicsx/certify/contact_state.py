@@ -16,8 +16,7 @@ from ..effects import Direction
 from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.problem import Bounds, Problem
-from ..problem.references import References
-from ..problem.rigid_part import elastic_forces
+from ..problem.references import References, elastic_forces
 from ..problem.vectors import nodal_values
 from ..typing import Array, Integers, Mask
 from . import force_attribution, law_state

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from .. import console
 from ..errors import ExitCode
 from ..model import read_scene
-from ..problem import boundary_parts
+from ..problem import domain_forms
 from ..runtime import log
 from ..runtime.mpi import on_root
 from ..solvers import obstacle_force
@@ -62,7 +62,7 @@ def _sizes(prepared: Preparation) -> dict[str, Any]:
     obstacles = {} if pressed is None else {pressed.name: pressed.force * pressed.direction}
     return {
         "body": list(map(float, problem.domain.upper - problem.domain.lower)),
-        "parts": {name: boundary_parts.of(problem.space, facets).area for name, facets in problem.part_facets.items()},
+        "parts": {name: domain_forms.of(problem.space, facets).area for name, facets in problem.part_facets.items()},
         "loads": {name: _rounded(force * problem.scales.force) for name, force in sums.items()},
         "obstacle_forces": {name: _rounded(force * problem.scales.force) for name, force in obstacles.items()},
     }

@@ -28,7 +28,7 @@ from ..formula import SpatialValue
 from ..mesh import facets as facet_sizes
 from ..mesh import nodes
 from ..mesh.boundary_part import Inequalities
-from ..problem import boundary_parts, references, spaces
+from ..problem import domain_forms, references, spaces
 from ..problem.contact_surface import Surface
 from ..problem.elastic_operator import stiffness_tensor
 from ..problem.interface_sides import outward
@@ -571,7 +571,7 @@ def _sums(problem: Problem, part: _Part) -> Array:
     spread = [effect for where, effect, _ in problem.contributions if where == part.name and effect.is_sum]
     for sign, counted in ((1.0, part.share), (-1.0, part.meshed)) if spread else ():
         areas = (on.areas * counted).ravel() * problem.scales.length ** (d - 1)
-        moments = boundary_parts.of_points(problem.domain.mesh.comm, at[:, :d], areas)
+        moments = domain_forms.of_points(problem.domain.mesh.comm, at[:, :d], areas)
         for effect in spread:
             found += sign * counted[:, :, None] * effect.spread_at(moments, at).reshape(found.shape)
     return found / problem.scales.stress

@@ -165,7 +165,7 @@ class Model(Content):
         """The effects and their places, its laws smoothed where it says so, for any mesh. Not collective."""
         from ..laws import smoothing
         from ..problem.compose import Formulation
-        from ..problem.part_laws import Modification, unchanged
+        from ..problem.law_term import Modification, unchanged
 
         wanted = self.solver
         modify: Modification = unchanged

@@ -21,10 +21,10 @@ from ..mesh.boundary_part import BoundaryPart, InterfaceSides
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from . import boundary_parts, constraints, elastic_operator, interfaces, part_laws, scaling
+from . import constraints, domain_forms, elastic_operator, interfaces, law_term, scaling
 from .contact_surface import Surface
 from .domain_forms import DomainForms
-from .part_laws import Modification, unchanged
+from .law_term import Modification, unchanged
 from .problem import PrescribedComponent, Problem
 from .scaling import Placed, PlacedContribution, Scales
 from .spaces import coefficients_of
@@ -65,7 +65,7 @@ def compose(domain: Domain, model: Formulation) -> Problem:
             that excludes a prescribed displacement.
     """
     effects = model.effects
-    facets = boundary_parts.find(domain, model.parts, effects)
+    facets = domain_forms.find(domain, model.parts, effects)
     sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate)
     context = DomainForms(domain, facets, scales, effects, model.degree)
@@ -145,9 +145,9 @@ def _problem(
     bounds = constraints.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
     constraints.check_bounds(context, bounds, prescribed, fixed)
     constraints.check_contradictions(context, scales, bounds)
-    part_laws.check_laws(contributions)
-    part_laws.check_moved(context.domain.mesh.comm, contributions, surfaces)
-    terms = part_laws.make_terms(context, scales, surfaces, contributions, fixed, model.modify)
+    law_term.check_laws(contributions)
+    law_term.check_moved(context.domain.mesh.comm, contributions, surfaces)
+    terms = law_term.make_terms(context, scales, surfaces, contributions, fixed, model.modify)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(
         domain=context.domain,

@@ -19,7 +19,7 @@ from ..laws import Superpotential
 from ..laws.base import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
-from ..problem.thresholds import DEFAULT
+from ..problem.scaling import DEFAULT
 from ..rigid import AnyBody, Resistance, RigidProblem, fields_at, gives_way
 from ..system import existence
 from ..system.equations import Cells, VertexModel

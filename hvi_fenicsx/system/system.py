@@ -23,7 +23,7 @@ from ..problem import references, scaling
 from ..problem.compose import Formulation, compose
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
-from ..problem.rigid_part import elastic_forces
+from ..problem.references import elastic_forces
 from ..problem.vectors import assembled, new_vector, product, turn
 from ..rigid import Mode
 from ..runtime.cost import Timer
