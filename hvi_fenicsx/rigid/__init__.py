@@ -11,7 +11,6 @@ from .motions import (
     MotionFields,
     Movable,
     RigidBody,
-    RigidThresholds,
     fields_at,
     kernel,
     modes,

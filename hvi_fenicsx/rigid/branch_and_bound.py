@@ -16,10 +16,12 @@ from heapq import heappop, heappush
 from itertools import count, product
 
 import numpy as np
+from typing_extensions import override
 
 from ..errors import SolverError
 from ..typing import Array
 from .cutting_planes import CuttingPlanes, Functional, Minimum, Polytope, ball, faces, idle
+from .motions import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class ConcavePart:
             if b < 0.0 and g.rows.size
         ]
         _, sizes, right = np.linalg.svd(np.linalg.qr(np.vstack([np.zeros((k, k)), *rows]), mode="r"))
-        return cls(f, programme, right[sizes > programme.thresholds.rounding * max(sizes[0], 1e-300)])
+        return cls(f, programme, right[sizes > DEFAULT.rounding * max(sizes[0], 1e-300)])
 
     def cones(self) -> Iterator[Array]:
         """Cones that cover all slips; the edges of each are columns (q, q)."""
@@ -82,9 +84,9 @@ class ConcavePart:
             y: the motion, (k,).
             depth: how often the cone was divided before.
         """
-        limit, slip = self.programme.thresholds.dropped, self.basis @ y
+        slip = self.basis @ y
         shares = np.linalg.solve(edges, slip)
-        inner = np.flatnonzero(shares > limit * np.abs(shares).max(initial=0.0))
+        inner = np.flatnonzero(shares > DEFAULT.dropped * np.abs(shares).max(initial=0.0))
         if depth % 3 == 2 or len(inner) < 2:
             cosines = edges.T @ edges
             inner = np.array(np.unravel_index(np.argmin(cosines), cosines.shape))
@@ -99,25 +101,10 @@ class ConcavePart:
         return self.programme.evaluate(only, y)
 
 
-@dataclass(frozen=True)
-class GlobalProgramme:
-    """What :class:`.CuttingPlanes` does, for factors of any sign.
+class GlobalProgramme(CuttingPlanes):
+    """Cutting planes for factors of any sign."""
 
-    Attributes:
-        convex: for functionals without negative factors.
-    """
-
-    convex: CuttingPlanes
-
-    def evaluate(self, f: Functional, y: Array) -> float:
-        """The value of f at y, all vertices summed; the cone is not looked at.
-
-        Args:
-            f: the functional.
-            y: a motion (k,).
-        """
-        return self.convex.evaluate(f, y)
-
+    @override
     def minimise(
         self, f: Functional, region: Polytope, give_up: float = np.inf, aim: float = -np.inf
     ) -> Minimum | None:
@@ -133,10 +120,10 @@ class GlobalProgramme:
             SolverError: the gap between value and bound does not close.
         """
         if not np.any(f.factors < 0.0):
-            return self.convex.minimise(f, region, give_up, aim=aim)
-        part = ConcavePart.of(f, self.convex)
+            return super().minimise(f, region, give_up, aim)
+        part = ConcavePart.of(f, self)
         if not len(part.basis):  # no motion slips where the growth is negative
-            return self.convex.minimise(replace(f, factors=np.maximum(f.factors, 0.0)), region, give_up)
+            return super().minimise(replace(f, factors=np.maximum(f.factors, 0.0)), region, give_up)
         return self._search(part, region, give_up)
 
     def sphere(self, f: Functional, across: Array) -> Minimum | None:
@@ -150,7 +137,7 @@ class GlobalProgramme:
             SolverError: the gap between value and bound does not close.
         """
         best: Minimum | None = None
-        for face in faces(self.convex.frame, across):
+        for face in faces(self.frame, across):
             found = self.minimise(f, face, np.inf if best is None else best.value)
             best = found if best is None or (found is not None and found.value < best.value) else best
         return best
@@ -169,40 +156,39 @@ class GlobalProgramme:
         Raises:
             SolverError: the gap between value and bound does not close.
         """
-        limits, frame = self.convex.thresholds, self.convex.frame
-        start = self.convex.minimise(f.unresisted().minus(load), ball(frame))
+        start = super().minimise(f.unresisted().minus(load), ball(self.frame))
         if start is None or -start.value <= least:  # it only ever holds, unless a motion it does no work on escapes
-            idling = self.minimise(f, idle(frame, load))
+            idling = self.minimise(f, idle(self.frame, load))
             return (np.inf, None) if idling is None or idling.value >= -least else (-np.inf, idling.y)
         factor, y = self.evaluate(f, start.y) / -start.value, start.y
-        for _ in range(limits.max_rounds):
-            found = self.minimise(f.minus(load, factor), ball(frame))
-            if found is None or found.value >= -limits.tight_gap * self.convex.scale:
+        for _ in range(DEFAULT.max_rounds):
+            found = self.minimise(f.minus(load, factor), ball(self.frame))
+            if found is None or found.value >= 0.0:
                 return factor, y
             work = float(load @ found.y)
             if work <= least:
-                return (factor, y) if found.value >= -limits.rounding * self.convex.scale else (-np.inf, found.y)
+                return (factor, y) if found.value >= -DEFAULT.rounding * self.scale else (-np.inf, found.y)
             lower = self.evaluate(f, found.y) / work
             if lower >= factor:
                 return factor, y
             factor, y = lower, found.y
-        raise SolverError(f"rigid motions: no load factor after {limits.max_rounds} minima")
+        raise SolverError(f"rigid motions: no load factor after {DEFAULT.max_rounds} minima")
 
     def _search(self, part: ConcavePart, region: Polytope, give_up: float) -> Minimum | None:
-        limits, numbers, depth = self.convex.thresholds, count(), 0
-        best, gap = Minimum(give_up, np.empty(0), -np.inf), np.inf
+        numbers, depth = count(), 0
+        best = Minimum(give_up, np.empty(0), -np.inf)
         waiting: list[tuple[float, int, Array, Array, int]] = []
         cones = part.cones()
-        for _ in range(limits.max_cones):
+        for _ in range(DEFAULT.max_rounds):
             for edges in cones:
-                found = self.convex.minimise(part.bound(edges), region, best.value, limits.part_of_gap * gap)
+                found = super().minimise(part.bound(edges), region, best.value)
                 if found is not None:
                     value = self.evaluate(part.functional, found.y)
                     best = Minimum(value, found.y, found.lower) if value < best.value else best
                     heappush(waiting, (found.lower, next(numbers), edges, found.y, depth))
             gap = best.value - waiting[0][0] if waiting else 0.0
-            if gap <= limits.rounding * self.convex.scale:
+            if gap <= DEFAULT.rounding * self.scale:
                 return replace(best, lower=best.value - gap) if best.y.size else None
             _, _, edges, y, depth = heappop(waiting)
             cones, depth = part.divide(edges, y, depth), depth + 1
-        raise SolverError(f"rigid motions: {limits.max_cones} cones left a gap in a growth that is not convex")
+        raise SolverError(f"rigid motions: {DEFAULT.max_rounds} cones left a gap in a growth that is not convex")

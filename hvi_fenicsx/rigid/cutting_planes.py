@@ -15,13 +15,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 
 from ..errors import SolverError
 from ..laws import Length
 from ..typing import Array
-from .motions import DEFAULT, RigidThresholds
+from .motions import DEFAULT
 
 _DIGITS = 12
 """To which directions of rows are compared; all other errors of the programme are larger."""
@@ -187,17 +188,13 @@ class CuttingPlanes:
         frame: rigid coefficients of the basis motions, (n, k).
         integrals: the slip integral of each part.
         scale: the size of the works that are compared.
-        thresholds: what is small, and when to give up.
         cuts: subgradients (k,) of each slip integral.
-        solved: number of linear programmes.
     """
 
     frame: Array
     integrals: tuple[SlipIntegral, ...]
     scale: float
-    thresholds: RigidThresholds = DEFAULT
-    cuts: list[list[Array]] = field(default_factory=list)
-    solved: int = 0
+    cuts: list[list[Array]] = field(init=False)
 
     def __post_init__(self) -> None:
         k = self.frame.shape[1]
@@ -216,7 +213,7 @@ class CuttingPlanes:
         return float(f.linear @ y + slip)
 
     def minimise(
-        self, f: Functional, region: Polytope, give_up: float = np.inf, enough: float = 0.0, aim: float = -np.inf
+        self, f: Functional, region: Polytope, give_up: float = np.inf, aim: float = -np.inf
     ) -> Minimum | None:
         """Minimum of a convex f over region and cone; None if that is empty or nothing in it is small enough.
 
@@ -224,16 +221,14 @@ class CuttingPlanes:
             f: the functional, with its cone.
             region: where to search.
             give_up: values above this are of no interest.
-            enough: a gap between value and bound that will do.
             aim: a value below this will do, whatever the gap.
 
         Raises:
             SolverError: the gap between value and bound does not close.
         """
         best = Minimum(np.inf, np.zeros(self.frame.shape[1]), -np.inf)
-        limits, active = self.thresholds, _seeds(f.cone)
-        smallest, stalled = np.inf, 0
-        for _ in range(limits.max_rounds):
+        active, smallest = _seeds(f.cone), np.inf
+        for _ in range(DEFAULT.max_rounds):
             found = self._solve(f, region, active)
             if found is None or found.lower > give_up:
                 return None
@@ -241,13 +236,11 @@ class CuttingPlanes:
                 value = self.evaluate(f, found.y)
                 best = Minimum(value, found.y, found.lower) if value < best.value else best
             gap = best.value - found.lower
-            stalled = 0 if gap < limits.shrunk * smallest else stalled + 1
-            smallest = min(smallest, gap)
-            tight = limits.rounding if stalled >= limits.patience else limits.tight_gap
-            if best.value < aim or (np.isfinite(gap) and gap <= max(enough, tight * self.scale)):
+            if best.value < aim or gap <= 0.0 or smallest <= gap <= DEFAULT.rounding * self.scale:
                 return replace(best, lower=found.lower)
+            smallest = min(smallest, gap)
             self._cut_towards(found.y, best.y)
-        raise SolverError(f"rigid motions: {limits.max_rounds} cutting planes left a gap of {smallest:.1e}")
+        raise SolverError(f"rigid motions: {DEFAULT.max_rounds} cutting planes left a gap of {smallest:.1e}")
 
     def _cut(self, y: Array) -> None:
         for integral, cuts in zip(self.integrals, self.cuts, strict=True):
@@ -260,7 +253,6 @@ class CuttingPlanes:
 
     def _solve(self, f: Functional, region: Polytope, active: list[int]) -> Minimum | None:
         """Minimum of the cut model; `value` and `lower` are both the model's."""
-        self.solved += 1
         if self.frame.shape[1] == 1:
             return self._solve_line(f, region)
         c, a_ub, b_ub = self._rows(f, region, active)
@@ -268,7 +260,7 @@ class CuttingPlanes:
         k, a_eq = len(f.linear), np.zeros((len(region.equal), len(c)))
         a_eq[:, :k] = region.equal
         bounds = [(None, None)] * k + [(0.0, None)] * (len(c) - k)
-        found = self.thresholds.linear_programme(c / size, a_ub, b_ub, a_eq, region.value, bounds)
+        found = linear_programme(c / size, a_ub, b_ub, a_eq, region.value, bounds)
         if found.status == 2:
             return None
         if found.status != 0:
@@ -304,14 +296,13 @@ class CuttingPlanes:
         return Minimum(values[i], inside[i], values[i]) if values else None
 
     def _inside(self, f: Functional, region: Polytope, y: Array) -> bool:
-        feasible = self.thresholds.exact
-        held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= feasible
-        return bool(held and (f.cone @ y).max(initial=0.0) <= feasible)
+        held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= DEFAULT.exact
+        return bool(held and (f.cone @ y).max(initial=0.0) <= DEFAULT.exact)
 
     def _violated(self, cone: Array, y: Array, active: list[int]) -> bool:
         """Whether y leaves the cone; the row it violates most is then added to the active ones."""
         excess = cone @ y
-        if not len(cone) or excess.max() <= self.thresholds.exact or int(excess.argmax()) in active:
+        if not len(cone) or excess.max() <= DEFAULT.exact or int(excess.argmax()) in active:
             return False
         active.append(int(excess.argmax()))
         return True
@@ -320,3 +311,24 @@ class CuttingPlanes:
 def _seeds(cone: Array) -> list[int]:
     """Rows extreme in one coefficient: on a straight part these are its ends, and no other is ever needed."""
     return sorted({*cone.argmin(axis=0).tolist(), *cone.argmax(axis=0).tolist()}) if len(cone) else []
+
+
+def linear_programme(*problem: Any) -> Any:
+    """What HiGHS finds, its options narrow at first, wider where rounding leaves it without a verdict.
+
+    Args:
+        *problem: as for ``scipy.optimize.linprog``, up to the bounds.
+
+    Returns:
+        Its result: the status is 0 where a minimum was found, 2 where nothing is admissible.
+    """
+    # Imported here: it takes longer than the analysis of a scene that needs no linear programme.
+    from scipy.optimize import linprog
+
+    names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
+    for tolerance, presolve in product((DEFAULT.exact, DEFAULT.rounding), (False, True)):
+        options = {"presolve": presolve, **dict.fromkeys(names, tolerance)}
+        found = linprog(*problem, method="highs-ds", options=options)
+        if found.status in (0, 2):
+            break
+    return found

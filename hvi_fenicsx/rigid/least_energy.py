@@ -18,7 +18,8 @@ from mpi4py import MPI
 
 from ..runtime.mpi import on_root
 from ..typing import Array
-from .motions import DEFAULT, RigidThresholds
+from .cutting_planes import linear_programme
+from .motions import DEFAULT
 
 Energy = Callable[[Array], tuple[Array, Array]]
 """The convex energies of parts at amplitudes (k,): values (p,) and a subgradient of each, (p, k). Collective."""
@@ -74,14 +75,12 @@ class _CutModel:
     Attributes:
         work: minus the work of the load, (k,).
         sides: what contact leaves.
-        thresholds: what is small.
         heights: of the planes at a = 0, (p,) each.
         slopes: of the planes, (p, k) each.
     """
 
     work: Array
     sides: OneSidedSupports
-    thresholds: RigidThresholds
     heights: list[Array] = field(default_factory=list)
     slopes: list[Array] = field(default_factory=list)
 
@@ -139,12 +138,12 @@ class _CutModel:
         return _Step(
             target,
             float(self.work @ target + np.sum(level) + size * np.sum(found.x[k:])),
-            bool(np.max(np.abs(found.x[:k])) < 1.0 - self.thresholds.rounding),
+            bool(np.max(np.abs(found.x[:k])) < 1.0 - DEFAULT.rounding),
             -found.ineqlin.marginals[: len(room)],
         )
 
     def _solve(self, cost: Array, rows: Array, limits: Array, bounds: list[tuple[float | None, float | None]]) -> Any:
-        found = self.thresholds.linear_programme(cost, rows, limits, None, None, bounds)
+        found = linear_programme(cost, rows, limits, None, None, bounds)
         return found if found.status == 0 else None
 
     def rest(self, a: Array, reactions: Array) -> RestingPosition:
@@ -155,14 +154,12 @@ class _CutModel:
             reactions: of the sides, (m,).
         """
         room = self.sides.limits - self.sides.rows @ a
-        touching = np.flatnonzero(room <= self.thresholds.touching * self.size)
+        touching = np.flatnonzero(room <= DEFAULT.touching * self.size)
         first = touching[np.argsort(-reactions[touching], kind="stable")]
-        return RestingPosition(a, _independent(self.sides.rows, first, self.thresholds.touching))
+        return RestingPosition(a, _independent(self.sides.rows, first, DEFAULT.touching))
 
 
-def least_energy(
-    comm: MPI.Comm, work: Array, energy: Energy, sides: OneSidedSupports, thresholds: RigidThresholds = DEFAULT
-) -> RestingPosition | None:
+def least_energy(comm: MPI.Comm, work: Array, energy: Energy, sides: OneSidedSupports) -> RestingPosition | None:
     """Minimise work·a + Σ_p energy_p(a) over rows @ a <= limits. Collective; the same on all ranks.
 
     Args:
@@ -170,25 +167,23 @@ def least_energy(
         work: minus the work of the load, (k,).
         energy: of the parts.
         sides: what contact leaves.
-        thresholds: what is small, and when to give up.
 
     Returns:
         None where nothing stops the bodies, or no position is admissible.
     """
-    model = _CutModel(work, sides, thresholds)
+    model = _CutModel(work, sides)
     first = on_root(comm, model.feasible)
     return None if first is None else _descend(comm, model, energy, first)
 
 
 def _descend(comm: MPI.Comm, model: _CutModel, energy: Energy, best: Array) -> RestingPosition | None:
     """From an admissible position to the one of least energy. Collective."""
-    thresholds = model.thresholds
     reactions: Array = np.zeros(len(model.sides.limits))
     radius, lowest = model.size, model.cut(best, *energy(best))
-    tiny = thresholds.exact * max(float(np.max(np.abs(v), initial=0.0)) for v in (model.work, model.slopes[0]))
-    for _ in range(thresholds.max_rounds):
+    tiny = DEFAULT.exact * max(float(np.max(np.abs(v), initial=0.0)) for v in (model.work, model.slopes[0]))
+    for _ in range(DEFAULT.max_rounds):
         step = on_root(comm, functools.partial(model.minimise, best, radius))
-        if step is None or radius > thresholds.farthest:
+        if step is None or radius > 1.0 / DEFAULT.rounding:
             return None
         reactions = step.reactions
         if lowest - step.energy <= tiny:

@@ -14,8 +14,8 @@ from ..errors import InputError, SolverError
 from ..runtime.mpi import on_root
 from ..typing import Array
 from .branch_and_bound import GlobalProgramme
-from .cutting_planes import CuttingPlanes, Functional, Minimum, Polytope, ball, cross, vertices
-from .motions import DEFAULT, Mode, RigidThresholds, mode_of, modes, natural_basis, null_space, triangle
+from .cutting_planes import Functional, Minimum, Polytope, ball, cross, vertices
+from .motions import DEFAULT, Mode, mode_of, modes, natural_basis, null_space, triangle
 from .reduction import ReducedProblem, RigidProblem, reduce
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to, undecided
 
@@ -31,11 +31,6 @@ class Analysis:
 
     problem: RigidProblem
     reduced: ReducedProblem
-
-    @property
-    def thresholds(self) -> RigidThresholds:
-        """What counts as zero."""
-        return self.reduced.thresholds
 
     @cached_property
     def growth(self) -> Functional:
@@ -55,26 +50,26 @@ class Analysis:
     @cached_property
     def tie(self) -> float:
         """Works of less than this are zero: relative to the loads, without any to the laws."""
-        return self.thresholds.rounding * (self.reduced.load_scale or self._law_scale or 1.0)
+        return DEFAULT.rounding * (self.reduced.load_scale or self._law_scale or 1.0)
 
     @cached_property
     def programme(self) -> GlobalProgramme:
         """The shared cuts."""
         scale = self.reduced.load_scale + self._law_scale or 1.0
-        return GlobalProgramme(CuttingPlanes(self.reduced.frame, self.reduced.slips, scale, self.thresholds))
+        return GlobalProgramme(self.reduced.frame, self.reduced.slips, scale)
 
     @cached_property
     def loose(self) -> Array:
         """Orthonormal basis (k, q) of the motions that nothing holds."""
         rows = np.vstack([self.reduced.contact, *self._resisted()])
-        return null_space(triangle(rows), self.thresholds)
+        return null_space(triangle(rows))
 
     @cached_property
     def free(self) -> Array:
         """Orthonormal basis (k, q) of the motions that nothing holds and on which the load does no work."""
         loose = self.loose
         work = self.work @ loose
-        return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None], self.thresholds)
+        return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None])
 
     @property
     def gives_way(self) -> bool:
@@ -109,7 +104,7 @@ class Analysis:
 
     def _named(self, basis: Array) -> tuple[Mode, ...]:
         """The motions of a basis on the kernel's, as simple as they go."""
-        natural = natural_basis(self.reduced.frame @ basis, self.problem.body.shifts, self.thresholds)
+        natural = natural_basis(self.reduced.frame @ basis, self.problem.body.shifts)
         return modes(natural, self.problem.body)
 
     @property
@@ -119,7 +114,7 @@ class Analysis:
 
     def _limits(self, factor: float) -> bool:
         """Whether a load factor between none and all of the load."""
-        return self.thresholds.rounding < factor < 1.0
+        return DEFAULT.rounding < factor < 1.0
 
     def load_factors(self, loads: Collection[str]) -> LoadFactors:
         """The factors of some loads together, the others constant."""
@@ -197,11 +192,11 @@ class Analysis:
         """Unit rigid coefficients (3|6,) of y, small ones dropped if f stays as low and y in the cone."""
         z = self.reduced.frame @ y
         z, limit = z / np.abs(z).max(), self.programme.evaluate(f, y) / np.abs(z).max() + self.tie
-        for snap in self.thresholds.dropped_sizes():
+        for snap in (DEFAULT.dropped, DEFAULT.rounding):
             short = np.where(np.abs(z) <= snap, 0.0, z)
             trial = np.linalg.lstsq(self.reduced.frame, short, rcond=None)[0]
             off = max(np.abs(self.reduced.frame @ trial - short).max(), (f.cone @ trial).max(initial=0.0))
-            if off <= self.thresholds.rounding and self.programme.evaluate(f, trial) <= limit:
+            if off <= DEFAULT.rounding and self.programme.evaluate(f, trial) <= limit:
                 return np.asarray(short)
         return np.asarray(z)
 
@@ -217,7 +212,7 @@ class Analysis:
         gram = sum(
             (g for g, c in zip(self.reduced.traces, c4, strict=True) if c > 0.0), np.zeros((len(self.work),) * 2)
         )
-        corners = vertices(self.reduced.frame, self.thresholds.rounding) if c4.any() else ()
+        corners = vertices(self.reduced.frame, DEFAULT.rounding) if c4.any() else ()
         trace = max((float(y @ gram @ y) for y in corners), default=0.0)
         return float(np.sqrt(c4**2 @ self.reduced.areas * trace))
 
@@ -239,19 +234,18 @@ class Analysis:
 Result = TypeVar("Result")
 
 
-def analyse(comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds = DEFAULT) -> Solvability:
+def analyse(comm: MPI.Comm, problem: RigidProblem) -> Solvability:
     """The state of a scene and its margins, before anything is solved. Collective; the same on all ranks.
 
     Args:
         comm: the ranks of the mesh.
         problem: the body and what it meets.
-        thresholds: what counts as zero, and when to give up.
     """
     held = Solvability(state="held", paper=PaperConditions(0.0, None))  # no motion is left: held under any load
-    return _judged(comm, problem, thresholds, held, lambda found: _verdict(problem, found))
+    return _judged(comm, problem, held, lambda found: _verdict(problem, found))
 
 
-def gives_way(comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds = DEFAULT) -> bool:
+def gives_way(comm: MPI.Comm, problem: RigidProblem) -> bool:
     """Whether the load does more work along a rigid motion than the growth resists. Collective; the same on all ranks.
 
     The growth does not hold the body then, whatever the peak does. One minimum tells, where the whole verdict takes one
@@ -260,9 +254,8 @@ def gives_way(comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds
     Args:
         comm: the ranks of the mesh.
         problem: the body and what it meets.
-        thresholds: what counts as zero, and when to give up.
     """
-    return _judged(comm, problem, thresholds, False, lambda found: _gives_way(problem, found))
+    return _judged(comm, problem, False, lambda found: _gives_way(problem, found))
 
 
 def _gives_way(problem: RigidProblem, reduced: ReducedProblem) -> bool:
@@ -280,16 +273,13 @@ def _verdict(problem: RigidProblem, reduced: ReducedProblem) -> Solvability:
         return undecided(modes(reduced.frame, problem.body), analysis.paper_c, str(error))
 
 
-def load_factors(
-    comm: MPI.Comm, problem: RigidProblem, *loads: str, thresholds: RigidThresholds = DEFAULT
-) -> LoadFactors:
+def load_factors(comm: MPI.Comm, problem: RigidProblem, *loads: str) -> LoadFactors:
     """Factors of some loads together, the others constant. Collective; the same on all ranks.
 
     Args:
         comm: the ranks of the mesh.
         problem: the body and what it meets.
         loads: their names; none: the whole load.
-        thresholds: what counts as zero, and when to give up.
 
     Raises:
         InputError: there is no such load.
@@ -300,18 +290,17 @@ def load_factors(
         if name not in problem.loads:
             raise InputError(f"there is no load {name!r}; there are: {', '.join(problem.loads) or 'none'}")
     unmoved = LoadFactors(-np.inf, np.inf, np.inf, None, None)
-    return _judged(comm, problem, thresholds, unmoved, lambda found: Analysis(problem, found).load_factors(names))
+    return _judged(comm, problem, unmoved, lambda found: Analysis(problem, found).load_factors(names))
 
 
 def _judged(
     comm: MPI.Comm,
     problem: RigidProblem,
-    thresholds: RigidThresholds,
     unmoved: Result,
     work: Callable[[ReducedProblem], Result],
 ) -> Result:
     """What the work finds of the reduced problem; the given result where no rigid motion is left. Collective."""
-    basis, reduced = reduce(comm, problem, thresholds)
+    basis, reduced = reduce(comm, problem)
     if basis.shape[1] == 0:
         return unmoved
     return on_root(comm, lambda: work(cast(ReducedProblem, reduced)))

@@ -9,13 +9,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
 
 from ..typing import Array, Integers
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidThresholds:
+    """Limits of the analysis; everything it compares is nondimensional and of order 1.
+
+    Attributes:
+        rounding: what counts as zero: a singular value beside the largest, a coefficient of a motion, a margin beside
+            the work of the loads, a gap between value and lower bound that shrinks no more;
+            a body that has gone its inverse (times p0 L / E0) slides away.
+        exact: the same where rows have unit length and nothing was summed up: a row that constrains no motion, the
+            violation of one, an energy above the least one.
+        dropped: coefficients of at most this size may be left out of the motion that is named. So small a share of an
+            edge of a cone of slips, relative to the largest, is none.
+        max_rounds: linear programmes for one minimum (friction in 3D needs about 40), and divisions of a cone of slips.
+        touching: distance from its bound, over the largest bound, at which a vertex rests on it; part of a support's
+            row that must not be spanned by others.
+    """
+
+    rounding: float = 1e-9
+    exact: float = 1e-10
+    dropped: float = 1e-3
+    max_rounds: int = 2000
+    touching: float = 1e-7
+
+
+DEFAULT = RigidThresholds()
 
 
 @dataclass(frozen=True)
@@ -237,9 +263,7 @@ class FixedDirections:
     directions: Array
 
 
-def kernel(
-    comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections], thresholds: RigidThresholds = DEFAULT
-) -> Array:
+def kernel(comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections]) -> Array:
     """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
 
     First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
@@ -250,16 +274,15 @@ def kernel(
         comm: the ranks of the mesh.
         body: the body that moves.
         fixed: the conditions, on each rank its own.
-        thresholds: what counts as zero.
     """
     rows = np.vstack([np.zeros((0, body.motions)), *(_condition_rows(part, body) for part in fixed)])
     factors = comm.gather(triangle(rows), root=0)
-    basis = None if factors is None else _natural_null_space(np.vstack(factors), body.shifts, thresholds)
+    basis = None if factors is None else _natural_null_space(np.vstack(factors), body.shifts)
     return np.asarray(comm.bcast(basis, root=0))
 
 
-def _natural_null_space(rows: Array, shifts: int, thresholds: RigidThresholds) -> Array:
-    return natural_basis(null_space(rows, thresholds), shifts, thresholds)
+def _natural_null_space(rows: Array, shifts: int) -> Array:
+    return natural_basis(null_space(rows), shifts)
 
 
 def modes(basis: Array, body: Movable) -> tuple[Mode, ...]:
@@ -277,42 +300,40 @@ def triangle(rows: Array) -> Array:
     return np.asarray(np.linalg.qr(rows, mode="r")) if len(rows) else rows
 
 
-def null_space(rows: Array, thresholds: RigidThresholds = DEFAULT) -> Array:
+def null_space(rows: Array) -> Array:
     """Orthonormal basis (n, k) of {z: rows @ z = 0}.
 
     Args:
         rows: (m, n), m = 0 allowed.
-        thresholds: what counts as zero.
     """
     n = rows.shape[1]
     if not rows.any():
         return np.eye(n)
     _, values, right = np.linalg.svd(np.vstack([rows, np.zeros((n, n))]), full_matrices=False)
-    return np.asarray(right[values <= thresholds.rounding * values[0]].T)
+    return np.asarray(right[values <= DEFAULT.rounding * values[0]].T)
 
 
-def natural_basis(basis: Array, count: int, thresholds: RigidThresholds = DEFAULT) -> Array:
+def natural_basis(basis: Array, count: int) -> Array:
     """The same space by translations first, then rotations, see `kernel`.
 
     Args:
         basis: rigid coefficients (3|6, k), one column for each motion.
         count: how many of the coefficients are translations; they come first.
-        thresholds: what counts as zero.
     """
-    basis = np.where(np.abs(basis) <= thresholds.rounding, 0.0, basis)
-    shifts = _sparse_basis(basis[:count] @ null_space(basis[count:], thresholds), thresholds)
-    spins = _sparse_basis(basis[count:], thresholds)
-    lift = np.linalg.lstsq(basis[count:], spins, rcond=thresholds.rounding)[0]
+    basis = np.where(np.abs(basis) <= DEFAULT.rounding, 0.0, basis)
+    shifts = _sparse_basis(basis[:count] @ null_space(basis[count:]))
+    spins = _sparse_basis(basis[count:])
+    lift = np.linalg.lstsq(basis[count:], spins, rcond=DEFAULT.rounding)[0]
     centre = basis[:count] @ lift
     centre = centre - shifts @ (shifts.T @ centre)
     zeros = np.zeros((len(basis) - count, shifts.shape[1]))
     return _snap(np.hstack([np.vstack([shifts, zeros]), np.vstack([centre, spins])]))
 
 
-def _sparse_basis(vectors: Array, thresholds: RigidThresholds) -> Array:
+def _sparse_basis(vectors: Array) -> Array:
     """Orthonormal basis of the span of the columns (n, k) of `vectors`, along axes where it can be."""
     left, values, _ = np.linalg.svd(vectors, full_matrices=False)
-    span = left[:, values > thresholds.rounding]
+    span = left[:, values > DEFAULT.rounding]
     factor, upper = np.linalg.qr(_reduce(span))
     return _snap(factor * np.sign(np.diag(upper)))
 
@@ -402,66 +423,3 @@ def _metres(value: float, length: float) -> str:
 
 def _clean(value: float) -> float:
     return 0.0 if abs(value) < NEGLIGIBLE else float(value)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RigidThresholds:
-    """Limits of the analysis; everything it compares is nondimensional and of order 1.
-
-    Attributes:
-        rounding: what counts as zero: a singular value beside the largest, a coefficient of a motion, a margin beside
-            the work of the loads, a gap between value and lower bound that shrinks no more, a distance from an edge.
-        exact: the same where rows have unit length and nothing was summed up: a row that constrains no motion, the
-            violation of one, an energy above the least one.
-        dropped: coefficients of at most this size may be left out of the motion that is named; the largest is tried
-            first, then its tenths. So small a share of an edge of a cone of slips, relative to the largest, is none.
-        max_rounds: linear programmes for one minimum; friction in 3D needs about 40.
-        tight_gap: gap between value and lower bound, over the scale, that ends the search.
-        patience: linear programmes without a smaller gap after which it counts as shrinking no more.
-        shrunk: what a gap must fall to, of the last smallest, to count as smaller.
-        touching: distance from its bound, over the largest bound, at which a vertex rests on it; part of a support's
-            row that must not be spanned by others.
-        farthest: a displacement of so many times p0 L / E0 is a body that slides away.
-        max_cones: divisions of a cone of slips for one minimum, where a growth is not convex.
-        part_of_gap: how exactly the bound on such a cone is computed, relative to the gap that is left in all.
-    """
-
-    rounding: float = 1e-9
-    exact: float = 1e-10
-    dropped: float = 1e-3
-    max_rounds: int = 500
-    tight_gap: float = 1e-13
-    patience: int = 4
-    shrunk: float = 0.9
-    touching: float = 1e-7
-    farthest: float = 1e8
-    max_cones: int = 2_000
-    part_of_gap: float = 0.1
-
-    def dropped_sizes(self) -> list[float]:
-        """The sizes up to which coefficients may be left out, the largest first; all are above rounding."""
-        tenths = round(np.log10(self.dropped / self.rounding))
-        return [self.dropped / 10.0**k for k in range(tenths)]
-
-    def linear_programme(self, *problem: Any) -> Any:
-        """What HiGHS finds, its options narrow at first, wider where rounding leaves it without a verdict.
-
-        Args:
-            *problem: as for ``scipy.optimize.linprog``, up to the bounds.
-
-        Returns:
-            Its result: the status is 0 where a minimum was found, 2 where nothing is admissible.
-        """
-        # Imported here: it takes longer than the analysis of a scene that needs no linear programme.
-        from scipy.optimize import linprog
-
-        names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
-        for tolerance, presolve in product((self.exact, self.rounding), (False, True)):
-            options = {"presolve": presolve, **dict.fromkeys(names, tolerance)}
-            found = linprog(*problem, method="highs-ds", options=options)
-            if found.status in (0, 2):
-                break
-        return found
-
-
-DEFAULT = RigidThresholds()

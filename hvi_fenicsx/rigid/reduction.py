@@ -25,7 +25,6 @@ from .motions import (
     MotionFields,
     Movable,
     Places,
-    RigidThresholds,
     fields_at,
     kernel,
 )
@@ -149,7 +148,6 @@ class ReducedProblem:
         traces: ∫ y·y over each resistance's part as a quadratic form, (p, k, k).
         loads: by name, the work on the basis motions, (k,).
         load_scale: the largest work of the loads on any basis motion, or the sum of the absolute nodal forces.
-        thresholds: what counts as zero.
     """
 
     frame: Array
@@ -160,7 +158,6 @@ class ReducedProblem:
     traces: Array
     loads: Mapping[str, Array]
     load_scale: float
-    thresholds: RigidThresholds
 
     def functional(self, laws: tuple[Directional, ...]) -> Functional:
         """Σ_p ∫ law_p(slip) ds on the cone of contact and of infinite one-sided laws; factors of any sign."""
@@ -176,7 +173,7 @@ class ReducedProblem:
     def slip_rows(self, p: int) -> Array:
         """The slips of part p as rows (q, k) of length one; vanishing ones are left out."""
         rows = self.slips[p].rows
-        tiny = self.thresholds.exact * float(self.areas[p]) / max(len(rows), 1)
+        tiny = DEFAULT.exact * float(self.areas[p]) / max(len(rows), 1)
         return unit_rows(rows.reshape(-1, rows.shape[2]), tiny)
 
 
@@ -199,20 +196,17 @@ class _Rows:
         )
 
 
-def reduce(
-    comm: MPI.Comm, problem: RigidProblem, thresholds: RigidThresholds = DEFAULT
-) -> tuple[Array, ReducedProblem | None]:
+def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, ReducedProblem | None]:
     """The kernel's basis (3|6, k) everywhere, and on the root the reduced problem if k > 0. Collective.
 
     Args:
         comm: the ranks of the mesh.
         problem: the body and what it meets.
-        thresholds: what counts as zero.
     """
-    basis = kernel(comm, problem.body, problem.conditions(), thresholds)
+    basis = kernel(comm, problem.body, problem.conditions())
     if basis.shape[1] == 0:
         return basis, None
-    rows = comm.reduce(_own_rows(problem, basis, thresholds), op=_Rows.joined, root=0)  # in a tree
+    rows = comm.reduce(_own_rows(problem, basis), op=_Rows.joined, root=0)  # in a tree
     if rows is None:
         return basis, None
     moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in rows.slips]
@@ -226,14 +220,13 @@ def reduce(
         traces=rows.traces,
         loads=works,
         load_scale=max(problem.force, sum(float(np.abs(work).max()) for work in problem.loads.values())),
-        thresholds=thresholds,
     )
 
 
-def _own_rows(problem: RigidProblem, basis: Array, thresholds: RigidThresholds) -> _Rows:
+def _own_rows(problem: RigidProblem, basis: Array) -> _Rows:
     """What this rank has of the reduced problem."""
     normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.cones()]
-    contact = unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), thresholds.exact)
+    contact = unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), DEFAULT.exact)
     slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
     return _Rows(
         contact=np.unique(contact, axis=0),
