@@ -164,13 +164,13 @@ class AdaptiveSolver:
         found, start = level.solution.solve_result, None
         if found is not None:
             found = found if ahead is None else replace(found, u=ahead)
-            balance = level.solution.balance
+            obstacle = level.solution.obstacle
             start = CoarseStart(
                 system=level.prepared.system,
                 result=found,
                 prolongation=step,
                 levels=levels,
-                way=None if balance is None else balance.way * level.prepared.problem.scales.displacement,
+                way=None if obstacle is None else obstacle.way,
             )
         finer = find_solution(prepared, interrupted=self.interrupted, start=start)
         return AdaptiveLevel(prepared=prepared, solution=finer.estimated(), levels=finer.levels, step=step)

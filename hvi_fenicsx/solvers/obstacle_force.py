@@ -17,6 +17,7 @@ from scipy.optimize import newton
 
 from ..errors import InputError
 from ..problem.problem import BoundsForce, Problem
+from ..problem.scaling import Scales
 from ..runtime.log import logger
 from ..system.system import System
 from ..typing import Array
@@ -37,34 +38,49 @@ class _Ended(Exception):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ObstacleBalance:
-    """Where an obstacle is that a force presses, nondimensional.
+class PressedObstacle:
+    """An obstacle that a force presses, SI.
 
     Attributes:
-        name: of part and effect, such as ``lid.contact``.
-        way: by which it has moved along the force.
-        direction: unit vector of the force, (d,).
-        force: its size.
-        borne: what contact bears of it, along it.
+        part: the boundary part.
+        displacement: by which it has moved, m, (d,).
+        force: N/m in 2D, N in 3D, (d,).
+        borne: by contact, along the force, N/m or N.
         tolerance: relative, of the difference.
     """
 
-    name: str
-    way: float
-    direction: Array
-    force: float
+    part: str
+    displacement: Array
+    force: Array
     borne: float
     tolerance: float
 
     @property
+    def way(self) -> float:
+        """By which it has moved along the force, m."""
+        return float(self.displacement @ self.force / np.linalg.norm(self.force))
+
+    @property
     def difference(self) -> float:
-        """The difference of both, relative to the force."""
-        return abs(self.borne - self.force) / self.force
+        """Of what is borne from the force, relative to it."""
+        return float(abs(self.borne / np.linalg.norm(self.force) - 1.0))
 
     @property
     def passed(self) -> bool:
         """Whether contact bears the force."""
         return self.difference <= self.tolerance
+
+    def __str__(self) -> str:
+        unit = "N/m" if len(self.force) == 2 else "N"
+        moved, force = (", ".join(f"{value:.6g}" for value in vector) for vector in (self.displacement, self.force))
+        return (
+            f"moved by ({moved}) m by the force ({force}) {unit}; contact bears it but for {self.difference:.1e} of it"
+        )
+
+    def summary(self) -> dict[str, object]:
+        """The entry ``obstacle`` of ``summary.json``."""
+        vectors = {"displacement": self.displacement.tolist(), "force": self.force.tolist()}
+        return {"part": self.part, **vectors, "borne": self.borne, "difference": self.difference}
 
 
 def pressed(problem: Problem) -> BoundsForce | None:
@@ -83,7 +99,7 @@ def pressed(problem: Problem) -> BoundsForce | None:
     return found[0] if found else None
 
 
-def unsolved(problem: Problem, tolerance: float) -> ObstacleBalance | None:
+def unsolved(problem: Problem, tolerance: float) -> PressedObstacle | None:
     """Where nothing was found: the obstacle as it is described, contact bears nothing; None where no force presses one.
 
     Args:
@@ -92,8 +108,17 @@ def unsolved(problem: Problem, tolerance: float) -> ObstacleBalance | None:
     """
     if (force := pressed(problem)) is None:
         return None
-    return ObstacleBalance(
-        name=force.name, way=0.0, direction=force.direction, force=force.force, borne=0.0, tolerance=tolerance
+    return _obstacle(force, problem.scales, 0.0, 0.0, tolerance)
+
+
+def _obstacle(force: BoundsForce, scales: Scales, way: float, borne: float, tolerance: float) -> PressedObstacle:
+    """An obstacle by its way along the force and what is borne, both nondimensional."""
+    return PressedObstacle(
+        part=force.name.rpartition(".")[0],
+        displacement=way * scales.displacement * force.direction,
+        force=force.force * scales.force * force.direction,
+        borne=borne * scales.force,
+        tolerance=tolerance,
     )
 
 
@@ -125,7 +150,7 @@ class ObstacleForceSolve:
         assert force is not None
         self._task, self._system, self._force, self._counts = task, system, force, Counts()
 
-    def solve(self, start: CoarseStart | fem.Function | None = None) -> tuple[LevelSolution, ObstacleBalance]:
+    def solve(self, start: CoarseStart | fem.Function | None = None) -> tuple[LevelSolution, PressedObstacle]:
         """The solution and where the obstacle is. Collective.
 
         Args:
@@ -134,7 +159,7 @@ class ObstacleForceSolve:
         touch, force = self._first_touch(), self._force.force
         scales, way = self._system.problem.scales, start.way if isinstance(start, CoarseStart) else None
         first = touch + force if way is None else way / scales.displacement  # at first that of a block of this size
-        found: list[tuple[LevelSolution, ObstacleBalance]] = []
+        found: list[tuple[LevelSolution, PressedObstacle]] = []
 
         def excess(way: float) -> float:
             """What contact bears beyond the force, 0 within the tolerance; nothing where the obstacle touches."""
@@ -144,15 +169,15 @@ class ObstacleForceSolve:
                 raise _Ended
             new = self._at(way, found[-1][0] if found else start)
             self._counts.add(new.result.counts)
-            found.append((new, self._balance(new)))
+            found.append((new, self._pressed(new)))
             if not new.result.converged:
                 raise _Ended
-            return 0.0 if found[-1][1].passed else found[-1][1].borne - force
+            return 0.0 if found[-1][1].passed else found[-1][1].borne / scales.force - force
 
         with suppress(_Ended):
             newton(excess, touch, x1=first, tol=_DIGIT, rtol=_DIGIT, maxiter=_MOST, disp=False)
-        solution, balance = found[-1]
-        return self._told(solution, balance), balance
+        solution, obstacle = found[-1]
+        return self._told(solution, obstacle), obstacle
 
     def _first_touch(self) -> float:
         """The way after which the obstacle touches the body at rest; behind it where it would overlap. Collective."""
@@ -173,7 +198,7 @@ class ObstacleForceSolve:
             return nested_iteration.solve_from_displacement(task, system, start)
         return nested_iteration.solve(task, system)
 
-    def _balance(self, found: LevelSolution) -> ObstacleBalance:
+    def _pressed(self, found: LevelSolution) -> PressedObstacle:
         """What contact bears: what the body's energy gains by a unit of the obstacle's way. Collective."""
         system = found.system
         x = system.unknowns(found.result.u)
@@ -184,25 +209,18 @@ class ObstacleForceSolve:
                 free = ~np.isin(dofs, system.problem.fixed_here)  # at others the supports bear it
                 borne += float(np.sum((bounds.force.rate * sign * forces[dofs])[free]))
                 way = bounds.force.way
-        return ObstacleBalance(
-            name=self._force.name,
-            way=way,
-            direction=self._force.direction,
-            force=self._force.force,
-            borne=float(system.comm.allreduce(borne)),
-            tolerance=self._task.options.tolerance,
-        )
+        borne, tolerance = float(system.comm.allreduce(borne)), self._task.options.tolerance
+        return _obstacle(self._force, system.problem.scales, way, borne, tolerance)
 
-    def _told(self, found: LevelSolution, balance: ObstacleBalance) -> LevelSolution:
+    def _told(self, found: LevelSolution, obstacle: PressedObstacle) -> LevelSolution:
         """The solution with all counts; not converged where contact does not bear the force."""
-        _LOG.info(
-            "obstacle of %s: %d Newton steps, difference %.1e", balance.name, self._counts.newton, balance.difference
-        )
+        name, newton_steps = self._force.name, self._counts.newton
+        _LOG.info("obstacle of %s: %d Newton steps, difference %.1e", name, newton_steps, obstacle.difference)
         result = replace(found.result, counts=self._counts)
-        if result.converged and not balance.passed:
+        if result.converged and not obstacle.passed:
             reason = (
-                f"contact of {balance.name} bears {balance.borne / balance.force:.6g} of the force at all positions "
-                "that were tried; what it bears jumps there, or the laws give way"
+                f"contact of {name} bears {obstacle.borne / np.linalg.norm(obstacle.force):.6g} of the force at all "
+                "positions that were tried; what it bears jumps there, or the laws give way"
             )
             result = replace(result, converged=False, reason=reason)
         return replace(found, result=result)

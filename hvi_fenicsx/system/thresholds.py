@@ -89,7 +89,12 @@ class Thresholds:
     first_ramp: float = 1e-2
 
     def is_direct(self, unknowns: int, dimension: int) -> bool:
-        """Whether a direct solve is the faster one."""
+        """Whether a direct solve is the faster one.
+
+        Args:
+            unknowns: of the system.
+            dimension: 2 or 3.
+        """
         return unknowns <= self.largest_direct[dimension - 2]
 
 

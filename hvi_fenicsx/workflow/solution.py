@@ -16,8 +16,7 @@ from ..problem.problem import Problem
 from ..rigid import Solvability
 from ..runtime.cost import Timer
 from ..solvers.method import SolveResult
-from ..solvers.obstacle_force import ObstacleBalance
-from ..typing import Array
+from ..solvers.obstacle_force import PressedObstacle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,36 +30,6 @@ class LastBorne:
 
     factor: float
     whole_load: Solution
-
-
-@dataclass(frozen=True, kw_only=True)
-class PressedObstacle:
-    """An obstacle that a force presses, SI.
-
-    Attributes:
-        part: the boundary part.
-        displacement: by which it has moved, m, (d,).
-        force: N/m in 2D, N in 3D, (d,).
-        borne: by contact, along the force, N/m or N.
-        difference: of both, relative to the force.
-    """
-
-    part: str
-    displacement: Array
-    force: Array
-    borne: float
-    difference: float
-
-    def __str__(self) -> str:
-        unit = "N/m" if len(self.force) == 2 else "N"
-        moved, force = (", ".join(f"{value:.6g}" for value in vector) for vector in (self.displacement, self.force))
-        return (
-            f"moved by ({moved}) m by the force ({force}) {unit}; contact bears it but for {self.difference:.1e} of it"
-        )
-
-    def summary(self) -> dict[str, object]:
-        """The entry ``obstacle`` of ``summary.json``."""
-        return vars(self) | {"displacement": self.displacement.tolist(), "force": self.force.tolist()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +50,7 @@ class Solution:
         warnings: sentences about numbers that may be mistakes (:mod:`.plausible_problem`, :mod:`.plausibility`).
         last_borne: where none was found under the whole load, and problem, displacement and examination are those of
             the last state that is borne.
-        balance: where the obstacle is that a force presses, and whether contact bears it; None without one.
+        obstacle: the one that a force presses, and whether contact bears it; None without one.
     """
 
     scene: Model
@@ -96,7 +65,7 @@ class Solution:
     warnings: tuple[str, ...] = ()
     uniqueness: Uniqueness | None = None
     last_borne: LastBorne | None = None
-    balance: ObstacleBalance | None = None
+    obstacle: PressedObstacle | None = None
 
     @property
     def certificate(self) -> Certificate | None:
@@ -111,22 +80,8 @@ class Solution:
     @property
     def converged(self) -> bool:
         """Certified within the tolerance, under the whole load; the same on all ranks, not collective."""
-        borne = self.balance is None or self.balance.passed
+        borne = self.obstacle is None or self.obstacle.passed
         return borne and self.certificate is not None and self.certificate.passed
-
-    @property
-    def obstacle(self) -> PressedObstacle | None:
-        """The obstacle that a force presses, SI; None without one; the same on all ranks, not collective."""
-        if self.balance is None:
-            return None
-        found, scales = self.balance, self.problem.scales
-        return PressedObstacle(
-            part=found.name.rpartition(".")[0],
-            displacement=found.way * scales.displacement * found.direction,
-            force=found.force * scales.force * found.direction,
-            borne=found.borne * scales.force,
-            difference=found.difference,
-        )
 
     @property
     def exit_code(self) -> int:

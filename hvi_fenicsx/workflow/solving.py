@@ -26,7 +26,7 @@ from ..runtime.log import logger, newton_step, warn
 from ..solvers import frozen_mixity, nested_iteration, obstacle_force
 from ..solvers.method import Progress, SolveResult, SolveTask, checked, decides_stability, never, relative_width
 from ..solvers.nested_iteration import CoarseStart, LevelSolution
-from ..solvers.obstacle_force import ObstacleBalance
+from ..solvers.obstacle_force import PressedObstacle
 from ..system import existence, rigid_motions
 from ..system.multigrid import Levels
 from ..system.system import System, assemble
@@ -257,13 +257,13 @@ def find_solution(
     if prepared.solvability.state == "escapes":
         return FoundSolution(prepared=prepared, solution=unsolved(prepared), levels=())
     with prepared.timer("solve"):
-        solved, balance = _solved(prepared, prepared.task(progress, interrupted), start)
+        solved, obstacle = _solved(prepared, prepared.task(progress, interrupted), start)
     prepared, result, only = replace(prepared, system=solved.system), solved.result, None
     examination, warnings = _examined(prepared, result)
     if examination.certificate.passed:
         with prepared.timer("certificate"):
             only = uniqueness(prepared.system, result.u, examination)
-    found = _solution(prepared, result, examination, prepared.warnings + warnings, only, balance)
+    found = _solution(prepared, result, examination, prepared.warnings + warnings, only, obstacle)
     return FoundSolution(prepared=prepared, solution=found, levels=solved.levels)
 
 
@@ -317,7 +317,7 @@ def _solution(
     examination: Examination | None,
     warnings: tuple[str, ...],
     only: Uniqueness | None = None,
-    balance: ObstacleBalance | None = None,
+    obstacle: PressedObstacle | None = None,
 ) -> Solution:
     return Solution(
         scene=prepared.scene,
@@ -331,18 +331,18 @@ def _solution(
         epsilon=relative_width(prepared.options, prepared.system),
         timer=prepared.timer,
         warnings=warnings,
-        balance=balance,
+        obstacle=obstacle,
     )
 
 
 def _solved(
     prepared: Preparation, task: SolveTask, start: CoarseStart | fem.Function | None
-) -> tuple[LevelSolution, ObstacleBalance | None]:
+) -> tuple[LevelSolution, PressedObstacle | None]:
     """What the method found, zero where it broke down; and where an obstacle is that a force presses. Collective."""
-    system, options, balance = prepared.system, prepared.options, None
+    system, options, obstacle = prepared.system, prepared.options, None
     try:
         if obstacle_force.pressed(prepared.problem) is not None:
-            found, balance = obstacle_force.ObstacleForceSolve(task, system).solve(start)
+            found, obstacle = obstacle_force.ObstacleForceSolve(task, system).solve(start)
         elif isinstance(start, CoarseStart):
             found = nested_iteration.solve_from_coarser(task, system, start)
         elif start is not None:
@@ -352,7 +352,7 @@ def _solved(
         found = frozen_mixity.settled(task, found)
         if system.free_motions is not None:
             rigid_motions.remove_free_motions(prepared.problem, prepared.solvability.free, found.result.u)
-        return found, balance
+        return found, obstacle
     except SolverError as error:
         u = fem.Function(prepared.problem.space, name="displacement")
         result = SolveResult(u=u, method=options.method, converged=False, reason=str(error))
