@@ -1,4 +1,4 @@
-"""The programme that looks for the weights of a cell, and where its solution is far from the graphs of the laws.
+"""The programme that looks for the weights of a cell.
 
 Each law's point (xᵢ, tᵢ) is replaced by a mean over a few points of its graph, and bounds bear what they may. The least
 of xᵀMx - f·x + Σ (dᵢ xᵢ² + xᵢ tᵢ) over all such means in balance is zero at stationary points; the duals of the balance
@@ -21,21 +21,6 @@ from .relaxation import Relaxation
 from .scalar_problem import Box, ScalarProblem
 from .thresholds import EPSILON, LIMITS
 from .weighed_balance import Graphs, Split, weighed
-
-
-@dataclass(frozen=True, kw_only=True)
-class Guide:
-    """Where a mean is far from its graph, as an energy.
-
-    Attributes:
-        x: the means, (n,).
-        law: of each law, (n,).
-        bound: of each bound that pushes, although the mean has left it, (n,).
-    """
-
-    x: Array
-    law: Array
-    bound: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,27 +103,6 @@ class BalanceProgramme:
         """
         return -here.duals[0] * self._unit / self._force_scale, self._middle + self._half * here.x
 
-    def guide(self, here: Iterate) -> Guide:
-        """Where an iterate is far from the graphs.
-
-        Args:
-            here: the iterate.
-        """
-        n, points, d, free = self._problem.size, self._points, self._split.diagonal, self._low < self._high
-        shares, pushes = np.split(here.shares[: len(points.x) + len(self._push)], [len(points.x)])
-        total = np.maximum(np.bincount(points.owner, shares, n), 1e-300)
-        x, t, mean = (
-            np.bincount(points.owner, shares * what, n) / total
-            for what in (points.x, points.t, points.x * points.t + d[points.owner] * points.x**2)
-        )
-        x = np.clip(x, self._low, self._high)
-        bound = np.zeros(n)
-        forces = pushes * self._force_scale[self._pushed]
-        np.add.at(bound, self._pushed, forces * np.abs(x[self._pushed] - self._bounds))
-        law, size = x * t + d * x * x - mean, np.abs(x * t) + np.abs(d) * x * x
-        far = free & (law > LIMITS.same * size)
-        return Guide(x=x, law=np.where(far, law, 0.0), bound=np.where(free, bound, 0.0))
-
 
 def _points(graphs: Graphs, diagonal: Array) -> _Points:
     """The ends of arcs, and some points between them where h is convex."""
@@ -153,19 +117,6 @@ def _points(graphs: Graphs, diagonal: Array) -> _Points:
     return _Points(owner=owner, x=x, t=graphs.offset[owner, k] + graphs.slope[owner, k] * x)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Look:
-    """What a test leaves of a cell.
-
-    Attributes:
-        cell: the cell, made smaller.
-        guide: where it is to be divided; None if the programme failed.
-    """
-
-    cell: Box
-    guide: Guide | None
-
-
 class BalanceTest:
     """The test for one problem.
 
@@ -176,7 +127,7 @@ class BalanceTest:
     def __init__(self, relaxation: Relaxation) -> None:
         self._relaxation, self._problem = relaxation, relaxation.problem
 
-    def look(self, cell: Box, cut: Callable[[], bool] = lambda: False) -> Look | None:
+    def smaller(self, cell: Box, cut: Callable[[], bool] = lambda: False) -> Box | None:
         """What is left of a cell; None if no stationary point is in it.
 
         Args:
@@ -185,25 +136,23 @@ class BalanceTest:
         """
         split = Split.of(self._problem, self._relaxation.diagonal(cell.low, cell.high))
         if not np.isfinite(split.short):
-            return Look(cell=cell, guide=None)
-        programme = BalanceProgramme(self._problem, split, cell.low, cell.high)
-        best, last = None, None
-        for step, last in enumerate(programme.iterates()):
+            return cell
+        programme, best = BalanceProgramme(self._problem, split, cell.low, cell.high), None
+        for step, here in enumerate(programme.iterates()):
             if cut():
                 break
             if step % 3 == 0 and 4 * step >= LIMITS.most_steps:
-                proof = weighed(self._problem, split, (cell.low, cell.high), *programme.weights(last))
+                proof = weighed(self._problem, split, (cell.low, cell.high), *programme.weights(here))
                 if proof.excludes:
                     return None
                 if best is not None and not proof.total > best.total + LIMITS.enough * abs(best.total):
                     break
                 if np.isfinite(proof.total):
                     best = proof
-        guide = None if last is None else programme.guide(last)
         if best is None:
-            return Look(cell=cell, guide=guide)
-        smaller = best.smaller(cell.low, cell.high)
-        return None if smaller is None else Look(cell=Box.around(*smaller, cell.x), guide=guide)
+            return cell
+        ends = best.smaller(cell.low, cell.high)
+        return None if ends is None else Box.around(*ends, cell.x)
 
 
 @dataclass(frozen=True, kw_only=True)

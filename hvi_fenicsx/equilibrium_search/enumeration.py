@@ -19,7 +19,7 @@ from scipy.optimize import linprog
 from ..typing import Array, Integers, Mask
 from . import stationarity
 from .arcs import on_interval
-from .balance_programme import BalanceTest, Guide, Look
+from .balance_programme import BalanceTest
 from .convex_programme import minimise
 from .envelopes import envelopes
 from .relaxation import Relaxation
@@ -84,26 +84,24 @@ class Enumeration:
 
     def _divide(self, cell: Box) -> None:
         """Test a cell, keep its point, and put the parts of what is left on the stack."""
-        look = self._looked(cell)
-        if look is None:
+        left = self._smaller(cell)
+        if left is None:
             return
-        verdict = self._laws.verdict(look.cell)
+        verdict = self._laws.verdict(left)
         self.points.add(verdict.point)
         if not verdict.decided:
-            self.waiting += parts(self.problem, self._balance.pivots, look.cell, look.guide)
+            self.waiting += _far(self.problem, self._balance.pivots, left) or _any(self.problem, left)
 
-    def _looked(self, cell: Box) -> Look | None:
-        """The cell made smaller, and where to divide it; None if no stationary point is in it."""
-        look = Look(cell=cell, guide=None)
+    def _smaller(self, cell: Box) -> Box | None:
+        """The cell made smaller; None if no stationary point is in it."""
         for _ in range(LIMITS.most_rounds):
-            if (tight := self._tightened(look.cell)) is None:
+            if (tight := self._tightened(cell)) is None or (left := self._weighed.smaller(tight, self.cut)) is None:
                 return None
-            if (found := self._weighed.look(tight, self.cut)) is None:
-                return None
-            look = found
-            if self.cut() or not shorter(tight.low, tight.high, look.cell.low, look.cell.high).any():
+            gained = shorter(tight.low, tight.high, left.low, left.high).any()
+            cell = left
+            if self.cut() or not gained:
                 break
-        return look
+        return cell
 
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller by balances of forces; None if no stationary point is in it."""
@@ -230,21 +228,6 @@ def some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
     return None if any(e.status != 0 for e in ends) else np.asarray(0.5 * (ends[0].x + ends[1].x))
 
 
-def parts(problem: ScalarProblem, pivots: Integers, cell: Box, guide: Guide | None) -> list[Box]:
-    """The parts of a cell, the one to look at first last.
-
-    Args:
-        problem: the problem.
-        pivots: unknowns that fix the rigid motions.
-        cell: the cell.
-        guide: where means are far from the graphs of laws and bounds; None where that is not known.
-    """
-    found = _far(problem, pivots, cell)
-    if guide is not None:
-        found = found or _guided(problem, cell, guide)
-    return found or list(_any(problem, cell))
-
-
 def at_bounds(problem: ScalarProblem, cell: Box) -> Mask:
     """Where a bound of the problem can push, and the unknown is free to leave it.
 
@@ -270,59 +253,26 @@ def _far(problem: ScalarProblem, pivots: Integers, cell: Box) -> list[Box]:
     return [_with(cell, int(pivots[j]), first, last) for first, last in itertools.pairwise(marks)]
 
 
-def _guided(problem: ScalarProblem, cell: Box, guide: Guide) -> list[Box]:
-    """Parts where the mean is farthest from a graph."""
-    free = cell.low < cell.high
-    law, bound = np.where(free, guide.law, 0.0), np.where(free & at_bounds(problem, cell), guide.bound, 0.0)
-    i, j = int(np.argmax(law)), int(np.argmax(bound))
-    if max(law[i], bound[j]) <= 0.0:
-        return []
-    return list(off_bound(problem, cell, j) if bound[j] >= law[i] else _near(problem, cell, i, float(guide.x[i])))
-
-
-def _near(problem: ScalarProblem, cell: Box, i: int, x: float) -> Iterator[Box]:
-    """Parts at the joint that is nearest to a place; halves if there is none."""
-    joints = _joints(problem, cell, i)
-    if not joints:
-        return _halves(cell, i, 0.5 * float(cell.low[i] + cell.high[i]))
-    return _at_joint(problem, cell, i, *min(joints, key=lambda joint: abs(joint[0] - x)))
-
-
-def _any(problem: ScalarProblem, cell: Box) -> Iterator[Box]:
+def _any(problem: ScalarProblem, cell: Box) -> list[Box]:
     """Parts at a drop where there is one, else at a joint, else at a bound."""
     arcs = problem.arcs
     drops = arcs.drops(cell.low, cell.high)
-    if drops.any():
-        i = int(np.argmax(drops / np.maximum(np.diag(problem.stiffness), 1e-300)))
-        chosen = [joint for joint in _joints(problem, cell, i) if joint[1] < -problem.arcs.rounding[i]]
-        return _at_joint(problem, cell, i, *chosen[len(chosen) // 2])
-    joints = np.where(cell.low < cell.high, arcs.meets(cell.low, cell.high).sum(axis=1) - 1, -1)
-    if joints.max() > 0:
-        i = int(np.argmax(joints))
-        chosen = _joints(problem, cell, i)
-        return _at_joint(problem, cell, i, *chosen[len(chosen) // 2])
-    return off_bound(problem, cell, int(np.argmax(at_bounds(problem, cell))))
+    joints = np.where(cell.low < cell.high, arcs.meets(cell.low, cell.high).sum(axis=1) - 1, 0)
+    if not joints.any():
+        return list(off_bound(problem, cell, int(np.argmax(at_bounds(problem, cell)))))
+    i = int(np.argmax(drops / np.maximum(np.diag(problem.stiffness), 1e-300) if drops.any() else joints))
+    at, jump = _middle_joint(problem, cell, i, only_drops=bool(drops.any()))
+    halves = [_with(cell, i, float(cell.low[i]), at), _with(cell, i, at, float(cell.high[i]))]
+    # what is on a jump is looked at last: a minimiser is on no drop
+    return [_with(cell, i, at, at), *halves] if abs(jump) > arcs.rounding[i] else halves
 
 
-def _joints(problem: ScalarProblem, cell: Box, i: int) -> list[tuple[float, float]]:
-    """The joints of a law inside a cell, and the rise of its traction there."""
-    arcs = on_interval(problem.chains[i], float(cell.low[i]), float(cell.high[i]))
-    return [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in itertools.pairwise(arcs)]
-
-
-def _at_joint(problem: ScalarProblem, cell: Box, i: int, at: float, jump: float) -> Iterator[Box]:
-    if _jumps(problem, i, jump):  # looked at last: a minimiser is on no drop
-        yield _with(cell, i, at, at)
-    yield from _halves(cell, i, at)
-
-
-def _jumps(problem: ScalarProblem, i: int, jump: float) -> bool:
-    return abs(jump) > float(problem.arcs.rounding[i])
-
-
-def _halves(cell: Box, i: int, at: float) -> Iterator[Box]:
-    yield _with(cell, i, cell.low[i], at)
-    yield _with(cell, i, at, cell.high[i])
+def _middle_joint(problem: ScalarProblem, cell: Box, i: int, *, only_drops: bool) -> tuple[float, float]:
+    """Of the joints of a law inside a cell the one in the middle, and the rise of its traction there."""
+    inside = itertools.pairwise(on_interval(problem.chains[i], float(cell.low[i]), float(cell.high[i])))
+    joints = [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in inside]
+    chosen = [one for one in joints if not only_drops or one[1] < -problem.arcs.rounding[i]]
+    return chosen[len(chosen) // 2]
 
 
 def off_bound(problem: ScalarProblem, cell: Box, i: int) -> Iterator[Box]:
