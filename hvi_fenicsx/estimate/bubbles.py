@@ -293,11 +293,6 @@ class BubbleStiffness:
         self._inverse[at] = 1.0 / (1.0 / self._inverse[at] + rates.values[: len(at)])
         return strong
 
-    def times(self, e: Array) -> Array:
-        """A e of owned values (n, d), overwritten by the next product. Collective."""
-        self._owned(self._in)[:] = e
-        return self._product()
-
     def _product(self) -> Array:
         """A e of what the owned values are that products are made of; overwritten by the next one. Collective."""
         self._in.x.scatter_forward()

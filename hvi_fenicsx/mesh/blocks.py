@@ -24,7 +24,7 @@ from .. import compat
 from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
 from .domain import DEFAULT, Domain
-from .transfer import Numbers, Rows, Transfer, mean_rows, weighted_rows
+from .transfer import Numbers, Rows, Transfer, mean_rows, renumbered, weighted_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -330,9 +330,4 @@ def _numbered(flat: Numbers, space: fem.FunctionSpace, points: Array, size: Sequ
     """PETSc's (block) numbers of grid vertices, which any rank may have. Collective."""
     start, end = space.dofmap.index_map.local_range
     own = np.rint(_grid_places(points[: end - start], size, cells)).astype(PETSc.IntType)
-    found = PETSc.AO().createMemoryScalable(
-        _flat(own, np.asarray(cells, dtype=np.int64)).astype(PETSc.IntType),
-        np.arange(start, end, dtype=PETSc.IntType),
-        comm=space.mesh.comm,
-    )
-    return np.asarray(found.app2petsc(flat.ravel().astype(PETSc.IntType)).reshape(flat.shape))
+    return renumbered(space, _flat(own, np.asarray(cells, dtype=np.int64)), flat)

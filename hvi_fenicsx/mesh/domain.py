@@ -168,16 +168,13 @@ def _bounding_box(mesh: dmesh.Mesh) -> tuple[Array, Array]:
     return np.nanmin([g[0] for g in gathered], axis=0), np.nanmax([g[1] for g in gathered], axis=0)
 
 
-Kept = TypeVar("Kept")
-
-
 class SharedObjects:
     """Objects by name; of each name the last one, so that memory does not grow from problem to problem."""
 
     def __init__(self) -> None:
         self._kept: dict[str, tuple[Any, Any]] = {}
 
-    def get(self, comm: MPI.Comm, name: str, origin: Any, make: Callable[[], Kept]) -> Kept:
+    def get(self, comm: MPI.Comm, name: str, origin: Any, make: Callable[[], T]) -> T:
         """The object that was made from an equal origin, else a new one. Collective.
 
         Args:
@@ -190,7 +187,7 @@ class SharedObjects:
         if not all(agree(comm, known)):
             self._kept.pop(name, None)  # first, so that there are never two of them
             self._kept[name] = (origin, make())
-        found: Kept = self._kept[name][1]
+        found: T = self._kept[name][1]
         return found
 
 

@@ -1,13 +1,11 @@
 """What gmsh holds, as arrays, and whether it makes a mesh at all: dolfinx takes that for granted, or crashes.
 
-A mesh is folded where two cells lie on the same side of their common facet, or the cells about a vertex overlap. The
-order in which a file lists the vertices of a cell is no fold. Two bodies that lie on each other are none either.
-Light: gmsh's own process uses it.
+A mesh is folded where two cells lie on the same side of their common facet. The order in which a file lists the
+vertices of a cell is no fold. Two bodies that lie on each other are none either. Light: gmsh's own process uses it.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry import ROUNDING, spot
-from ..typing import Array, Entities, Integers, Mask
+from ..typing import Array, Entities, Integers
 
 _SIMPLEX = {1: {1: 1, 2: 2, 3: 4}, 2: {1: 8, 2: 9, 3: 11}}
 """Gmsh's element type of the simplex, by order and dimension."""
@@ -187,17 +185,12 @@ def _counted(rows: Integers) -> tuple[Integers, Integers]:
 
 
 def folded_cells(points: Array, cells: Integers) -> Integers:
-    """The cells at a fold, one or two of each; empty where the mesh has none.
+    """The two cells at each fold, those that lie on the same side of their common facet; empty where there is none.
 
     Args:
         points: the vertices, (n, d).
         cells: the vertices of each simplex, (c, d+1).
     """
-    return np.union1d(_over_facets(points, cells), _around_vertices(points, cells))
-
-
-def _over_facets(points: Array, cells: Integers) -> Integers:
-    """The pairs of cells that lie on the same side of their common facet."""
     corners = range(cells.shape[1])
     facets = np.sort(np.concatenate([np.delete(cells, i, axis=1) for i in corners]), axis=1)
     opposite = np.concatenate([cells[:, i] for i in corners])
@@ -205,16 +198,7 @@ def _over_facets(points: Array, cells: Integers) -> Integers:
     side = np.sign(_volumes(edges))
     order = np.lexsort(facets.T)
     same = np.all(facets[order[1:]] == facets[order[:-1]], axis=1) & (side[order[1:]] == side[order[:-1]])
-    return np.concatenate([order[1:][same], order[:-1][same]]) % len(cells)
-
-
-def _around_vertices(points: Array, cells: Integers) -> Integers:
-    """A cell of each vertex about which the cells fill more than the full angle."""
-    angles = np.column_stack([_angles(points, np.roll(cells, -i, axis=1)) for i in range(cells.shape[1])])
-    total = np.bincount(cells.ravel(), weights=angles.ravel(), minlength=len(points))
-    full = 2.0 * math.pi * (cells.shape[1] - 2)
-    over: Mask = total > full * (1.0 + ROUNDING)
-    return np.flatnonzero(np.any(over[cells], axis=1))
+    return np.unique(np.concatenate([order[1:][same], order[:-1][same]]) % len(cells))
 
 
 def _volumes(edges: Array) -> Array:
@@ -222,16 +206,3 @@ def _volumes(edges: Array) -> Array:
     if edges.shape[1] == 2:
         return edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     return np.einsum("ki,ki->k", np.cross(edges[:, 0], edges[:, 1]), edges[:, 2])
-
-
-def _angles(points: Array, cells: Integers) -> Array:
-    """The angle of each triangle, the solid angle of each tetrahedron at its first vertex, (c,)."""
-    edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    edges /= np.linalg.norm(edges, axis=2, keepdims=True)
-    volume = np.abs(_volumes(edges))
-    first, second = edges[:, 0], edges[:, 1]
-    if edges.shape[1] == 2:
-        return np.arctan2(volume, np.sum(first * second, axis=1))
-    third = edges[:, 2]
-    cosines = (np.sum(a * b, axis=1) for a, b in ((first, second), (second, third), (third, first)))
-    return 2.0 * np.arctan2(volume, 1.0 + sum(cosines))

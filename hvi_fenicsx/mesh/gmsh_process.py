@@ -117,10 +117,7 @@ def _name(gmsh: Any, path: Path, dimension: int, tag: int) -> str:
         return gmsh.model.getPhysicalName(dimension, tag) or str(tag)
     except UnicodeDecodeError as error:
         shown = error.object.decode("latin-1")
-        line = path.read_bytes().partition(error.object)[0].count(b"\n") + 1
-        raise InputError(
-            f"mesh file {path}:{line}: the name {shown!r} is not in UTF-8; save the file as UTF-8"
-        ) from None
+        raise InputError(f"mesh file {path}: the name {shown!r} is not in UTF-8; save the file as UTF-8") from None
 
 
 def _within_surface(gmsh: Any, given: Any) -> tuple[Array, Integers]:

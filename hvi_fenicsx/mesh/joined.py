@@ -25,7 +25,7 @@ from ..typing import Array, Entities, Integers
 from . import facets as cell_facets
 from . import nodes
 from .domain import Coarsening, Domain
-from .transfer import Rows, Transfer, barycentric_weights
+from .transfer import Rows, Transfer, barycentric_weights, renumbered
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,11 +221,7 @@ def _selection(space: fem.FunctionSpace, common: fem.FunctionSpace, numbers: Int
     d, here = common.dofmap.index_map_bs, space.dofmap.index_map.size_local
     wanted = _by_dof(space, numbers)[:here]
     known = _by_dof(common, np.asarray(common.mesh.geometry.input_global_indices, dtype=np.int64))
-    start, end = common.dofmap.index_map.local_range
-    order = PETSc.AO().createMemoryScalable(
-        known[: end - start].astype(PETSc.IntType), np.arange(start, end, dtype=PETSc.IntType), comm=common.mesh.comm
-    )
-    blocks = np.asarray(order.app2petsc(wanted.astype(PETSc.IntType)))
+    blocks = renumbered(common, known[: common.dofmap.index_map.size_local], wanted)
     columns = (blocks[:, None] * d + np.arange(d)).ravel().astype(PETSc.IntType)
     sizes = [(m.size_local * d, m.size_global * d) for m in (space.dofmap.index_map, common.dofmap.index_map)]
     rows = np.arange(here * d + 1, dtype=PETSc.IntType)

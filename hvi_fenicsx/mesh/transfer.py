@@ -139,6 +139,19 @@ class InterpolationTransfer(Transfer):
         return weighted_rows(corners, weights, fine.dofmap.index_map_bs)
 
 
+def renumbered(space: fem.FunctionSpace, own: Numbers, wanted: Numbers) -> Numbers:
+    """PETSc's numbers of blocks which any rank may have. Collective.
+
+    Args:
+        space: of the blocks.
+        own: other numbers of the blocks that this rank owns.
+        wanted: the others' numbers to look for, of any shape.
+    """
+    places = np.arange(*space.dofmap.index_map.local_range, dtype=PETSc.IntType)
+    order = PETSc.AO().createMemoryScalable(own.astype(PETSc.IntType), places, comm=space.mesh.comm)
+    return np.asarray(order.app2petsc(wanted.ravel().astype(PETSc.IntType))).reshape(wanted.shape)
+
+
 def weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
     """Compressed rows of a matrix of weighted sums, component by component.
 

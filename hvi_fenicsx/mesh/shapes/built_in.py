@@ -266,6 +266,11 @@ class HalfDisk(Round):
         return Outline([(-r, r), (0.0, 0.0), (r, r)], sides, [coarse, self.finest, coarse])
 
 
+def _check_smaller(name: str, part: tuple[float, float], size: tuple[float, float]) -> None:
+    if part[0] >= size[0] or part[1] >= size[1]:
+        raise validation_error([Mistake((name,), "must be smaller than size in both directions")])
+
+
 class LShape(PlaneShape):
     """An L: a rectangle without a smaller rectangle at its upper right corner."""
 
@@ -285,8 +290,7 @@ class LShape(PlaneShape):
 
     @model_validator(mode="after")
     def _leaves_an_l(self) -> Self:
-        if self.cut[0] >= self.size[0] or self.cut[1] >= self.size[1]:
-            raise validation_error([Mistake(("cut",), "must be smaller than size in both directions")])
+        _check_smaller("cut", self.cut, self.size)
         return self
 
     def outline(self) -> Outline:
@@ -312,8 +316,7 @@ class NotchedStrip(PlaneShape):
 
     @model_validator(mode="after")
     def _leaves_a_strip(self) -> Self:
-        if self.notch[0] >= self.size[0] or self.notch[1] >= self.size[1]:
-            raise validation_error([Mistake(("notch",), "must be smaller than size in both directions")])
+        _check_smaller("notch", self.notch, self.size)
         return self
 
     def outline(self) -> Outline:

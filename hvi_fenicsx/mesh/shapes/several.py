@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
@@ -36,11 +36,8 @@ _PLACE = ("origin", "angle")
 
 def _refuse_unknown_keys(table: Mapping[str, Any]) -> None:
     """Refuse what neither the shape nor its place knows: the shape itself would not name the keys of the place."""
-    name = table.get("shape")
-    kind = DomainShape.registry.get(name) if isinstance(name, str) else None
-    if kind is None:
-        return
-    keys = [*kind.model_fields, *_PLACE]
+    kind = DomainShape.registry.get(str(table.get("shape")))
+    keys = [*kind.model_fields, *_PLACE] if kind else list(table)
     if mistakes := [Mistake((key,), unknown("key", key, keys)) for key in table if key not in keys]:
         raise validation_error(mistakes)
 
@@ -100,10 +97,8 @@ class PlacedShape(Table):
             raise InputError(
                 f"domain.{name}: its mesh has {d} dimensions; origin wants {d} numbers, angle only suits 2"
             )
-        rotation = np.eye(d)
-        if self.angle:
-            c, s = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
-            rotation = np.array([[c, -s], [s, c]])
+        c, s = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
+        rotation = np.array([[c, -s], [s, c]]) if self.angle else np.eye(d)
         return PlacedBody(name=name, domain=domain, origin=origin, rotation=rotation)
 
 
@@ -242,8 +237,4 @@ class SeveralBodies(DomainShape):
 
     def files(self) -> tuple[Path, ...]:
         """The files of all bodies."""
-        return tuple(self._files())
-
-    def _files(self) -> Iterator[Path]:
-        for body in self.bodies.values():
-            yield from body.form.files()
+        return tuple(file for body in self.bodies.values() for file in body.form.files())
