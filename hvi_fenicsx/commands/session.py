@@ -97,7 +97,7 @@ def execute(
         with display():
             with log.handled(*run_logs):
                 code = work(Session(options, scene, folder, timer, interrupted))
-            on_root(COMM, lambda: [run_log.finish() for run_log in run_logs])
+            on_root(COMM, lambda: run_logs[0].finish())
             folder.commit(scene)
             say(console.warnings([*folder.kept, *petsc_options.unread(options.petsc)]))
             first = on_root(COMM, lambda: f"; open {PAGE} there" if (target / PAGE).is_file() else "")

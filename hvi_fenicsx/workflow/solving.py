@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from ..certify import certificate, plausibility
 from ..certify.certificate import Examination
-from ..certify.uniqueness import Uniqueness, uniqueness
+from ..certify.uniqueness import uniqueness
 from ..errors import SolverError
 from ..estimate import estimator
 from ..estimate.estimator import estimate
@@ -258,12 +258,11 @@ def find_solution(
         return FoundSolution(prepared=prepared, solution=unsolved(prepared), levels=())
     with prepared.timer("solve"):
         solved, obstacle = _solved(prepared, prepared.task(progress, interrupted), start)
-    prepared, result, only = replace(prepared, system=solved.system), solved.result, None
-    examination, warnings = _examined(prepared, result)
-    if examination.certificate.passed:
+    prepared, result = replace(prepared, system=solved.system), solved.result
+    found = replace(certified(prepared, result), obstacle=obstacle)
+    if found.examination is not None and found.examination.certificate.passed:
         with prepared.timer("certificate"):
-            only = uniqueness(prepared.system, result.u, examination)
-    found = _solution(prepared, result, examination, prepared.warnings + warnings, only, obstacle)
+            found = replace(found, uniqueness=uniqueness(prepared.system, result.u, found.examination))
     return FoundSolution(prepared=prepared, solution=found, levels=solved.levels)
 
 
@@ -274,12 +273,6 @@ def certified(prepared: Preparation, found: SolveResult) -> Solution:
         prepared: the scene.
         found: the displacement.
     """
-    examination, warnings = _examined(prepared, found)
-    return _solution(prepared, found, examination, prepared.warnings + warnings)
-
-
-def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, tuple[str, ...]]:
-    """The certificate of a result, and warnings about the solution. Collective."""
     with prepared.timer("certificate"):
         examination = examine(prepared, found.u)
         warnings = plausibility.of_solution(prepared.problem, examination, found.u)
@@ -287,7 +280,8 @@ def _examined(prepared: Preparation, found: SolveResult) -> tuple[Examination, t
     proof = examination.certificate
     verdict = "passed" if proof.passed else "not passed"
     _LOG.info("certificate %s (%g): %s", verdict, proof.tolerance, proof)
-    return examination, warnings
+    solution = unsolved(prepared)
+    return replace(solution, solve_result=found, examination=examination, warnings=solution.warnings + tuple(warnings))
 
 
 def examine(prepared: Preparation, u: fem.Function) -> Examination:
@@ -308,30 +302,17 @@ def unsolved(prepared: Preparation) -> Solution:
     Args:
         prepared: the scene.
     """
-    return _solution(prepared, None, None, prepared.warnings)
-
-
-def _solution(
-    prepared: Preparation,
-    found: SolveResult | None,
-    examination: Examination | None,
-    warnings: tuple[str, ...],
-    only: Uniqueness | None = None,
-    obstacle: PressedObstacle | None = None,
-) -> Solution:
     return Solution(
         scene=prepared.scene,
         problem=prepared.problem,
         solvability=prepared.solvability,
-        solve_result=found,
-        examination=examination,
+        solve_result=None,
+        examination=None,
         estimate=None,
-        uniqueness=only,
         dofs=prepared.system.dofs,
         epsilon=relative_width(prepared.options, prepared.system),
         timer=prepared.timer,
-        warnings=warnings,
-        obstacle=obstacle,
+        warnings=prepared.warnings,
     )
 
 
