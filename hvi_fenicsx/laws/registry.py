@@ -113,13 +113,8 @@ def require_number(owner: str, **parameters: Any) -> None:
         InputError: with the first that is none.
     """
     for key, value in parameters.items():
-        if isinstance(value, bool) or not isinstance(value, Real) or not _is_finite(value):
+        if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= sys.float_info.max:
             raise InputError(f"{owner}: {key} = {value!r} is not usable; give a finite number")
-
-
-def _is_finite(value: Any) -> bool:
-    """Whether a number is finite as a float; whole numbers may be larger than any."""
-    return bool(abs(value) <= sys.float_info.max)
 
 
 def require_positive(owner: str, **parameters: object) -> None:

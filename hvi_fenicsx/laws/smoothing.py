@@ -148,11 +148,6 @@ class SmoothedLaw(Superpotential, register=False):
         """Bound of |S - j|, N/m."""
 
     @property
-    def epsilon(self) -> float:
-        """ε relative to the law's energy scale."""
-        return self.epsilon_absolute / self.law.energy_scale
-
-    @property
     @override
     def growth(self) -> Directional:
         return self.law.growth
