@@ -6,12 +6,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
@@ -48,9 +48,10 @@ def path_chart(result: PathResult) -> Figure:
     """
     assert result.driven is not None
     u, force = result.along(result.driven)
-    pulled = bool(np.any(force))
+    pulled, name = bool(np.any(force)), "N" if len(result.axes) == 3 else "N/m"
     load = force if pulled else result.columns["factor"]
-    units = unit_for(float(np.max(np.abs(u))), "m"), _unit(result, load) if pulled else Unit(1.0, "")
+    units = [unit_for(float(np.max(np.abs(u))), "m")]
+    units += [unit_for(float(np.max(np.abs(load))), name) if pulled else Unit(1.0, "")]
     fig = figure(5.8)
     titled(fig, result.title, _path_subject(result), *_path_verdict(result))
     axes = fig.add_subplot()
@@ -66,17 +67,10 @@ def path_chart(result: PathResult) -> Figure:
     return fig
 
 
-def _unit(result: PathResult, force: Array) -> Unit:
-    return unit_for(float(np.max(np.abs(force))), "N" if len(result.axes) == 3 else "N/m")
-
-
 def _path_subject(result: PathResult) -> str:
-    path = result.path
-    return f"load path · largest factor {path['peak_factor']:.5g} · {_events(path['events'] + path['folds'])}"
-
-
-def _events(count: int) -> str:
-    return "1 event" if count == 1 else f"{count} events"
+    count = result.path["events"] + result.path["folds"]
+    events = "1 event" if count == 1 else f"{count} events"
+    return f"load path · largest factor {result.path['peak_factor']:.5g} · {events}"
 
 
 def _path_verdict(result: PathResult) -> tuple[str, str]:
@@ -88,9 +82,9 @@ def _path_verdict(result: PathResult) -> tuple[str, str]:
 
 
 def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
-    """The curve, each kind of it as one line that has gaps."""
+    """The curve, each kind of it in its own look."""
     jump = np.array([event == "jump" for event in result.events[1:]], dtype=bool)
-    stable = result.stable[:-1] & ~jump
+    stable, points = result.stable[:-1] & ~jump, np.column_stack([x, y])
     kinds: tuple[tuple[Mask, str, dict[str, Any]], ...] = (
         (stable, "stable", {"color": BLUE, "ls": "-", "lw": 2.4, "zorder": 3}),
         (~stable & ~jump, "unstable", {"color": VERMILION, "ls": (0, (4, 2)), "lw": 1.5, "zorder": 2}),
@@ -98,38 +92,25 @@ def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
     )
     for kind, name, look in kinds:
         if np.any(kind):
-            axes.plot(*_with_gaps(x, y, kind), label=name, **look)
+            axes.add_collection(LineCollection(np.stack([points[:-1], points[1:]], axis=1)[kind], label=name, **look))
 
 
-def _with_gaps(x: Array, y: Array, chosen: Mask) -> tuple[Array, Array]:
-    """The chosen stretches between neighbouring rows, others left out."""
-    points = np.column_stack([x, y])
-    parts = [np.vstack([points[at : at + 2], [[np.nan, np.nan]]]) for at in np.flatnonzero(chosen)]
-    joined = np.vstack(parts)
-    return joined[:, 0], joined[:, 1]
-
-
-def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: tuple[Unit, Unit]) -> None:
+def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: Sequence[Unit]) -> None:
     """Events as dots, the largest force, turns and the end by name."""
-    events = np.flatnonzero([e in ("kink", "contact", "release", "fold") for e in result.events])
-    shown = events[:: max(1, -(-len(events) // _DOTS))]
-    if len(shown):
-        axes.plot(x[shown], y[shown], "o", color=INK, ms=3.4, alpha=0.8, mew=0, zorder=4, label="event")
+    events = np.array(result.events)
+    dots = np.flatnonzero(np.isin(events, ("kink", "contact", "release", "fold")))
     look: dict[str, Any] = {"ls": "", "ms": 9, "mec": "white", "mew": 0.8, "zorder": 6}
-    peak = int(np.argmax(y))
+    peak, end = int(np.argmax(y)), str(result.path["end"])
     load = f"{number(y[peak], 4)} {units[1].name}".rstrip()
     words = f"peak {load} at {number(x[peak], 4)} {units[0].name}"
     axes.plot(x[peak], y[peak], marker=CARETDOWN, color=PURPLE, label=words, **{**look, "ms": 12})
-    for row, marker, colour, text in _named(result):
-        axes.plot(x[row], y[row], marker=marker, color=colour, label=text, **look)
-
-
-def _named(result: PathResult) -> Iterator[tuple[int, str, str, str | None]]:
-    """Turns and the end: row, mark, colour and words."""
-    for count, row in enumerate(n for n, event in enumerate(result.events) if event == "turn"):
-        yield row, "s", INK, None if count else "turn"
-    if result.path["end"] != "reached":
-        yield len(result.events) - 1, "X", VERMILION, str(result.path["end"])
+    if len(dots):
+        few, small = -(-len(dots) // _DOTS), {**look, "ms": 3.4, "mew": 0, "zorder": 4}
+        axes.plot(x[dots], y[dots], marker="o", color=INK, alpha=0.8, markevery=few, label="event", **small)
+    if len(turns := np.flatnonzero(events == "turn")):
+        axes.plot(x[turns], y[turns], marker="s", color=INK, label="turn", **look)
+    if end != "reached":
+        axes.plot(x[-1], y[-1], marker="X", color=VERMILION, label=end, **look)
 
 
 def equilibria_chart(result: EquilibriaResult) -> Figure:
@@ -166,8 +147,7 @@ def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None
         mark, face = _KINDS.get(row["kind"], _OTHER)
         axes.plot(value, i, mark, color=INK, mfc=face, ms=9, clip_on=False)
     spread = float(values[-1]) or 1.0
-    axes.set_xlim(-0.06 * spread, 1.06 * spread)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set(xlim=(-0.06 * spread, 1.06 * spread), ylim=(len(rows) - 0.5, -0.5))
     axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
     axes.xaxis.set_major_locator(MaxNLocator(2) if spread != 1.0 or values[-1] else FixedLocator([0.0]))
     axes.tick_params(axis="y", length=0)
@@ -178,20 +158,16 @@ def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) ->
     """A strip for each equilibrium: the piece of the law at each vertex, and a line below where it has lifted off."""
     longest = max(map(len, states))
     for i, (row, vertices) in enumerate(zip(rows, states, strict=True)):
-        colours = np.array([[to_rgb(_colour(v)) for v in vertices]])
-        axes.imshow(colours, extent=(-0.5, len(vertices) - 0.5, i + 0.26, i - 0.26), aspect="auto", zorder=1)
-        edges = np.arange(len(vertices) - 1) + 0.5
-        axes.vlines(edges, i - 0.26, i + 0.26, color="white", lw=0.8 if longest < 80 else 0.2)
+        at, colours = np.arange(len(vertices)), [_colour(vertex) for vertex in vertices]
+        axes.bar(at, 0.52, 1.0, i - 0.26, color=colours, ec="white", lw=0.8 if longest < 80 else 0.2)
         lifted = np.flatnonzero([_is_lifted(vertex) for vertex in vertices])
         axes.hlines(np.full(len(lifted), i + 0.34), lifted - 0.5, lifted + 0.5, color=INK, lw=3.0)
         words = f"{row['kind']}, {row['broken']} broken"
         axes.text(0.0, i - 0.3, words, transform=axes.get_yaxis_transform(), va="bottom", size=10, color=GREY)
-    axes.set_xlim(-0.5, longest - 0.5)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_yticks([])
+    axes.set(xlim=(-0.5, longest - 0.5), ylim=(len(rows) - 0.5, -0.5), yticks=[])
+    axes.set_xlabel("vertex along the contact parts")
     axes.spines[["left"]].set_visible(False)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("vertex along the contact parts")
 
 
 def _is_lifted(vertex: Row) -> bool:
@@ -206,20 +182,19 @@ def _branch(vertex: Row) -> str:
 
 def _colour(vertex: Row) -> str:
     branch = _branch(vertex)
-    if not branch:
-        return PALE
-    return VERMILION if branch == "-1" else _PIECES[int(branch) % len(_PIECES)]
+    return {"": PALE, "-1": VERMILION}.get(branch) or _PIECES[int(branch) % len(_PIECES)]
 
 
 def _legend(fig: Figure, kinds: Sequence[str], states: Sequence[Sequence[Row]]) -> None:
-    found = sorted({_branch(v) for vertices in states for v in vertices} - {"", "-1"}, key=int)
-    marks = {kind: _KINDS.get(kind, _OTHER) for kind in kinds}
-    handles: list[Patch | Line2D] = [
-        Line2D([], [], marker=mark, color=INK, mfc=face, ls="", label=kind) for kind, (mark, face) in marks.items()
-    ]
-    handles += [Patch(color=_PIECES[int(b) % len(_PIECES)], label=f"piece {int(b) + 1} of the law") for b in found[:4]]
-    if any(_branch(v) == "-1" for vertices in states for v in vertices):
-        handles.append(Patch(color=VERMILION, label="on a kink or drop"))
-    if any(_is_lifted(v) for vertices in states for v in vertices):
+    vertices = [vertex for state in states for vertex in state]
+    found = {_branch(vertex): _colour(vertex) for vertex in vertices}
+    handles: list[Patch | Line2D] = []
+    for kind in kinds:
+        mark, face = _KINDS.get(kind, _OTHER)
+        handles.append(Line2D([], [], marker=mark, color=INK, mfc=face, ls="", label=kind))
+    for branch in sorted(set(found) - {""}, key=int):
+        words = "on a kink or drop" if branch == "-1" else f"piece {int(branch) + 1} of the law"
+        handles.append(Patch(color=found[branch], label=words))
+    if any(map(_is_lifted, vertices)):
         handles.append(Line2D([], [], color=INK, lw=3.0, label="lifted off"))
     fig.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=10, handlelength=1.2)
