@@ -29,16 +29,14 @@ from .thresholds import LIMITS
 
 def scalar_problem(
     problem: CondensedProblem,
-    factor: float = 1.0,
     *,
     tolerance: float | None = None,
     within: Array | None = None,
 ) -> ScalarProblem:
-    """The problem at a load factor. Of energies that depend on the mode one nearby, as these have no potential.
+    """The problem under the whole load. Of energies that depend on the mode one nearby, as these have no potential.
 
     Args:
         problem: the condensed problem.
-        factor: λ.
         tolerance: energy by which curved laws may differ from their polylines, altogether; None: a coarse one.
         within: displacements up to which curved laws are followed, (n,); None: far beyond all that the laws tell apart.
 
@@ -46,7 +44,7 @@ def scalar_problem(
         InputError: a law acts on the length of a vector whose components have other laws.
     """
     far = np.full(problem.size, _far(problem.bonds)) if within is None else within
-    laws = _Laws.of(problem, _graphs(problem.bonds, far, tolerance), problem.constant_at(factor))
+    laws = _Laws.of(problem, _graphs(problem.bonds, far, tolerance), problem.constant_at(1.0))
     vectors = [argument for argument in laws.chains if argument.radial]
     _refuse_overlap(problem, laws.chains)
     unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
@@ -55,7 +53,7 @@ def scalar_problem(
     lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, LIMITS.zero)
     return ScalarProblem(
         stiffness=without_resistance(problem.stiffness),
-        force=problem.load(factor),
+        force=problem.load(1.0),
         lower=lower,
         upper=upper,
         chains=whole,

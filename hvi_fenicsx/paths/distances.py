@@ -23,11 +23,9 @@ class Distances:
     Args:
         problem: the problem.
         remember: numbers of the problem's bonds that remember.
-        rounding: a displacement this near to a break of a law, or to a bound, may be there.
     """
 
-    def __init__(self, problem: CondensedProblem, remember: Collection[int], rounding: float = DEFAULT.reached) -> None:
-        self._rounding = rounding
+    def __init__(self, problem: CondensedProblem, remember: Collection[int]) -> None:
         self._factors = factors(problem)
         self._problem = multiplied(problem, self._factors)
         bonds = enumerate(self._problem.bonds)
@@ -56,7 +54,7 @@ class Distances:
 
     def _near(self, laws: VertexLaws, x: Array) -> float:
         """A difference of displacements that is none: beside a law's length, and as rounding of the largest one."""
-        return self._rounding * laws.law.length_scale + ROUNDING * float(np.max(np.abs(x), initial=0.0))
+        return DEFAULT.reached * laws.law.length_scale + ROUNDING * float(np.max(np.abs(x), initial=0.0))
 
     def _largest(self, x: Array, force: Array, present: Sequence[VertexLaws]) -> float:
         """The largest distance of a force that laws and bounds should give."""
@@ -66,16 +64,16 @@ class Distances:
             unknowns = bonds.unknowns
             if bonds.radial:
                 lower = problem.lower[unknowns[:, 0]] if bonds.opens else np.full(len(unknowns), -np.inf)
-                near = self._rounding * np.max(np.abs(x[unknowns]), axis=1) + self._near(laws, x)
+                near = DEFAULT.reached * np.max(np.abs(x[unknowns]), axis=1) + self._near(laws, x)
                 off = _off(bonds, laws, x[unknowns], force[unknowns], lower, near)
                 worst = max(worst, float(np.max(off, initial=0.0)))
                 rest[unknowns] = 0.0
             else:
                 at = x[unknowns[:, 0]]
-                least, most = _interval(laws, at, self._rounding * np.abs(at) + self._near(laws, x))
+                least, most = _interval(laws, at, DEFAULT.reached * np.abs(at) + self._near(laws, x))
                 np.add.at(low, unknowns[:, 0], least)
                 np.add.at(high, unknowns[:, 0], most)
-        allowed = self._rounding * float(np.max(np.abs(x), initial=0.0))
+        allowed = DEFAULT.reached * float(np.max(np.abs(x), initial=0.0))
         low[x <= problem.lower + allowed], high[x >= problem.upper - allowed] = -np.inf, np.inf
         beyond = np.maximum(np.maximum(problem.lower - x, x - problem.upper), 0.0) * problem.elastic.diagonal
         away = np.maximum(np.maximum(low - rest, rest - high), 0.0) + beyond

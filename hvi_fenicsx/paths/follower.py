@@ -171,13 +171,12 @@ class Follower(LoadHistory):
         factor: float,
         resumed: PathState | None = None,
         inverse: CellInverse | None = None,
-        heading: int = 1,
     ) -> None:
         problem, points = self._problem, self._points
         position = None if resumed is None else resumed.position
         if points.straight:
             loads = problem.force, problem.force_rate
-            self._branch = StraightBranch(points, *loads, z, factor, position, inverse, heading)
+            self._branch = StraightBranch(points, *loads, z, factor, position, inverse)
             return
         curve = CurvedBranch(problem.force, problem.force_rate, points, z.copy(), factor)
         curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
