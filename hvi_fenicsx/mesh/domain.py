@@ -208,6 +208,7 @@ class MeshThresholds:
             turns at most between two vertices that are kept: a coarse chord must stay near its curve. Twice as
             much is an edge of a surface.
         remeshed_size: part by which a coarser mesh's volume, or the area of a side, may differ.
+        gmsh_share: part of the memory that nothing uses which gmsh may take for a file.
         gmsh_seconds: seconds that gmsh has to read a mesh file, to mesh a script, and to remesh a body in space.
         least_jacobian: part of its straight size to which a curved cell may shrink anywhere.
     """
@@ -218,6 +219,7 @@ class MeshThresholds:
     coarsest: int = 2_500
     outline_turn: float = math.radians(20.0)
     remeshed_size: float = 0.25
+    gmsh_share: float = 0.8
     gmsh_seconds: float = 300.0
     least_jacobian: float = 0.2
 

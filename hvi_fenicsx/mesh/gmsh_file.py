@@ -65,7 +65,7 @@ def _read(path: Path, dimension: int, scale: float, found: list[MeshArrays]) -> 
         The physical groups by dimension and name, and the number of vertices.
     """
     kind = "script" if _is_script(path) else "mesh"
-    words = [str(path.absolute()), kind, str(dimension), str(cost.free_memory())]
+    words = [str(path.absolute()), kind, str(dimension), str(DEFAULT.gmsh_share * cost.free_memory())]
     try:
         done = processes.run(gmsh_process.__name__, words, DEFAULT.gmsh_seconds)
     except subprocess.TimeoutExpired:
