@@ -27,7 +27,7 @@ from .rigid_balance import RigidBalance
 from .scalar_problem import Box, ScalarProblem, clipped
 from .stationarity import PointList, StationaryPoint
 from .thresholds import LIMITS
-from .tightening import ForceIntervals, clipped_again, shorter
+from .weighed_balance import ForceIntervals, clipped_again, shorter
 
 
 @dataclass(kw_only=True)

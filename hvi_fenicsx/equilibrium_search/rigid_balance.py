@@ -20,7 +20,7 @@ from scipy.linalg import qr
 from ..typing import Array, Integers
 from .scalar_problem import ScalarProblem
 from .thresholds import EPSILON, LIMITS
-from .tightening import GraphClip, clipped_again
+from .weighed_balance import GraphClip, clipped_again
 
 
 @dataclass(frozen=True, kw_only=True)
