@@ -22,8 +22,7 @@ from ..runtime.mpi import largest, total
 from ..system import existence
 from ..typing import Array
 from .certificate import Examination
-from .contact_state import ContactState
-from .law_state import LawState
+from .contact_state import ContactState, LawState
 from .thresholds import DEFAULT, PLAUSIBILITY
 
 

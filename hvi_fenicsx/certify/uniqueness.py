@@ -34,7 +34,7 @@ from ..system import existence, rigid_motions
 from ..system.system import System
 from ..typing import Array
 from .certificate import Examination
-from .law_state import LawState
+from .contact_state import LawState
 from .second_order import growth, negative_eigenvalues
 from .thresholds import DEFAULT, UNIQUENESS, UniquenessThresholds
 

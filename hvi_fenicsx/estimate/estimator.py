@@ -14,8 +14,7 @@ from dolfinx import fem, la
 from mpi4py import MPI
 
 from ..certify.certificate import Examination
-from ..certify.contact_state import ContactState
-from ..certify.law_state import LawState
+from ..certify.contact_state import ContactState, LawState
 from ..laws import Superpotential
 from ..problem.problem import Problem
 from ..runtime.log import percent

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
-from ..certify.contact_state import ContactState
-from ..certify.law_state import LawState
+from ..certify.contact_state import ContactState, LawState
 from ..certify.placed_forces import traction
 from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..laws import Length, Superpotential
