@@ -78,7 +78,7 @@ def of_existence(found: Solvability) -> tuple[str, ...]:
     Args:
         found: whether a solution can exist.
     """
-    peak, far = found.lambda_peak, PLAUSIBILITY.far_peak
+    peak, far = found.lambda_peak, PLAUSIBILITY.negligible**-2
     if not (0.0 < peak < 1.0 / far or far < peak < np.inf):
         return ()
     than = "far more" if peak > 1.0 else "far less"
@@ -92,7 +92,7 @@ def _scales(problem: Problem) -> Iterator[str]:
     scales, strain = problem.scales, problem.scales.stress / problem.scales.modulus
     if not PLAUSIBILITY.softest <= scales.modulus <= PLAUSIBILITY.stiffest:
         yield f"the largest Young's modulus is {scales.modulus:.3g} N/m²; is it in N/m²? (steel has 2.1e11)"
-    if strain > PLAUSIBILITY.largest_strain:
+    if strain > PLAUSIBILITY.large:
         yield (
             f"the load (or prescribed displacement, or thermal strain) is {strain:.3g} of Young's modulus, where small "
             "strains are assumed; are loads and modulus in N/m², displacements in m?"
@@ -204,14 +204,14 @@ def _strain(problem: Problem, u: fem.Function) -> Iterator[str]:
     values = u.x.array.reshape(-1, d)
     size = np.sqrt(d) * largest(comm, float(np.max(np.abs(values), initial=0.0))) * scales.displacement
     shortest = problem.once("shortest edge", None, lambda: _shortest_edge(problem))
-    if 2.0 * size <= PLAUSIBILITY.largest_strain * shortest:
+    if 2.0 * size <= PLAUSIBILITY.large * shortest:
         return
     most = 0.0
     for edge, change in zip(_along_edges(problem, problem.points[:, :d]), _along_edges(problem, values), strict=True):
         along = np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge)
         most = max(most, float(np.max(along, initial=0.0)))
     strain = largest(comm, most) * scales.displacement
-    if strain > PLAUSIBILITY.largest_strain:
+    if strain > PLAUSIBILITY.large:
         yield f"the largest strain is {strain:.3g}, where small strains are assumed; is the modulus in N/m²?"
 
 
@@ -272,7 +272,7 @@ def _slip_and_kink(problem: Problem, law: LawState) -> Iterator[str]:
             f"{of_law(problem, term)}: the largest {what} is {sizes}: "
             "the law is on its first piece everywhere; are the law's displacements in m?"
         )
-    elif beyond > PLAUSIBILITY.nearly_all:
+    elif beyond > 1.0 - PLAUSIBILITY.large:
         yield (
             f"{of_law(problem, term)}: the {what} is up to {sizes}: "
             "the law is far beyond it nearly everywhere; are the law's displacements in m?"
@@ -285,9 +285,9 @@ def _wide_smoothing(problem: Problem, law: LawState) -> Iterator[str]:
     if term.law is term.exact:
         return
     peak = max(term.exact.peak.minus, term.exact.peak.plus)
-    away, weights, limit = law.true_distance(), term.weights, PLAUSIBILITY.smoothing_change
+    away, weights, limit = law.true_distance(), term.weights, PLAUSIBILITY.large
     share = total(comm, float(weights[away > limit * peak].sum())) / total(comm, float(weights.sum()))
-    if share > PLAUSIBILITY.smoothing_share:
+    if share > PLAUSIBILITY.large:
         most, of_peak = (largest(comm, float(np.max(v, initial=0.0))) for v in (away * term.multiplier, away / peak))
         yield (
             f"{of_law(problem, term)}: smoothing changes the traction by up to "

@@ -283,7 +283,7 @@ class _Collector:
         for dofs, lowest, pair in coupled(self.couplings, SideSlopes(self.up, self.down, self.jump), self.d):
             least[dofs], opposite[dofs], self.bent[dofs] = lowest, pair, True
         up, down = np.where(free_up, self.curved_up, np.inf), np.where(free_down, self.curved_down, np.inf)
-        rounding = self.thresholds.no_jump / self.tolerance * self.slack
+        rounding = self.thresholds.near / self.tolerance * self.slack
         return Growth(least, opposite, self.slack, rounding, np.minimum(up, down), self.bent)
 
 

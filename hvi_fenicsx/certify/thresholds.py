@@ -10,15 +10,14 @@ class CertificateThresholds:
     """When a vertex is on a kink or a bound, and what is rounding.
 
     Attributes:
-        near: distance (of u0) from a kink or a bound that counts as being on it.
-        no_jump: jump of a traction, relative to the law's scale, that is rounding.
+        near: distance (of u0) from a kink or a bound that counts as being on it, and jump of a traction, relative to the
+            law's scale, that is none.
         largest_rounding: a certificate's entry above this is no rounding.
         rounding_safety: factor within which the sample of the rounding error is trusted.
         shared_steps: Newton steps on what is asked of the carriers of a shared force, at most.
     """
 
     near: float = 1e-10
-    no_jump: float = 1e-12
     largest_rounding: float = 1e-4
     rounding_safety: float = 4.0
     shared_steps: int = 60
@@ -29,29 +28,22 @@ class PlausibilityThresholds:
     """What a scene and its solution are warned of.
 
     Attributes:
-        largest_strain: small strains are assumed everywhere.
+        large: a strain, where small ones are assumed; a change of a traction by smoothing, over the law's peak; a share
+            of a part on which smoothing changes it so much, or which is more than vertices on supports.
         softest: smallest plausible Young's modulus, N/m²: softer than a gel.
         stiffest: largest plausible Young's modulus, N/m²: stiffer than diamond.
-        far_peak: a factor of the load that is borne is suspicious above it, and below its inverse.
         negligible: a law's largest force over the load, or a penetration between nodes over the largest displacement,
             up to which it cannot matter; its inverse is the ratio of two lengths that have nothing to do with each
-            other.
-        smoothing_change: change of a traction by smoothing, over the law's peak, that is large.
-        smoothing_share: share of a part on which smoothing may change the traction so much.
-        nearly_all: share of a part that counts as all of it: a vertex on a support does not slip.
+            other, and the square of that a factor of the load that is suspicious.
         straight: angle (rad) between facets at a vertex, up to which they are one plane, with its rounding.
         corner: angle from which on it is a corner of the body.
         mostly_bent: share of the vertices with an angle between the two from which on a part is a curve's polygon.
     """
 
-    largest_strain: float = 0.1
+    large: float = 0.1
     softest: float = 1e3
     stiffest: float = 2e12
-    far_peak: float = 1e4
     negligible: float = 0.01
-    smoothing_change: float = 0.1
-    smoothing_share: float = 0.25
-    nearly_all: float = 0.9
     straight: float = 1e-3
     corner: float = 0.6
     mostly_bent: float = 0.5
