@@ -10,8 +10,8 @@ class CertificateThresholds:
     """When a vertex is on a kink or a bound, and what is rounding.
 
     Attributes:
-        near: distance (of u0) from a kink or a bound that counts as being on it, and jump of a traction, relative to the
-            law's scale, that is none.
+        near: distance (of u0) from a kink or a bound that counts as being on it, and a jump of a traction,
+            relative to the law's scale, that is none.
         largest_rounding: a certificate's entry above this is no rounding.
         rounding_safety: factor within which the sample of the rounding error is trusted.
         shared_steps: Newton steps on what is asked of the carriers of a shared force, at most.

@@ -20,8 +20,7 @@ from ..typing import Array, Integers, Mask
 from . import stationarity
 from .arcs import on_interval
 from .balance_programme import BalanceTest
-from .convex_programme import minimise
-from .envelopes import envelopes
+from .convex_programme import envelopes, minimise
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
 from .scalar_problem import Box, ScalarProblem, clipped

@@ -19,8 +19,7 @@ import numpy as np
 
 from ..typing import Array, Integers, Mask
 from .arcs import FREE, ArcTable
-from .convex_programme import Optimum, minimise, never
-from .envelopes import envelopes
+from .convex_programme import Optimum, envelopes, minimise, never
 from .length_programme import LengthProgramme
 from .scalar_problem import Box, ScalarProblem
 from .thresholds import LIMITS

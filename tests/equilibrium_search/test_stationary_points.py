@@ -20,8 +20,8 @@ from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.equilibrium_search import relaxation
 from hvi_fenicsx.equilibrium_search.arcs import FREE, ArcTable, arcs_of, chain
 from hvi_fenicsx.equilibrium_search.condensed_form import scalar_problem
+from hvi_fenicsx.equilibrium_search.convex_programme import convex_chains
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
-from hvi_fenicsx.equilibrium_search.envelopes import convex_chains
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
 from hvi_fenicsx.equilibrium_search.rigid_balance import RigidBalance
