@@ -31,7 +31,7 @@ from ..mesh.boundary_part import Inequalities
 from ..problem import domain_forms, references, spaces
 from ..problem.contact_surface import Surface
 from ..problem.elastic_operator import stiffness_tensor
-from ..problem.interface_sides import outward
+from ..problem.facets import function_integrals, outward
 from ..problem.problem import Bounds, PrescribedComponent, Problem
 from ..problem.scaling import DEFAULT as composition
 from ..runtime.mpi import total
@@ -450,8 +450,9 @@ def _means(problem: Problem, facets: Entities, forces: Array, areas: Array, coun
     values = field.x.array.reshape(-1, d)
     values[:owned] = forces / np.where(areas > 0.0, areas, np.inf)[:owned, None]
     field.x.scatter_forward()
-    on = nodes.facet_nodes(space, facet_sizes.owned(problem.domain.mesh, facets))
-    weights = spaces.facet_weights(space, np.ones(len(on))) * counted[on]
+    owned_facets = facet_sizes.owned(problem.domain.mesh, facets)
+    on = nodes.facet_nodes(space, owned_facets)
+    weights = function_integrals(space, owned_facets) * counted[on]
     whole = weights.sum(axis=1)
     means = np.einsum("fn,fnd->fd", weights, values[on]) / np.where(whole > 0.0, whole, np.inf)[:, None]
     values[:] = 0.0

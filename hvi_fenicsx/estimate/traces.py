@@ -18,7 +18,7 @@ from mpi4py import MPI
 from ..mesh import facets, nodes
 from ..problem import dual_basis, spaces
 from ..problem.contact_surface import Surface
-from ..problem.facet_overlaps import Facets
+from ..problem.facets import Facets
 from ..problem.interfaces import Interface
 from ..problem.problem import Problem
 from ..runtime.mpi import agree

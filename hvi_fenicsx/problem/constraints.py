@@ -17,7 +17,7 @@ from ..geometry import spot
 from ..mesh import nodes
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from . import contact_surface, interface_sides
+from . import contact_surface
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .problem import Bounds, BoundsForce, BoundsMove
@@ -46,7 +46,7 @@ def make_surfaces(
     towards = {w: b.towards for w, _, c in contributions for b in c.bounds if w in parts and b.towards is not None}
     stated = {name: _stated(context, surfaces[name], obstacle) for name, obstacle in towards.items()}
     if not context.domain.one_piece:
-        interface_sides.refuse(context.domain.mesh.comm, surfaces.values(), context.length)
+        contact_surface.refuse_facing_sides(context.domain.mesh.comm, surfaces.values(), context.length)
     return contact_surface.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length)
 
 

@@ -6,7 +6,7 @@ Vertex (trapezoidal) quadrature makes every boundary term a sum over these nodes
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..geometry import spot, tangents
 from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
-from . import facet_overlaps
+from .facets import is_curved
 from .scaling import DEFAULT
 from .vectors import nodal
 
@@ -113,7 +113,7 @@ def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, b
 
     With the latter a uniform pressure has exactly the forces of its nodal values, whatever the curve.
     """
-    if facet_overlaps.is_curved(space):
+    if is_curved(space):
         return np.asarray(np.linalg.norm(normal, axis=1))
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * space.mesh.geometry.dim)
     return np.asarray(nodal(ufl.inner(ones, test) * measure)[blocks, 0])
@@ -293,3 +293,38 @@ def _largest_turn(normal: _Row, row: _Row) -> float:
     if not normal.exact:
         return DEFAULT.uneven
     return DEFAULT.turned_to_prescribed if row.prescribed else DEFAULT.same
+
+
+def refuse_facing_sides(comm: MPI.Comm, surfaces: Iterable[Surface], length: float) -> None:
+    """Refuse a part with two vertices at one point whose outward normals face each other. Collective.
+
+    Args:
+        comm: the ranks.
+        surfaces: of the parts with contact or laws.
+        length: of the body, m.
+
+    Raises:
+        InputError: on all ranks alike, with the first such point.
+    """
+    for surface in surfaces:
+        gathered = agree(comm, (surface.points, surface.normals))
+        points, normals = (np.concatenate(arrays) for arrays in zip(*gathered, strict=True))
+        found = _facing(points, normals, DEFAULT.same * length)
+        if found is not None:
+            raise InputError(
+                f"boundary.{surface.part}: two sides lie on each other at {spot(found[: normals.shape[1]])} and face "
+                "each other. Contact and laws of a boundary part act between the body and a rigid obstacle: each side "
+                "would be held by an obstacle of its own. Give the part one of the sides only, or name both "
+                "in an [interface.NAME]"
+            )
+
+
+def _facing(points: Array, normals: Array, near: float) -> Array | None:
+    """The first point (3,) that two vertices with opposite normals share; None: there is none."""
+    from scipy.spatial import cKDTree
+
+    if len(points) < 2:
+        return None
+    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    facing = pairs[np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]]) < -0.5]
+    return points[np.sort(facing.ravel())[0]] if len(facing) else None

@@ -22,7 +22,7 @@ from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
-from . import facet_overlaps
+from . import facets as boundary_facets
 from .scaling import Placed, Scales
 from .spaces import LOAD_DEGREE, displacement_space, pressure_space
 
@@ -215,12 +215,8 @@ def of(space: fem.FunctionSpace, facets: Entities) -> SideMoments:
         space: of the displacements.
         facets: the part's local facets (owned and ghost).
     """
-    own, d = facet_sizes.owned(space.mesh, facets), space.mesh.geometry.dim
-    comm = space.mesh.comm
-    if facet_overlaps.is_curved(space):
-        points, weights, _ = facet_overlaps.samples(space, own)
-        return of_points(comm, points.reshape(-1, d), weights.ravel())
-    return _of_corners(comm, facet_sizes.corners(space.mesh, own))
+    points, weights, _ = boundary_facets.samples(space, facet_sizes.owned(space.mesh, facets))
+    return of_points(space.mesh.comm, points.reshape(-1, points.shape[2]), weights.ravel())
 
 
 def of_points(comm: Any, points: Array, weights: Array) -> SideMoments:
@@ -235,16 +231,3 @@ def of_points(comm: Any, points: Array, weights: Array) -> SideMoments:
     centroid = comm.allreduce(weights @ points) / area
     r = points - centroid
     return SideMoments(area=area, centroid=centroid, second=comm.allreduce(np.einsum("p,pi,pj->ij", weights, r, r)))
-
-
-def _of_corners(comm: Any, corners: Array) -> SideMoments:
-    """The moments of plane facets of all ranks by their corners. Collective."""
-    d, areas = corners.shape[2], facet_sizes.areas(corners)
-    area = float(comm.allreduce(float(areas.sum())))
-    sums = comm.allreduce(np.einsum("f,fkd->d", areas, corners) / d)
-    centroid = sums / area
-    r = corners - centroid
-    middle = r.sum(axis=1)
-    products = np.einsum("fki,fkj->fij", r, r) + np.einsum("fi,fj->fij", middle, middle)
-    second = comm.allreduce(np.einsum("f,fij->ij", areas, products) / (d * (d + 1)))
-    return SideMoments(area=area, centroid=centroid, second=second)

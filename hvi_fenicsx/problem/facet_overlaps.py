@@ -1,131 +1,28 @@
-"""Where the facets of two sides that face each other lie over each other: intervals in the plane.
+"""Where the facets of two sides that face each other lie over each other: segments in the plane, polygons in space.
 
-A point of the second side belongs to the point of the first that it is projected onto along the first facet's normal.
-All products of the basis functions of both sides are integrated exactly over the intersections of facets.
+A point of the second side belongs to the point of the first that it is projected onto along the normal of the first
+facet's corners. Each facet of the first side has coordinates of its own, in which its corners are those of the
+reference simplex, and its last coordinate goes along the normal. All products of the basis functions of both sides are
+integrated exactly over the intersections of straight facets.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-import basix
 import numpy as np
-from dolfinx import fem
+from scipy.spatial import KDTree
 
-from .. import compat
-from ..mesh import nodes
-from ..typing import Array, Entities, Integers, Mask
-from . import spaces
+from ..geometry import tangents
+from ..typing import Array, Integers, Mask
+from . import facets
+from .facets import Facets, across, places, slopes
 from .scaling import DEFAULT
 
-_DEGREE = 12
-"""Degree of the quadrature: areas are square roots of polynomials, nearly constant ones."""
-
-
-def is_curved(space: fem.FunctionSpace) -> bool:
-    """Whether the space lives on curved cells."""
-    return compat.geometry_degree(space.mesh) > 1
-
-
-def samples(space: fem.FunctionSpace, facets: Entities) -> tuple[Array, Array, Array]:
-    """Quadrature points of facets of curved cells.
-
-    Args:
-        space: of degree 2.
-        facets: local facets (f of them).
-
-    Returns:
-        The points (q of them), m, (f, q, d), their weights, whose sum is the facet's size, (f, q), and the
-        displacement's basis functions there, (q, nodes).
-    """
-    d = space.mesh.geometry.dim
-    at = nodes.points(space)[nodes.facet_nodes(space, facets)][:, :, :d]
-    return from_nodes(at, spaces.edge_share(space))
-
-
-def from_nodes(at: Array, share: float) -> tuple[Array, Array, Array]:
-    """The same, for facets by their nodes.
-
-    Args:
-        at: the nodes, corners first, then midpoints of edges in the order of basix, m, (f, n, d).
-        share: of an edge's function that goes to each of its ends (:func:`.spaces.edge_share`).
-    """
-    kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[at.shape[2]]
-    places, weights = (np.asarray(part, dtype=np.float64) for part in basix.make_quadrature(kind, _DEGREE))
-    element = basix.create_element(basix.ElementFamily.P, kind, 2, basix.LagrangeVariant.gll_warped)
-    table = np.asarray(element.tabulate(1, places))[:, :, :, 0]
-    slopes = np.einsum("iqn,fnd->fqid", table[1:], at)
-    gram = np.einsum("fqid,fqjd->fqij", slopes, slopes)
-    barycentric = np.column_stack([1 - places.sum(axis=1), places])
-    functions = spaces.simplex_functions(2, barycentric, share)
-    return np.einsum("qn,fnd->fqd", table[0], at), weights * np.sqrt(np.linalg.det(gram)), functions
-
-
-@dataclass(frozen=True, kw_only=True)
-class Facets:
-    """The facets of one side, the same on all ranks (f of them).
-
-    Attributes:
-        nodes: global numbers of their nodes, corners first, (f, n).
-        points: these nodes, those of curved sides on their curves, m, (f, n, d).
-        normals: outward unit normals of the corners' segments or triangles, (f, d).
-        share: of an edge's function that goes to each of its ends (:func:`.spaces.edge_share`).
-    """
-
-    nodes: Integers
-    points: Array
-    normals: Array
-    share: float = 0.0
-
-    @property
-    def degree(self) -> int:
-        """The degree of the elements."""
-        return 1 if self.points.shape[1] == self.points.shape[2] else 2
-
-    @property
-    def corners(self) -> Array:
-        """The vertices, m, (f, d, d)."""
-        return self.points[:, : self.points.shape[2]]
-
-    @property
-    def edges(self) -> list[list[int]]:
-        """The ends of the edges whose midpoints are nodes, in their order."""
-        kind = basix.CellType[_KINDS[self.points.shape[2]]]
-        found: list[list[int]] = basix.topology(kind)[1]
-        return found if self.degree == 2 else []
-
-    @property
-    def hull(self) -> Array:
-        """Points whose convex hull holds each facet, curved or not, m, (f, n, d): Bézier's points."""
-        found = self.points.copy()
-        for node, ends in enumerate(self.edges, found.shape[2]):
-            found[:, node] = 2 * found[:, node] - found[:, ends].sum(axis=1) / 2
-        return found
-
-    @property
-    def positions(self) -> Array:
-        """The coefficients of the positions of the nodes, m, (f, n, d)."""
-        found = self.points.copy()
-        for node, ends in enumerate(self.edges, found.shape[2]):
-            found[:, node] = (found[:, node] - self.share * found[:, ends].sum(axis=1)) / (1 - 2 * self.share)
-        return found
-
-    def functions(self, barycentric: Array) -> Array:
-        """The basis functions of the nodes at points (..., d) of a facet, (..., n)."""
-        flat = spaces.simplex_functions(self.degree, barycentric.reshape(-1, barycentric.shape[-1]), self.share)
-        return flat.reshape(*barycentric.shape[:-1], -1)
-
-    @property
-    def areas(self) -> Array:
-        """Lengths or areas, m^(d-1), (f,)."""
-        sides = self.corners[:, 1:] - self.corners[:, :1]
-        return np.sqrt(np.linalg.det(sides @ sides.transpose(0, 2, 1))) / sides.shape[1]
-
-    @property
-    def width(self) -> float:
-        """The longest edge, m."""
-        return float(np.max(np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=1), axis=2)))
+_STEPS = 12
+"""Newton steps to a place in a curved facet; what they have not found by then is far outside."""
+_EDGES = [[1, 2], [0, 2], [0, 1]]
+"""The ends of the edge opposite to each corner."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,30 +49,34 @@ class Overlaps:
     """The intersections of facets, cut into segments or triangles (k of them).
 
     Attributes:
+        sides: the facets of both sides.
         first: number of the first side's facet, (k,).
         second: number of the second side's facet, (k,).
-        areas: m^(d-1), (k,).
         on_first: barycentric coordinates of the corners in the first facet, (k, d, d).
         on_second: in the second facet, (k, d, d).
         covered: whether each vertex of the first side's facets lies over the second side, (f, d).
     """
 
+    sides: tuple[Facets, Facets]
     first: Integers
     second: Integers
-    areas: Array
     on_first: Array
     on_second: Array
     covered: Mask
 
+    @property
+    def areas(self) -> Array:
+        """Of their projections along the normals, m^(d-1), (k,)."""
+        return _sizes(self.on_first[:, :, 1:]) * self.sides[0].areas[self.first]
+
     def points(self, degree: int) -> OverlapPoints:
-        """The points of a rule that is exact for products of two functions.
+        """The points of a rule that is exact for products of two functions on straight facets.
 
         Args:
             degree: of the functions.
         """
-        made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[_KINDS[self.on_first.shape[1]]], 2 * degree)
-        rule = np.column_stack([1.0 - made[0].sum(axis=1), made[0]])
-        return self.sampled(rule, made[1] / made[1].sum(), np.arange(len(self.first)))
+        rule = facets.rule(self.on_first.shape[1], degree, curved=self.sides[0].curved)
+        return self.sampled(*rule, np.arange(len(self.first)))
 
     def sampled(self, rule: Array, shares: Array, chosen: Integers) -> OverlapPoints:
         """The points of a rule, those of one intersection after those of the other.
@@ -185,72 +86,234 @@ class Overlaps:
             shares: their weights, whose sum is 1, (q,).
             chosen: numbers of intersections.
         """
-        d = rule.shape[1]
+        d, (above, below) = rule.shape[1], self.sides
+        first, second = (np.repeat(numbers[chosen], len(rule)) for numbers in (self.first, self.second))
+        on_first, on_second = ((rule @ on[chosen]).reshape(-1, d) for on in (self.on_first, self.on_second))
+        sizes = above.areas[first]
+        if above.curved:
+            sizes = np.linalg.norm(across(slopes(above.points[first], on_first)), axis=1) / (d - 1)
+            own, others = (
+                above.own_coordinates(first, of)[:, :, :-1] for of in (above.points[first], below.points[second])
+            )
+            on_second = _coordinates_of(others, places(own, on_first), on_second)
         return OverlapPoints(
-            first=np.repeat(self.first[chosen], len(rule)),
-            second=np.repeat(self.second[chosen], len(rule)),
-            weights=np.asarray(np.outer(self.areas[chosen], shares).ravel(), dtype=np.float64),
-            on_first=(rule @ self.on_first[chosen]).reshape(-1, d),
-            on_second=(rule @ self.on_second[chosen]).reshape(-1, d),
+            first=first,
+            second=second,
+            weights=np.outer(_sizes(self.on_first[chosen][:, :, 1:]), shares).ravel() * sizes,
+            on_first=on_first,
+            on_second=on_second,
         )
 
 
-_KINDS = {2: "interval", 3: "triangle"}
-"""Facets by dimension."""
-
-
-def in_plane(first: Facets, second: Facets) -> Overlaps:
-    """The intersections of the facets of two sides in the plane.
+def overlaps(first: Facets, second: Facets) -> Overlaps:
+    """The intersections of the facets of two sides, without what lies behind nearer facets.
 
     Args:
         first: the side onto which is projected.
         second: the other one.
     """
-    pieces = [np.empty((0, 6))]
-    covered = np.zeros((len(first.nodes), 2), dtype=bool)
-    for number in range(len(first.nodes)):
-        found = _nearest(_intervals(first, second, number))
-        pieces.append(np.column_stack([np.full(len(found), number), found]))
-        begin, end = found[:, 1].min(initial=np.inf), found[:, 2].max(initial=-np.inf)
-        covered[number] = begin <= DEFAULT.uncovered, end >= 1.0 - DEFAULT.uncovered
-    whole = np.vstack(pieces)
-    return _pieces(first, whole, covered)
-
-
-def _intervals(first: Facets, second: Facets, number: int) -> Array:
-    """Facets over one of the first side: number, begin, end on it, and where these ends are on the facet, (k, 5)."""
-    start, end = first.corners[number]
-    length, normal = np.linalg.norm(end - start), first.normals[number]
-    facing = np.flatnonzero(second.normals @ normal < -DEFAULT.facing)
-    along = (second.corners[facing] - start) @ (end - start) / length**2
-    low, high = np.maximum(along.min(axis=1), 0.0), np.minimum(along.max(axis=1), 1.0)
-    over = high - low > DEFAULT.rounding
-    facing, along, low, high = facing[over], along[over], low[over], high[over]
-    width = along[:, 1] - along[:, 0]
-    at = (np.stack([low, high], axis=1) - along[:, :1]) / width[:, None]
-    distance = np.abs((second.corners[facing].mean(axis=1) - start) @ normal)
-    order = np.argsort(distance, kind="stable")
-    return np.column_stack([facing, low, high, at])[order]
-
-
-def _nearest(intervals: Array) -> Array:
-    """The intervals without those that lie behind nearer ones."""
-    kept: list[Array] = []
-    for one in intervals:
-        hidden = sum(max(0.0, min(one[2], k[2]) - max(one[1], k[1])) for k in kept)
-        if hidden < 0.5 * (one[2] - one[1]):
-            kept.append(one)
-    return np.array(kept).reshape(-1, 5)
-
-
-def _pieces(first: Facets, found: Array, covered: Mask) -> Overlaps:
-    """Intervals (first facet, second facet, begin, end, both on the second facet) as intersections."""
-    number, x, y = found[:, 0].astype(np.int64), found[:, 2:4], found[:, 4:6]
+    d = first.dimension
+    number, other = _candidates(first, second)
+    local = first.own_coordinates(number, second.points[other])
+    pair, of_second = np.arange(len(other)), np.broadcast_to(np.eye(d), (len(other), d, d))
+    if second.curved and d == 3:
+        pair, of_second = _parts(second, other)
+    outlines = local[:, :d, :-1]
+    if second.curved:
+        outlines = _curved_outlines(first, second, number[pair], other[pair], local[pair, :, :-1], of_second)
+    pieces, outline = _clipped(outlines)
+    seen = _visible(pieces, outline, number[pair], np.abs(local[pair, :d, -1].mean(axis=1)))
+    pieces, outline = pieces[seen], outline[seen]
+    on = pair[outline]
     return Overlaps(
-        first=number,
-        second=found[:, 1].astype(np.int64),
-        areas=first.areas[number] * (x[:, 1] - x[:, 0]),
-        on_first=np.stack([1.0 - x, x], axis=2),
-        on_second=np.stack([1.0 - y, y], axis=2),
-        covered=covered,
+        sides=(first, second),
+        first=number[on],
+        second=other[on],
+        on_first=np.concatenate([1.0 - pieces.sum(axis=2, keepdims=True), pieces], axis=2),
+        on_second=_barycentric(outlines[outline], pieces) @ of_second[outline],
+        covered=_covered(pieces, number[on], len(first.nodes), DEFAULT.rim if first.curved else DEFAULT.uncovered),
     )
+
+
+def _candidates(first: Facets, second: Facets) -> tuple[Integers, Integers]:
+    """Pairs of facets that may lie over each other: the first side's facets, the second's, (p,) each."""
+    (centres, radii), (others, other_radii) = _balls(first), _balls(second)
+    normals, group = np.unique(np.round(first.normals, 12), axis=0, return_inverse=True)
+    order = np.argsort(group.ravel(), kind="stable")
+    pairs: list[Integers] = [np.empty((0, 2), dtype=np.int64)]
+    for own in np.split(order, np.flatnonzero(np.diff(group.ravel()[order])) + 1):
+        normal = normals[group.ravel()[own[0]]]
+        facing = np.flatnonzero(second.normals @ normal < -DEFAULT.facing)
+        plane = tangents(normal[None])[0].T
+        # A tree for few points would cost more than it saves.
+        tree = KDTree(others[facing] @ plane, leafsize=max(16, len(facing) // len(own)))
+        found = tree.query_ball_point(centres[own] @ plane, radii[own] + other_radii.max(), return_sorted=True)
+        counts = [len(one) for one in found]
+        pairs.append(np.column_stack([np.repeat(own, counts), facing[np.concatenate(found).astype(np.int64)]]))
+    number, other = np.vstack(pairs).T
+    return number, other
+
+
+def _balls(side: Facets) -> tuple[Array, Array]:
+    """Centres (f, d) and radii (f,) of balls around facets."""
+    centres, hull = side.corners.mean(axis=1), side.hull
+    return centres, np.linalg.norm(hull - centres[:, None], axis=2).max(axis=1)
+
+
+def _sizes(simplices: Array) -> Array:
+    """Lengths or areas of simplices (n, d, d-1), in parts of that of the reference simplex, (n,)."""
+    return np.asarray(np.abs(np.linalg.det(simplices[:, 1:] - simplices[:, :1])))
+
+
+def _barycentric(simplices: Array, points: Array) -> Array:
+    """Barycentric coordinates of points (n, q, d-1) in simplices (n, d, d-1), (n, q, d)."""
+    found = (points - simplices[:, :1]) @ np.linalg.inv(simplices[:, 1:] - simplices[:, :1])
+    return np.concatenate([1.0 - found.sum(axis=2, keepdims=True), found], axis=2)
+
+
+def _clipped(outlines: Array) -> tuple[Array, Integers]:
+    """What simplices (p, d, d-1) have in common with the reference simplex: parts (n, d, d-1), the number of each."""
+    number = np.flatnonzero(np.all((outlines.min(axis=1) < 1.0) & (outlines.max(axis=1) > 0.0), axis=1))
+    pieces = np.clip(np.sort(outlines[number], axis=1), 0.0, 1.0)
+    if outlines.shape[1] == 3:
+        pieces, polygon = _clipped_triangles(outlines[number])
+        number = number[polygon]
+    solid = _sizes(pieces) > DEFAULT.rounding
+    return pieces[solid], number[solid]
+
+
+def _clipped_triangles(triangles: Array) -> tuple[Array, Integers]:
+    """The same in the plane: polygons, cut into triangles about their first corners."""
+    ring = np.concatenate([1.0 - triangles.sum(axis=2, keepdims=True), triangles], axis=2)
+    sizes: Integers = np.full(len(ring), 3, dtype=np.int64)
+    for side in range(3):
+        ring, sizes = _cut(ring, sizes, side)
+    polygon, corner = np.nonzero(np.arange(2, ring.shape[1]) < sizes[:, None])
+    return np.stack([ring[polygon, 0], ring[polygon, corner + 1], ring[polygon, corner + 2]], axis=1)[:, :, 1:], polygon
+
+
+def _cut(ring: Array, sizes: Integers, side: int) -> tuple[Array, Integers]:
+    """Convex polygons by the barycentric coordinates of their corners (p, v, 3), where one coordinate is positive."""
+    number = np.arange(ring.shape[1])
+    inside, after = number < sizes[:, None], (number + 1) % np.maximum(sizes, 1)[:, None]
+    following = np.take_along_axis(ring, after[:, :, None], axis=1)
+    here, there = ring[:, :, side], following[:, :, side]
+    crossing = inside & ((here >= 0.0) != (there >= 0.0))
+    share = np.divide(here, here - there, out=np.zeros_like(here), where=crossing)
+    cut = ring + share[:, :, None] * (following - ring)
+    cut[:, :, side] = 0.0
+    both = np.stack([ring, cut], axis=2).reshape(len(ring), 2 * len(number), 3)
+    kept = np.stack([inside & (here >= 0.0), crossing], axis=2).reshape(both.shape[:2])
+    order = np.argsort(~kept, axis=1, kind="stable")[:, : max(int(kept.sum(axis=1).max(initial=0)), 3)]
+    return np.take_along_axis(both, order[:, :, None], axis=1), kept.sum(axis=1)
+
+
+def _visible(pieces: Array, outline: Integers, number: Integers, distance: Array) -> Mask:
+    """Which pieces, of outlines on facets (o,) at distances (o,), do not lie behind nearer ones, (n,)."""
+    kept, sizes, under = np.ones(len(pieces), dtype=bool), _sizes(pieces), number[outline]
+    for crowded in np.flatnonzero(np.bincount(under, weights=sizes, minlength=1) > 1.0 + DEFAULT.uncovered):
+        here, nearer = np.flatnonzero(under == crowded), pieces[:0]
+        for one in sorted(set(outline[here]), key=distance.__getitem__):
+            own = here[outline[here] == one]
+            kept[own] = _common(pieces[own], nearer) < 0.5 * sizes[own].sum()
+            nearer = np.concatenate([nearer, pieces[own[kept[own]]]])
+    return kept
+
+
+def _common(simplices: Array, others: Array) -> float:
+    """What simplices (n, d, d-1) and others (m, d, d-1), of which none overlap, have in common."""
+    inverse = np.linalg.inv(others[:, 1:] - others[:, :1])
+    local = (simplices[None] - others[:, None, :1]) @ inverse[:, None]
+    pieces, number = _clipped(local.reshape(-1, *simplices.shape[1:]))
+    return float(np.sum(_sizes(pieces) * _sizes(others)[number // len(simplices)]))
+
+
+def _covered(pieces: Array, number: Integers, count: int, near: float) -> Mask:
+    """Whether pieces on facets (n,) fill the angle at each corner of these, (count, d)."""
+    d = pieces.shape[1]
+    filled, reference, angles = np.zeros((count, d)), np.eye(d)[:, 1:], _angles(pieces)
+    for corner, place in enumerate(reference):
+        piece, at = np.nonzero(np.linalg.norm(pieces - place, axis=2) <= near)
+        np.add.at(filled[:, corner], number[piece], angles[piece, at])
+    return np.asarray(filled >= (1.0 - near) * _angles(reference[None]))
+
+
+def _angles(simplices: Array) -> Array:
+    """The angles at the corners of triangles, (n, 3); of segments 1, (n, 2)."""
+    if simplices.shape[1] == 2:
+        return np.ones(simplices.shape[:2])
+    one, other = (np.roll(simplices, step, axis=1) - simplices for step in (1, -1))
+    turn = one[:, :, 0] * other[:, :, 1] - one[:, :, 1] * other[:, :, 0]
+    return np.abs(np.arctan2(turn, np.sum(one * other, axis=2)))
+
+
+def _parts(second: Facets, other: Integers) -> tuple[Integers, Array]:
+    """Triangles (o) whose edges stand for the curved ones: the pair of each (o,), its corners on the facet (o, 3, 3).
+
+    Two neighbours share a chord. Where a side ends it has to end where the other does: the edge is cut into parts.
+    """
+    rim = _rim_edges(second)[other]
+    pairs, corners = [], []
+    for pattern in np.unique(rim, axis=0):
+        here, parts = np.flatnonzero(np.all(rim == pattern, axis=1)), _fan(pattern)
+        pairs.append(np.repeat(here, len(parts)))
+        corners.append(np.tile(parts, (len(here), 1, 1)))
+    return np.concatenate(pairs), np.concatenate(corners)
+
+
+def _fan(pattern: Mask) -> Array:
+    """A facet with edges on the rim (3,) as triangles about its middle, else as itself; corners (s, 3, 3)."""
+    if not pattern.any():
+        return np.eye(3)[None]
+    around: list[Array] = []
+    for edge in range(3):
+        a, b = np.eye(3)[(edge + 1) % 3], np.eye(3)[(edge + 2) % 3]
+        many = DEFAULT.rim_parts if pattern[edge] else 1
+        around += [a + (b - a) * step / many for step in range(many)]
+    return np.stack([np.full((len(around), 3), 1 / 3), around, [*around[1:], around[0]]], axis=1)
+
+
+def _curved_outlines(
+    first: Facets, second: Facets, number: Integers, other: Integers, local: Array, of_second: Array
+) -> Array:
+    """Simplices of curved facets (o, d, d) in the reference coordinates of those of the first side, (o, d, d-1)."""
+    d = first.dimension
+    at = places(np.repeat(local, d, axis=0), of_second.reshape(-1, d))
+    own = first.own_coordinates(number, first.points[number])[:, :, :-1]
+    straight = np.column_stack([1.0 - at.sum(axis=1), at])
+    found = _coordinates_of(np.repeat(own, d, axis=0), at, straight).reshape(-1, d, d)
+    if d == 3:
+        both = _on_rim(second, other, of_second)[:, :, None] & _rim_edges(first)[number][:, None]
+        found[both & (np.abs(found) < DEFAULT.rim)] = 0.0
+    return np.asarray(found[:, :, 1:] / found.sum(axis=2, keepdims=True))
+
+
+def _rim_edges(side: Facets) -> Mask:
+    """Whether no other facet of the side has the edge opposite to each corner, (f, 3)."""
+    edges = np.sort(side.nodes[:, _EDGES], axis=2)
+    _, which, times = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(times[which.ravel()].reshape(-1, 3) == 1)
+
+
+def _on_rim(side: Facets, which: Integers, at: Array) -> Mask:
+    """Whether places (o, 3, 3) of facets (o,) are on the rim of the side, (o, 3)."""
+    alone = _rim_edges(side)
+    corners = np.isin(side.nodes[:, :3], side.nodes[:, _EDGES][alone])
+    on_edge, at_corner = at == 0.0, at == 1.0
+    return np.asarray(np.any(alone[which][:, None] & on_edge | corners[which][:, None] & at_corner, axis=2))
+
+
+def _coordinates_of(nodes: Array, at: Array, start: Array) -> Array:
+    """The barycentric coordinates of places (p, k) in curved facets (p, n, k), or the start where there are none."""
+    found, open_ = start.copy(), np.arange(len(start))
+    for _ in range(_STEPS):
+        left, by = at[open_] - places(nodes[open_], found[open_]), slopes(nodes[open_], found[open_])
+        by[np.linalg.det(by) == 0.0] = np.eye(by.shape[1])
+        step = np.linalg.solve(by.transpose(0, 2, 1), left[:, :, None])[:, :, 0]
+        found[open_] += np.column_stack([-step.sum(axis=1), step])
+        open_ = open_[np.abs(left).max(axis=1) > DEFAULT.same]
+    d = start.shape[1]
+    turned = np.linalg.det(slopes(nodes, found)) * np.linalg.det(nodes[:, 1:d] - nodes[:, :1]) <= 0.0
+    lost = np.union1d(open_, np.flatnonzero(turned))
+    found[lost] = start[lost]
+    return found

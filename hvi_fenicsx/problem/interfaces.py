@@ -6,27 +6,96 @@ side, and those that are prescribed, on another part with contact or laws, or on
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
-from scipy.sparse import csr_array, diags_array, eye_array, kron
 
 from ..errors import InputError
 from ..geometry import tangents
+from ..mesh import curved as curved_cells
+from ..mesh import nodes
 from ..mesh.boundary_part import InterfaceSides
+from ..mesh.facets import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers, Mask
-from . import curved_overlaps, dual_basis, interface_sides
+from . import dual_basis, facet_overlaps, spaces
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
-from .facet_overlaps import Facets, Overlaps
-from .interface_sides import Pair
+from .facet_overlaps import Overlaps
+from .facets import Facets, is_curved, outward
 from .scaling import DEFAULT
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """The facets of the two sides of an interface, the same on all ranks.
+
+    Attributes:
+        name: of the interface.
+        sides: what the scene says of it.
+        first: the facets of the first side.
+        second: those of the second.
+    """
+
+    name: str
+    sides: InterfaceSides
+    first: Facets
+    second: Facets
+
+    def covered(self, overlaps: Overlaps) -> Mask:
+        """Whether each node of the first side lies over the second, a midpoint with both ends of its edge, (f, n)."""
+        middles = [overlaps.covered[:, ends].all(axis=1) for ends in self.first.edges]
+        return np.column_stack([overlaps.covered, *middles])
+
+    def members(self, context: DomainForms) -> Entities:
+        """Local vertices (owned) of both sides."""
+        start, end = context.space.dofmap.index_map.local_range
+        both = np.unique(np.concatenate([self.first.nodes.ravel(), self.second.nodes.ravel()]))
+        return np.asarray(both[(both >= start) & (both < end)] - start, dtype=np.int32)
+
+
+def _pair(context: DomainForms, name: str, sides: InterfaceSides) -> Pair:
+    """The facets of both sides on all ranks; refuses a side without facets. Collective."""
+    found = []
+    for side in (sides.first, sides.second):
+        facets = _gathered(context, context.domain.facets([side]))
+        if not len(facets.nodes):
+            raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
+        found.append(facets)
+    curved = is_curved(context.space) and any(curved_cells.is_curved(facets.points) for facets in found)
+    first, second = (replace(facets, curved=curved) for facets in found)
+    return Pair(name=name, sides=sides, first=first, second=second)
+
+
+def _gathered(context: DomainForms, local: Entities) -> Facets:
+    """Facets whose cells this rank owns, and those of all other ranks. Collective."""
+    space, d = context.space, context.dimension
+    of_cell, topology = cell_facets(context.domain.mesh), context.domain.mesh.topology
+    connected = topology.connectivity(d - 1, d)
+    local = local[np.diff(connected.offsets)[local] == 1]
+    cells = connected.array[connected.offsets[local]]
+    owned = cells < topology.index_map(d).size_local
+    local, cells = local[owned], cells[owned]
+    blocks = nodes.facet_nodes(space, local)
+    inner = space.dofmap.list[cells][:, : d + 1][of_cell[cells] == local[:, None]]
+    parts = [
+        space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel())).reshape(blocks.shape),
+        (context.points if is_curved(space) else context.points_on_curves)[blocks][:, :, :d],
+        outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
+    ]
+    every = agree(context.domain.mesh.comm, parts)
+    numbers, points, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
+    order = np.lexsort(np.round(points[:, :d].mean(axis=1) / context.length, 12).T)
+    return Facets(
+        nodes=numbers[order].astype(np.int64),
+        points=points[order],
+        normals=normals[order],
+        share=spaces.edge_share(space),
+    )
 
 
 def check_facing(pair: Pair, overlaps: Overlaps) -> None:
@@ -115,7 +184,6 @@ class Interface:
         overlaps: their intersections.
         sides: what the scene says of it.
         members: local vertices of both sides.
-        curved: whether facets are curved through their nodes.
     """
 
     name: str
@@ -128,7 +196,6 @@ class Interface:
     second: Facets
     overlaps: Overlaps
     sides: InterfaceSides
-    curved: bool
 
 
 def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: Entities) -> tuple[Interface, ...]:
@@ -144,7 +211,7 @@ def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: E
     """
     if not wanted:
         return ()
-    pairs = {name: interface_sides.pair(context, name, sides) for name, sides in wanted.items()}
+    pairs = {name: _pair(context, name, sides) for name, sides in wanted.items()}
     taken = context.space.dofmap.index_map.local_to_global(np.asarray(occupied, dtype=np.int32))
     taken = np.unique(np.concatenate(agree(context.domain.mesh.comm, taken)))
     return tuple(_interface(context, name, pairs, taken) for name in wanted)
@@ -156,7 +223,7 @@ def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken
     Nodes that are taken, by other interfaces too, or that the second side does not cover, carry nothing.
     """
     pair = pairs[name]
-    overlaps = pair.overlaps()
+    overlaps = facet_overlaps.overlaps(pair.first, pair.second)
     check_facing(pair, overlaps)
     others = [taken, np.unique(pair.second.nodes)]
     others += [np.unique([*p.first.nodes.flat, *p.second.nodes.flat]) for n, p in pairs.items() if n != name]
@@ -180,7 +247,6 @@ def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken
         second=pair.second,
         overlaps=overlaps,
         sides=pair.sides,
-        curved=pair.curved,
     )
 
 
@@ -218,13 +284,13 @@ def _summed_normals(pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> tuple
     of its nodal values, whatever the curve (as of :func:`.contact_surface.make_surface`).
     """
     sums = np.zeros((len(rows.weights), pair.first.points.shape[2]))
-    if not pair.curved:
+    if not pair.first.curved:
         for node in range(pair.first.nodes.shape[1]):
             np.add.at(sums, pair.first.nodes[:, node], pair.first.areas[:, None] * pair.first.normals)
         return sums, rows.weights
     points, sizes = overlaps.points(pair.first.degree), np.zeros(len(sums))
     functions = points.weights[:, None] * pair.first.functions(points.on_first)
-    normals = curved_overlaps.normals(pair.first, points)
+    normals = pair.first.normals_at(points.first, points.on_first)
     np.add.at(sums, pair.first.nodes[points.first], functions[:, :, None] * normals[:, None])
     np.add.at(sizes, pair.first.nodes[points.first], functions)
     ratio = np.divide(np.linalg.norm(sums, axis=1), sizes, out=np.ones_like(sizes), where=sizes > 0.0)
@@ -247,89 +313,3 @@ def _dofs(context: DomainForms, surface: Surface) -> Entities:
     marks.x.array[surface.dofs] = 1.0
     marks.x.scatter_forward()
     return np.flatnonzero(marks.x.array).astype(np.int32)
-
-
-def whole_rows(found: Sequence[Interface], size: int) -> Iterator[tuple[csr_array, Array]]:
-    """For each interface the rows w = R u, and the diagonal of R, over the vertices of the mesh.
-
-    Args:
-        found: the interfaces.
-        size: number of vertices of the mesh.
-    """
-    for one in found:
-        scale = np.divide(1.0, one.rows.weights, out=np.zeros(size), where=one.rows.weights > 0.0)
-        rows = csr_array((one.rows.first - one.rows.second).multiply(scale[:, None]))
-        yield rows, np.asarray(rows.diagonal())
-
-
-@dataclass(frozen=True)
-class Coupling:
-    """The way between displacements u and unknowns û, both in Cartesian components.
-
-    Attributes:
-        space: of the displacements.
-        matrix: T.
-        inverse: T⁻¹.
-    """
-
-    space: fem.FunctionSpace
-    matrix: PETSc.Mat
-    inverse: PETSc.Mat
-
-    def relative(self, u: Array) -> Array:
-        """T⁻¹ u of a local array, of which the owned values count; a local array. Collective."""
-        return self._local(self.inverse.mult, u)
-
-    def forces(self, values: Array) -> Array:
-        """Tᵀ f: forces on u, at the owned vertices (n, d), as forces on û. Collective."""
-        return self._local(self.matrix.multTranspose, values)[: values.size].reshape(values.shape)
-
-    def forces_on_bodies(self, values: Array) -> Array:
-        """T⁻ᵀ f: forces on û, at the owned vertices (n, d), as forces on the vertices of the bodies. Collective."""
-        return self._local(self.inverse.multTranspose, values)[: values.size].reshape(values.shape)
-
-    def _local(self, product: object, values: Array) -> Array:
-        """A product with a local array, as a local array with ghosts updated."""
-        function = fem.Function(self.space)
-        right, left = self.matrix.createVecs()
-        right.array[:] = values.ravel()[: right.local_size]
-        product(right, left)  # type: ignore[operator]
-        function.x.array[: left.local_size] = left.array_r
-        function.x.scatter_forward()
-        right.destroy()
-        left.destroy()
-        return np.array(function.x.array)
-
-
-def coupled(space: fem.FunctionSpace, interfaces: Sequence[Interface]) -> Coupling | None:
-    """The coupling of interfaces; None where there are none. Collective.
-
-    Args:
-        space: of the displacements.
-        interfaces: none of whose nodes with weights is combined by another.
-    """
-    if not interfaces:
-        return None
-    size, (start, end) = space.dofmap.index_map.size_global, space.dofmap.index_map.local_range
-    inverse, forward = (csr_array(eye_array(size, format="csr")[start:end]) for _ in range(2))
-    for rows, diagonal in whole_rows(interfaces, size):
-        own = diags_array(diagonal[start:end], offsets=0) @ eye_array(size, format="csr")[start:end]
-        rest, scale = rows[start:end] - own, diagonal[start:end]
-        unit = diags_array((scale != 0.0).astype(float), offsets=0) @ eye_array(size, format="csr")[start:end]
-        over = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale != 0.0)
-        inverse = inverse + rest + own - unit
-        forward = forward - diags_array(over, offsets=0) @ (rest - unit) - unit
-    return Coupling(space, _petsc_matrix(space, forward), _petsc_matrix(space, inverse))
-
-
-def _petsc_matrix(space: fem.FunctionSpace, rows: csr_array) -> PETSc.Mat:
-    """A matrix over vertices as one over their vectors, component by component. Collective."""
-    d, index_map = space.dofmap.index_map_bs, space.dofmap.index_map
-    whole = csr_array(kron(csr_array(rows), np.eye(d), format="csr"))
-    whole.eliminate_zeros()
-    whole.sort_indices()
-    size = index_map.size_local * d, index_map.size_global * d
-    arrays = whole.indptr.astype(PETSc.IntType), whole.indices.astype(PETSc.IntType), whole.data
-    matrix = PETSc.Mat().createAIJ((size, size), bsize=d, csr=arrays, comm=space.mesh.comm)
-    matrix.assemble()
-    return matrix

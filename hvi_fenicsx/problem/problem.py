@@ -25,8 +25,9 @@ from ..typing import Array, Entities, Integers
 from . import bodies, contact_surface, spaces
 from .bodies import MeshBodies
 from .contact_surface import Surface
+from .dual_basis import Coupling, coupled
 from .elastic_operator import Bulk
-from .interfaces import Coupling, Interface, coupled
+from .interfaces import Interface
 from .law_term import LawTerm
 from .scaling import PlacedContribution, Scales
 
@@ -211,7 +212,7 @@ class Problem:
     @functools.cached_property
     def coupling(self) -> Coupling | None:
         """The way between displacements and unknowns; None where both are the same. Collective when first used."""
-        return coupled(self.space, self.interfaces)
+        return coupled(self.space, [one.rows for one in self.interfaces])
 
     def with_obstacle_at(self, way: float) -> Problem:
         """The problem where the obstacle that a force presses has moved.

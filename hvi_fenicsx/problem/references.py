@@ -19,7 +19,7 @@ from mpi4py import MPI
 from ..mesh import facets as facet_sizes
 from ..mesh import nodes
 from ..typing import Array, Entities, Integers, Mask
-from . import facet_overlaps, spaces
+from .facets import function_integrals
 from .law_term import LawTerm
 from .problem import Problem
 from .scaling import DEFAULT
@@ -200,17 +200,9 @@ def lumped(problem: Problem, facets: Entities) -> Array:
     own = facet_sizes.owned(problem.domain.mesh, facets)
     found = la.vector(problem.space.dofmap.index_map)
     if len(own):
-        np.add.at(found.array, nodes.facet_nodes(problem.space, own), _weights(problem.space, own))
+        np.add.at(found.array, nodes.facet_nodes(problem.space, own), function_integrals(problem.space, own))
     found.scatter_reverse(la.InsertMode.add)
     return np.asarray(found.array[: problem.space.dofmap.index_map.size_local], dtype=np.float64)
-
-
-def _weights(space: fem.FunctionSpace, facets: Entities) -> Array:
-    """The integrals of the basis functions over facets, m or m², (f, nodes)."""
-    if facet_overlaps.is_curved(space):
-        _, weights, functions = facet_overlaps.samples(space, facets)
-        return np.asarray(weights @ functions)
-    return spaces.facet_weights(space, facet_sizes.areas(facet_sizes.corners(space.mesh, facets)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -157,22 +157,6 @@ def coefficients_of(space: fem.FunctionSpace, points: Array) -> Array:
     return np.asarray((points - share * points[nodes.edge_ends(space)].sum(axis=1)) / (1 - 2 * share))
 
 
-def facet_weights(space: fem.FunctionSpace, sizes: Array) -> Array:
-    """The integrals of the basis functions over facets, by their nodes (:func:`.nodes.facet_nodes`), (k, nodes).
-
-    Args:
-        space: of the displacements.
-        sizes: lengths or areas of the facets, (k,).
-    """
-    d, share = space.mesh.geometry.dim, edge_share(space)
-    if nodes.degree(space) == 1:
-        return np.repeat((sizes / d)[:, None], d, axis=1)
-    vertex, edge = (1 / 6, 2 / 3) if d == 2 else (0.0, 1 / 3)
-    edges_of_vertex, edges = (1, 1) if d == 2 else (2, 3)
-    shares = [vertex + share * edges_of_vertex * edge] * d + [(1 - 2 * share) * edge] * edges
-    return np.asarray(sizes[:, None] * np.array(shares, dtype=np.float64))
-
-
 def simplex_functions(degree: int, barycentric: Array, share: float = 0.0) -> Array:
     """The basis functions of the nodes of a facet or a cell, corners first, at points of it, (q, nodes).
 

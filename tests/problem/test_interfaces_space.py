@@ -17,8 +17,8 @@ from hvi_fenicsx import InputError, Model, Solution, prepare, read_tables, solve
 from hvi_fenicsx.certify import placed_forces
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.joined import PlacedBody, joined
-from hvi_fenicsx.problem import facet_polygons
-from hvi_fenicsx.problem.facet_overlaps import Facets
+from hvi_fenicsx.problem.facet_overlaps import overlaps
+from hvi_fenicsx.problem.facets import Facets
 from hvi_fenicsx.workflow import finish
 
 Array = npt.NDArray[np.float64]
@@ -155,7 +155,7 @@ def triangulated(size: tuple[float, float], height: float, seed: int, up: float)
 
 def test_triangles_are_intersected_exactly() -> None:
     first, second = triangulated((1.0, 1.0), 0.0, 1, -1.0), triangulated((0.7, 1.3), -0.2, 2, 1.0)
-    found = facet_polygons.in_space(first, second)
+    found = overlaps(first, second)
     points = found.points(1)
     x = np.einsum("pk,pki->pi", points.on_first, first.corners[points.first])
     other = np.einsum("pk,pki->pi", points.on_second, second.corners[points.second])
@@ -170,7 +170,7 @@ def test_what_lies_behind_a_nearer_facet_is_not_met() -> None:
     first, near = triangulated((1.0, 1.0), 0.0, 1, -1.0), triangulated((1.0, 1.0), -0.1, 2, 1.0)
     far = triangulated((1.0, 1.0), -0.3, 3, 1.0)
     both = Facets(**{k: np.concatenate([getattr(far, k), getattr(near, k)]) for k in ("nodes", "points", "normals")})
-    found = facet_polygons.in_space(first, both)
+    found = overlaps(first, both)
     assert found.second.min() >= len(far.nodes)
     assert found.areas.sum() == pytest.approx(1.0, rel=1e-12)
 

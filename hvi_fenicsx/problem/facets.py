@@ -1,0 +1,214 @@
+"""Facets, straight or curved through their nodes: places, slopes and quadrature on them, their own coordinates."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import basix
+import numpy as np
+from dolfinx import fem
+
+from .. import compat
+from ..mesh import nodes
+from ..typing import Array, Entities, Integers
+from . import spaces
+
+_DEGREE = 12
+"""Degree of the quadrature on curved facets: areas are square roots of polynomials, nearly constant ones."""
+_KINDS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
+"""Facets by dimension."""
+
+
+def is_curved(space: fem.FunctionSpace) -> bool:
+    """Whether the space lives on curved cells."""
+    return compat.geometry_degree(space.mesh) > 1
+
+
+def rule(dimension: int, degree: int, *, curved: bool) -> tuple[Array, Array]:
+    """A quadrature on facets: barycentric points (q, d), and their weights, whose sum is 1 (q,).
+
+    Args:
+        dimension: of the space.
+        degree: of the functions of which products are integrated exactly on straight facets.
+        curved: whether facets are curved.
+    """
+    made: tuple[Any, Any] = basix.make_quadrature(_KINDS[dimension], _DEGREE if curved else 2 * degree)
+    return np.column_stack([1.0 - made[0].sum(axis=1), made[0]]), np.asarray(made[1] / made[1].sum())
+
+
+def samples(space: fem.FunctionSpace, facets: Entities) -> tuple[Array, Array, Array]:
+    """Quadrature points of facets.
+
+    Args:
+        space: of the displacements.
+        facets: local facets (f of them).
+
+    Returns:
+        The points (q of them), m, (f, q, d), their weights, whose sum is the facet's size, (f, q), and the
+        displacement's basis functions there, (q, nodes).
+    """
+    d = space.mesh.geometry.dim
+    at = nodes.points(space)[nodes.facet_nodes(space, facets)][:, :, :d]
+    where, weights = rule(d, nodes.degree(space), curved=is_curved(space))
+    every = np.repeat(at, len(where), axis=0), np.tile(where, (len(at), 1))
+    sizes = np.linalg.norm(across(slopes(*every)), axis=1).reshape(len(at), len(where)) / (d - 1)
+    functions = spaces.simplex_functions(nodes.degree(space), where, spaces.edge_share(space))
+    return places(*every).reshape(len(at), len(where), d), weights * sizes, functions
+
+
+def function_integrals(space: fem.FunctionSpace, facets: Entities) -> Array:
+    """The integrals of the basis functions over facets, by their nodes, m or m², (f, nodes).
+
+    Args:
+        space: of the displacements.
+        facets: local facets (f of them).
+    """
+    _, weights, functions = samples(space, facets)
+    return np.asarray(weights @ functions)
+
+
+def places(nodes: Array, barycentric: Array) -> Array:
+    """Where points are, (p, k).
+
+    Args:
+        nodes: of the facet of each point, corners first, then midpoints of edges in the order of basix, (p, n, k).
+        barycentric: the points, (p, d).
+    """
+    degree = 1 if nodes.shape[1] == barycentric.shape[1] else 2
+    return np.asarray(np.einsum("pn,pnk->pk", spaces.simplex_functions(degree, barycentric), nodes))
+
+
+def slopes(nodes: Array, barycentric: Array) -> Array:
+    """The derivatives of the place by all barycentric coordinates but the first, (p, d-1, k).
+
+    Args:
+        nodes: as for :func:`places`.
+        barycentric: the points, (p, d).
+    """
+    d = barycentric.shape[1]
+    if nodes.shape[1] == d:
+        return np.asarray(nodes[:, 1:] - nodes[:, :1])
+    by = (4.0 * barycentric - 1.0)[:, :, None] * nodes[:, :d]
+    for node, (a, b) in enumerate(_ends(d), d):
+        by[:, a] += 4.0 * barycentric[:, [b]] * nodes[:, node]
+        by[:, b] += 4.0 * barycentric[:, [a]] * nodes[:, node]
+    return np.asarray(by[:, 1:] - by[:, :1])
+
+
+def _ends(dimension: int) -> list[list[int]]:
+    """The ends of the edges of a facet, in the order of their midpoints."""
+    found: list[list[int]] = basix.topology(_KINDS[dimension])[1]
+    return found
+
+
+def across(slopes: Array) -> Array:
+    """Vectors along the normals, their lengths what a facet has of length or twice its area there, (p, d).
+
+    Args:
+        slopes: in d dimensions, (p, d-1, d).
+    """
+    if slopes.shape[2] == 2:
+        return np.column_stack([slopes[:, 0, 1], -slopes[:, 0, 0]])
+    return np.asarray(np.cross(slopes[:, 0], slopes[:, 1]), dtype=np.float64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Facets:
+    """The facets of one side, the same on all ranks (f of them).
+
+    Attributes:
+        nodes: global numbers of their nodes, corners first, (f, n).
+        points: these nodes, those of curved sides on their curves, m, (f, n, d).
+        normals: outward unit normals of the corners' segments or triangles, (f, d).
+        share: of an edge's function that goes to each of its ends (:func:`.spaces.edge_share`).
+        curved: whether they are curved through their nodes, else segments or triangles.
+    """
+
+    nodes: Integers
+    points: Array
+    normals: Array
+    share: float = 0.0
+    curved: bool = False
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.points.shape[2]
+
+    @property
+    def degree(self) -> int:
+        """The degree of the elements."""
+        return 1 if self.points.shape[1] == self.dimension else 2
+
+    @property
+    def corners(self) -> Array:
+        """The vertices, m, (f, d, d)."""
+        return self.points[:, : self.dimension]
+
+    @property
+    def edges(self) -> list[list[int]]:
+        """The ends of the edges whose midpoints are nodes, in their order."""
+        return _ends(self.dimension) if self.degree == 2 else []
+
+    def _middles(self, share: float, weight: float) -> Array:
+        """The nodes, of each midpoint that less a share of both ends, times a weight, (f, n, d)."""
+        found = self.points.copy()
+        for node, ends in enumerate(self.edges, self.dimension):
+            found[:, node] = weight * (found[:, node] - share * found[:, ends].sum(axis=1))
+        return found
+
+    @property
+    def hull(self) -> Array:
+        """Points whose convex hull holds each facet, curved or not, m, (f, n, d): Bézier's points."""
+        return self._middles(0.25, 2.0)
+
+    @property
+    def positions(self) -> Array:
+        """The coefficients of the positions of the nodes, m, (f, n, d)."""
+        return self._middles(self.share, 1 / (1 - 2 * self.share))
+
+    def functions(self, barycentric: Array) -> Array:
+        """The basis functions of the nodes at points (..., d) of a facet, (..., n)."""
+        flat = spaces.simplex_functions(self.degree, barycentric.reshape(-1, self.dimension), self.share)
+        return flat.reshape(*barycentric.shape[:-1], -1)
+
+    @functools.cached_property
+    def areas(self) -> Array:
+        """Lengths or areas of the corners' segments or triangles, m^(d-1), (f,)."""
+        sides = self.corners[:, 1:] - self.corners[:, :1]
+        return np.asarray(np.linalg.norm(across(sides), axis=1) / (self.dimension - 1))
+
+    @property
+    def width(self) -> float:
+        """The longest edge, m."""
+        return float(np.max(np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=1), axis=2)))
+
+    @functools.cached_property
+    def _frames(self) -> Array:
+        """Distances from a facet's first corner times these are its own coordinates, (f, d, d)."""
+        sides = self.corners[:, 1:] - self.corners[:, :1]
+        return np.asarray(np.linalg.inv(np.concatenate([sides, self.normals[:, None]], axis=1)))
+
+    def own_coordinates(self, facets: Integers, points: Array) -> Array:
+        """Points (p, n, d) in the coordinates of facets (p,), (p, n, d)."""
+        return np.asarray(np.einsum("pvi,pij->pvj", points - self.corners[facets, :1], self._frames[facets]))
+
+    def normals_at(self, facets: Integers, barycentric: Array) -> Array:
+        """The outward unit normals at points (p, d) of facets (p,), (p, d)."""
+        found = across(slopes(self.points[facets], barycentric))
+        found /= np.linalg.norm(found, axis=1, keepdims=True)
+        return np.asarray(found * np.sign(np.sum(found * self.normals[facets], axis=1, keepdims=True)))
+
+
+def outward(corners: Array, inner: Array) -> Array:
+    """The unit normals of segments or triangles away from points inside, (f, d).
+
+    Args:
+        corners: of the facets, (f, d, d).
+        inner: points inside, (f, d).
+    """
+    normals = across(corners[:, 1:] - corners[:, :1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(normals * -np.sign(np.sum(normals * (inner - corners[:, 0]), axis=1, keepdims=True)))
