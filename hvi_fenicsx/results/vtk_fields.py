@@ -20,7 +20,7 @@ from ..problem import spaces
 from ..problem.problem import Problem
 from ..problem.stress import von_mises
 from ..rigid import Mode
-from ..typing import Array, Entities, Integers
+from ..typing import Array, Entities
 from ..workflow import Solution
 from . import vtk_files
 from .gathering import columns_of
@@ -52,7 +52,8 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
         cells["error"] = _in_parts(problem, estimate.cells / (estimate.energy_norm or 1.0))
     if len(problem.bodies.single()) > 1:
         cells["body"] = _in_parts(problem, problem.bodies.number_at(nodes.owned_cells(problem.space)[:, 0]))
-    _write_on_body(path, problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
+    grid = _body(problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
+    vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", grid)])
 
 
 def _strain_of_parts(problem: Problem, u: Array) -> Array:
@@ -91,31 +92,22 @@ def _in_parts(problem: Problem, values: npt.NDArray[Any]) -> Array:
     return np.repeat(values.astype(np.float64), nodes.parts_of_cell(problem.space))
 
 
-def _write_on_body(path: Path, problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> None:
-    """Write fields at all local nodes and, in single precision, in the parts of the owned cells. Collective."""
-    vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", _grid(problem, at_points, in_cells))])
-
-
-def _grid(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
+def _body(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
     """This rank's part of the body with fields at all local nodes and in the parts of the owned cells."""
-    used, cells = _numbered(problem, nodes.linear_cells(problem.space))
+    return _grid(problem, nodes.linear_cells(problem.space), at_points, in_cells)
+
+
+def _grid(problem: Problem, cells: Entities, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
+    """Cells or facets of this rank as a mesh, with fields at all local nodes and, in single precision, in the cells."""
+    used = np.zeros(len(problem.positions), dtype=np.bool_)
+    used[cells] = True  # marked, not sorted: that takes a tenth of the time
     return Grid(
         points=problem.positions[used],
-        cells=cells,
-        at_points={name: in_space(values[used]) for name, values in at_points.items()},
-        in_cells={name: _in_rows(values).astype(np.float32) for name, values in in_cells.items()},
-        units=_units(problem),
+        cells=(np.cumsum(used) - 1)[cells],
+        at_points={name: v[used] if v.ndim == 1 else in_space(v[used]) for name, v in at_points.items()},
+        in_cells={n: v.reshape(len(v), math.prod(v.shape[1:])).astype(np.float32) for n, v in in_cells.items()},
+        units=_UNITS | {"reaction": "N/m" if problem.scales.dimension == 2 else "N"},
     )
-
-
-def _numbered(problem: Problem, cells: Entities) -> tuple[Integers, Integers]:
-    """The local nodes that cells (c, k) have, ascending, and the cells by their numbers among them.
-
-    Nodes are marked, not sorted: that takes a tenth of the time.
-    """
-    used = np.zeros(len(problem.positions), dtype=np.bool_)
-    used[cells] = True
-    return np.flatnonzero(used), (np.cumsum(used) - 1)[cells]
 
 
 def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, float, fem.Function]]) -> None:
@@ -134,20 +126,10 @@ def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, flo
     def entries() -> Iterator[Entry]:
         for number, (time, factor, u) in enumerate(states):
             field = spaces.values(problem.space, u.x.array) * problem.scales.displacement
-            grid = _grid(problem, {"displacement": field}, {"factor": np.full(count, factor)})
+            grid = _body(problem, {"displacement": field}, {"factor": np.full(count, factor)})
             yield time, 0, f"-{number:05d}", grid
 
     vtk_files.write(path, problem.domain.mesh.comm, entries())
-
-
-def _units(problem: Problem) -> dict[str, str]:
-    """The units of the fields that have one, by name."""
-    return _UNITS | {"reaction": "N/m" if problem.scales.dimension == 2 else "N"}
-
-
-def _in_rows(values: Array) -> Array:
-    """Values by cell, tensors as rows of components, (c, k)."""
-    return values.reshape(len(values), math.prod(values.shape[1:]))
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
@@ -162,7 +144,8 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
         InputError: it cannot be written, on all ranks alike.
     """
     points = np.asarray(problem.points / problem.scales.length)
-    _write_on_body(path, problem, {"escape_mode": problem.bodies.motion(points, mode)}, {})
+    grid = _body(problem, {"escape_mode": problem.bodies.motion(points, mode)}, {})
+    vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", grid)])
 
 
 def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) -> None:
@@ -191,23 +174,15 @@ def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -
     """This rank's facets as a mesh of their own, with some values at all local nodes of the body."""
     mesh, d = problem.domain.mesh, problem.scales.dimension
     owned = facets[facets < mesh.topology.index_map(d - 1).size_local]
-    used, cells = _numbered(problem, nodes.linear_facets(problem.space, owned))
-    return Grid(
-        points=problem.positions[used],
-        cells=cells,
-        at_points={name: values[used] for name, values in nodal.items()},
-        in_cells={},
-        units=_units(problem),
-    )
+    return _grid(problem, nodes.linear_facets(problem.space, owned), nodal, {})
 
 
 def _second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:
-    """The tractions on the second sides of interfaces at all local nodes, N/m², (n, 3). Collective."""
-    owned = in_space(placed_forces.second_tractions(problem, states)) * problem.scales.stress
-    found = la.vector(problem.space.dofmap.index_map, 3)
-    found.array[: owned.size] = owned.ravel()
-    found.scatter_forward()
-    return found.array.reshape(-1, 3)
+    """The tractions on the second sides of interfaces at all local nodes, N/m², (n, d). Collective."""
+    found, owned = fem.Function(problem.space), placed_forces.second_tractions(problem, states)
+    found.x.array[: owned.size] = owned.ravel() * problem.scales.stress
+    found.x.scatter_forward()
+    return found.x.array.reshape(-1, owned.shape[1])
 
 
 def _nodal(problem: Problem, states: Sequence[ContactState]) -> dict[str, Array]:

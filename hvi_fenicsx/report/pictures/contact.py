@@ -138,8 +138,8 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     else:
         note = _fallen(axes, part["branch_t" if field.kind == "friction" else "branch_n"] > 0, s, values, field.colour)
     axes.set_title(note, loc="right", size=11.5, color=GREY)
-    for start, end in _lifted_spans(part):
-        axes.axvspan(start / length.size, end / length.size, color=ORANGE, alpha=0.16, lw=0)
+    everywhere: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "color": ORANGE, "alpha": 0.16, "lw": 0}
+    axes.fill_between(s, 0.0, 1.0, where=part.lifted.tolist(), **everywhere)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)  # zero is always in sight
     axes.margins(0.015, 0.06)
     few_ticks(axes, "y")
@@ -161,14 +161,6 @@ def _fallen(axes: Axes, fallen: Mask, s: Array, values: Array, colour: str) -> s
         return ""
     axes.plot(s[fallen], values[fallen], "o", mfc="white", mec=colour, ms=6)
     return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
-
-
-def _lifted_spans(part: ContactPart) -> Iterator[tuple[float, float]]:
-    """Stretches of s whose vertices are lifted; each vertex stands for half the way to its neighbours."""
-    s = part["s"]
-    middles = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
-    changes = np.flatnonzero(np.diff(np.concatenate([[0], part.lifted.astype(int), [0]])))
-    return ((float(middles[a]), float(middles[b])) for a, b in changes.reshape(-1, 2))
 
 
 def _maps(result: Result, part: ContactPart) -> Figure:
