@@ -15,10 +15,9 @@ from .curve import CurvedBranch
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
 from .jumps import landing
-from .load_history import Cycle, Cycles, LoadHistory
 from .pivoting import StraightBranch
 from .relations import ContactPoints
-from .state import End, Event, EventPlace, Follow, PathOptions, PathState, Stopped, place_of
+from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped, place_of
 from .straight_state import coordinates_at
 from .vertex_laws import factors, multiplied
 
