@@ -1,6 +1,4 @@
-"""What is asked of a follower, and what it reports: the states along a load path, how the path ended,
-and where it is in its history of load factors: cycles are detected.
-"""
+"""What is asked of a follower and what it reports: states, how a path ended, and its history of load factors."""
 
 from __future__ import annotations
 
