@@ -519,7 +519,8 @@ class EstimateThresholds:
         tolerance: of a solve for bubbles, in the energy norm, and of one with the system's matrix, relative residual:
             an energy is right to about its square.
         rough_tolerance: the same where the answer is a small part or is taken up by a next round: what the solver left,
-            and bubbles that are found again beside nodes that moved, and nodes among those rounds.
+            and bubbles that are found again beside nodes that moved, at degree 1; such bubbles at degree 2, and nodes
+            among those rounds.
         bubble_steps: conjugate gradient steps at most of a solve for bubbles; bisections of the body's motion along a
             normal, where a gap varies within facets.
         rounds: of the active set of the bounds between the nodes, and of corrections of the nodes' answer to bubbles by
@@ -540,7 +541,7 @@ class EstimateThresholds:
 
     facet_degree: tuple[int, int] = (12, 30)
     tolerance: float = 0.1
-    rough_tolerance: float = 0.2
+    rough_tolerance: tuple[float, float] = (0.3, 0.2)
     bubble_steps: int = 30
     rounds: int = 4
     vertex_tolerance: float = 1e-6

@@ -239,7 +239,8 @@ class LeastEnergy:
         """Find them; from the second time on from those that were found before. Collective."""
         stiffness, e = self._stiffness, self._e
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
-        tolerance = DEFAULT.rough_tolerance if self._begun else DEFAULT.tolerance
+        rough = DEFAULT.rough_tolerance[nodes.degree(stiffness.problem.space) - 1]
+        tolerance = rough if self._begun else DEFAULT.tolerance
         goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), DEFAULT.rounding**2)
         for _ in range(DEFAULT.rounds):
             self._put_on_bounds()

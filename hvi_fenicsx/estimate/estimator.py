@@ -95,7 +95,7 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
     cells += data_errors.squares_at_ends(problem, traces.bubbles, u, examination, inverse)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
-    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance)
+    _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])
     inverse.destroy()
     comm = problem.domain.mesh.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
@@ -243,7 +243,7 @@ class Coupled:
             unmet = -asked
             unmet -= self._force
             unmet[laws.blocks] += laws.values
-            step, length = inverse.solve(unmet, DEFAULT.rough_tolerance)
+            step, length = inverse.solve(unmet, DEFAULT.rough_tolerance[1])
             nodes.x.array[:] += step.x.array
             self._force = inverse.force(nodes)
             self._longest = max(self._longest, length)
