@@ -20,8 +20,7 @@ from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .branch import Branch, Move, Passage, Refused, StepEnd
 from .equations import CurvePoint
-from .events import CurveStep, Events, displacement_rate, driven_work
-from .passages import Crossing
+from .events import Crossing, CurveStep, Events, displacement_rate, driven_work
 from .pivoting import StraightBranch
 from .relations import ContactPoints
 from .state import Position
