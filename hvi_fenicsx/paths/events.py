@@ -216,11 +216,12 @@ class Events(CurveEquations):
 class Crossing:
     """The passages at the present point of a curve, where points go on from one segment to the next.
 
-    At such a point the equations are piecewise linear to first order. Where several points are at ends of their segments,
-    the load is imagined to be perturbed by ε q with ε infinitesimal: each then comes to its end at a way of its own of the
-    order ε, one after the other, until the curve leads away from all ends (as on straight segments, :mod:`.pivoting`). The
-    point that passes goes on along its graph, and that gives the direction in which the curve goes on. The order of the
-    points comes from where they are, so that it is the same on any number of ranks.
+    At such a point the equations are piecewise linear to first order. Where several points are at ends of their
+    segments, the load is imagined to be perturbed by ε q with ε infinitesimal: each then comes to its end at a way
+    of its own of the order ε, one after the other, until the curve leads away from all ends (as on straight
+    segments, :mod:`.pivoting`). The point that passes goes on along its graph, and that gives the direction in
+    which the curve goes on. The order of the points comes from where they are, so that it is the same on any number
+    of ranks.
 
     Args:
         curve: the curve; its direction and its points' statuses are changed.
