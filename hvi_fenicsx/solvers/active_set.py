@@ -7,9 +7,9 @@ function, and a preconditioner that works at full size.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,8 @@ from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.multigrid import Levels
 from ..system.petsc_options import default_options, prefix, raise_python_error
 from ..system.system import System
-from ..system.thresholds import Thresholds
 from ..typing import Entities
-from .convergence import NOT_MEASURED, ConvergenceTest, Outcome
+from .convergence import ConvergenceTest, Counts, Outcome, Sizes
 
 StepReport = Callable[[int, float, int], None]
 """Called with iteration, residual, and vertices in contact (of all ranks)."""
@@ -37,6 +36,33 @@ _WORDS = {
     _REASON[NOT_A_NUMBER]: "the residual is no number",
 }
 """What PETSc's reasons mean, for users."""
+FULL_STEPS = "basic"
+"""PETSc's name of the line search that shortens no step."""
+EXACT = "cp"
+"""PETSc's name of the one that looks for where the slope of the energy along a step is zero."""
+ENERGY = "bt"
+"""PETSc's name of the one that backtracks by the energy."""
+Bounds = tuple[PETSc.Vec, PETSc.Vec]
+"""Lower and upper ones."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """One way to solve.
+
+    Attributes:
+        models: what takes the place of the laws, by term.
+        line_search: PETSc's name; ``bt`` uses the energy.
+        start: where to begin instead; None for where it would.
+        steady: whether the start's active set is expected to be the final one; the first linear solve is then exact.
+        foundation: as in :meth:`.Equations.tangents`; the residual has none, so the solution is the same.
+    """
+
+    models: Sequence[LawModel]
+    line_search: str = FULL_STEPS
+    start: PETSc.Vec | None = None
+    steady: bool = False
+    foundation: float = 0.0
 
 
 class ActiveSetSolver:
@@ -63,9 +89,8 @@ class ActiveSetSolver:
         timer: Timer,
         interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
-        self.system, self.settings, self.timer = system, settings, timer
+        self.system, self.settings, self.timer, self.interrupted = system, settings, timer, interrupted
         self.held = HeldPreconditioner(system, levels, settings, timer)
-        self.interrupted, self.thresholds = interrupted, system.thresholds
         self.convergence = ConvergenceTest(system)
         self.progress: StepReport | None = None
         self._residual = system.load.duplicate()
@@ -131,296 +156,213 @@ class ActiveSetSolver:
         step.destroy()
         return Outcome(reason > 0 and finite, 1, iterations, float("nan"), f"KSP reason {reason}")
 
-    def solve(
+    def first_success(
         self,
         x: PETSc.Vec,
-        models: Sequence[LawModel],
+        attempts: Iterable[Attempt | str],
         tolerance: float,
-        *,
-        lower: PETSc.Vec,
-        upper: PETSc.Vec,
-        line_search: str = "bt",
-        max_iterations: int = 60,
-        steady: bool = False,
-        foundation: float = 0.0,
+        bounds: Bounds,
+        counts: Counts,
+        most: int,
     ) -> Outcome:
+        """The outcome of the first attempt that converges, else of the one with the smallest residual. Collective.
+
+        Args:
+            x: start and result.
+            attempts: the next is asked for only after the last has failed; a text is the reason to end.
+            tolerance: of :meth:`measure`.
+            bounds: lower and upper bounds.
+            counts: gets the iterations of all.
+            most: Newton steps of each at most.
+        """
+        begin, best = x.copy(), x.copy()
+        outcome = found = Outcome(False, 0, 0, float("inf"), "not started")
+        for attempt in attempts:
+            if isinstance(attempt, str):
+                outcome = replace(outcome, reason=attempt)
+                break
+            (begin if attempt.start is None else attempt.start).copy(x)
+            x.copy(begin)
+            found = self.solve(x, attempt, tolerance, bounds, most)
+            counts.add_outcome(found)
+            if found.measure < outcome.measure or found.converged:
+                outcome = found
+                x.copy(best)
+            if found.converged or found.interrupted:
+                break
+            # an energy that has fallen is kept; else the next attempt begins where this one began
+            if attempt.line_search == ENERGY and np.isfinite(found.measure):
+                x.copy(begin)
+        best.copy(x)
+        for vector in (begin, best):
+            vector.destroy()
+        return replace(outcome, interrupted=found.interrupted)
+
+    def solve(self, x: PETSc.Vec, attempt: Attempt, tolerance: float, bounds: Bounds, most: int) -> Outcome:
         """Minimise the energy of the models between the bounds. Collective.
 
         Args:
             x: start and result.
-            models: what takes the place of the laws, by term.
+            attempt: how.
             tolerance: of :meth:`measure`.
-            lower: lower bounds.
-            upper: upper bounds.
-            line_search: PETSc's name; ``bt`` uses the energy.
-            max_iterations: Newton steps at most.
-            steady: whether x's active set is expected to be the final one; the first linear solve is then exact.
-            foundation: as in :meth:`.Equations.tangents`; the residual has none, so the solution is the same.
+            bounds: lower and upper bounds.
+            most: Newton steps at most.
         """
-        bounds = lower, upper
-
-        def once() -> Outcome:
-            return self._once(x, _SnesRun(self, models, tolerance, bounds, steady=steady, foundation=foundation), *how)
-
-        how = line_search, max_iterations
         with self.timer("solve"):
             self.system.evaluate_by_cells(x)
-            found, left = once(), np.inf
-            while not found.interrupted and found.measure <= self.thresholds.coarse_tolerance:
-                self.system.evaluate_by_cells(x)
-                self.system.equations.residual(x, self._residual, models)
-                sizes = self.convergence.sizes(x, self._residual, *bounds)
-                found = replace(found, converged=sizes.worst <= tolerance, measure=sizes.worst)
-                if found.converged or sizes.worst > 0.5 * left:
+            found, left = _SnesRun(self, attempt, tolerance, bounds).into(x, most), np.inf
+            while not found.interrupted and found.measure <= self.system.thresholds.coarse_tolerance:
+                found, sizes = self._measured(found, x, attempt.models, tolerance, bounds)
+                if found.converged or found.measure > 0.5 * left:
                     return self.convergence.accept_rounding(found, sizes, x, tolerance)
-                left, found = sizes.worst, found.followed_by(once())
+                left, again = found.measure, _SnesRun(self, attempt, tolerance, bounds).into(x, most)
+                found = found.followed_by(again)
             return found
 
-    def _once(self, x: PETSc.Vec, run: _SnesRun, line_search: str, max_iterations: int) -> Outcome:
-        """One run of SNES from and into x. Collective."""
-        snes = run.create(line_search, max_iterations)
+    def judged(
+        self, found: Outcome, x: PETSc.Vec, models: Sequence[LawModel], tolerance: float, bounds: Bounds
+    ) -> Outcome:
+        """The outcome of a solve: converged if the residual at x is small, or as small as rounding allows. Collective.
+
+        Args:
+            found: of the solve.
+            x: its result.
+            models: what takes the place of the laws, by term.
+            tolerance: of :meth:`measure`.
+            bounds: lower and upper bounds.
+        """
+        found, sizes = self._measured(found, x, models, tolerance, bounds)
+        return self.convergence.accept_rounding(found, sizes, x, tolerance)
+
+    def _measured(
+        self, found: Outcome, x: PETSc.Vec, models: Sequence[LawModel], tolerance: float, bounds: Bounds
+    ) -> tuple[Outcome, Sizes]:
+        self.system.evaluate_by_cells(x)
+        self.system.equations.residual(x, self._residual, models)
+        sizes = self.convergence.sizes(x, self._residual, *bounds)
+        return replace(found, converged=sizes.worst <= tolerance, measure=sizes.worst), sizes
+
+
+class _SnesRun:
+    """One SNES solve: its convergence test, and the context of its matrix and of its linear solver.
+
+    J's inactive part is not copied; its equations are solved at full size (:class:`.HeldPreconditioner`).
+    """
+
+    def __init__(self, owner: ActiveSetSolver, attempt: Attempt, tolerance: float, bounds: Bounds) -> None:
+        self._owner, self._attempt, self._tolerance, self._bounds = owner, attempt, tolerance, bounds
+        self._system, self._thresholds = owner.system, owner.system.thresholds
+        self._last = self._least = float("inf")
+        self._useless, self._stood, self._stopped, self._reason = 0, False, False, ""
+        self._active: Entities | None = None
+
+    def into(self, x: PETSc.Vec, most: int) -> Outcome:
+        """Run SNES from and into x. Collective."""
+        self._snes = snes = self._configured(most)
         try:
             snes.solve(None, x)
         except PETSc.Error as error:
             raise_python_error(error)
-            run.failure = f"PETSc error {error.ierr}"
+            self._last, self._reason = np.inf, f"PETSc error {error.ierr}"
         finally:
-            run.finish(snes)
-        return run.outcome()
+            steps, linear = snes.getIterationNumber(), snes.getLinearSolveIterations()
+            name = _REASON.get(int(snes.getConvergedReason()), "")
+            snes.destroy()
+        left = self._last if np.isfinite(self._last) else np.inf
+        reason = self._reason or (f"{_WORDS[name]} ({name})" if name in _WORDS else name)
+        return Outcome(left <= self._tolerance, steps, linear, left, reason, self._stopped)
 
-    def check_step(self, step: Outcome, x: PETSc.Vec, models: Sequence[LawModel], tolerance: float) -> Outcome:
-        """The outcome of a step without bounds: converged if the residual at x is small enough. Collective.
-
-        Args:
-            step: the outcome of the linear solve.
-            x: the result of the step.
-            models: what takes the place of the laws, by term.
-            tolerance: of :meth:`measure`.
-        """
-        self.system.evaluate_by_cells(x)
-        self.system.equations.residual(x, self._residual, models)
-        sizes = self.convergence.sizes_without_bounds(x, self._residual)
-        found = replace(step, converged=sizes.worst <= tolerance, measure=sizes.worst)
-        return self.convergence.accept_rounding(found, sizes, x, tolerance)
-
-
-class _SnesRun:
-    """The callbacks of one SNES solve.
-
-    Attributes:
-        failure: the error of PETSc that it ended with; else empty.
-    """
-
-    def __init__(
-        self,
-        owner: ActiveSetSolver,
-        models: Sequence[LawModel],
-        tolerance: float,
-        bounds: tuple[PETSc.Vec, PETSc.Vec],
-        *,
-        steady: bool,
-        foundation: float,
-    ) -> None:
-        self.owner, self.models, self.tolerance = owner, models, tolerance
-        self.thresholds, self.steady, self.foundation = owner.thresholds, steady, foundation
-        self.lower, self.upper = bounds
-        self.last, self.linear, self.iterations, self.reason = float("inf"), 0, 0, 0
-        self.sizes, self.failure = NOT_MEASURED, ""
-        self.stopped = self.far = False
-
-    def create(self, line_search: str, max_iterations: int) -> PETSc.SNES:
-        """The configured SNES."""
-        system = self.owner.system
-        self._stalls = StallTest(self.thresholds, full_steps=line_search == FULL_STEPS)
+    def _configured(self, most: int) -> PETSc.SNES:
+        system, attempt = self._system, self._attempt
+        matrix = self._python_matrix(system.jacobian.matrix.getSizes())
         snes = PETSc.SNES().create(system.comm)
         snes.setType("vinewtonrsls")
-        snes.setFunction(self._function, system.load.duplicate())
-        snes.setJacobian(self._jacobian, unextracted(self.owner.held))
-        snes.setVariableBounds(self.lower, self.upper)
-        snes.setObjective(lambda _, x: system.equations.energy_from_base(x, self.models))
-        snes.setConvergenceTest(self._converged)
-        snes.setTolerances(max_it=max_iterations)
-        near = self.thresholds.near * float(np.min(system.references.scale))
-        with default_options(
-            {"snes_linesearch_type": line_search, "snes_linesearch_max_it": 40, "snes_vi_zero_tolerance": near}
-        ):
-            snes.setOptionsPrefix(prefix())
-            snes.getKSP().setOptionsPrefix(f"{prefix()}inactive_")
-            snes.setFromOptions()
-        self._set_linear_solve(snes)
-        return snes
-
-    def _set_linear_solve(self, snes: PETSc.SNES) -> None:
-        """The KSP of the inactive dofs. The user's -ksp_type is for the one at full size that it calls."""
+        snes.setFunction(lambda _, x, f: system.equations.residual(x, f, attempt.models), system.load.duplicate())
+        snes.setJacobian(self._set_tangent, matrix)
+        snes.setVariableBounds(*self._bounds)
+        snes.setObjective(lambda _, x: system.equations.energy_from_base(x, attempt.models))
+        snes.setConvergenceTest(self._test)
+        snes.setTolerances(max_it=most)
+        near = self._thresholds.near * float(np.min(system.references.scale))
+        search = {"snes_linesearch_type": attempt.line_search, "snes_linesearch_max_it": 40}
         ksp = snes.getKSP()
+        with default_options({**search, "snes_vi_zero_tolerance": near}):
+            snes.setOptionsPrefix(prefix())
+            ksp.setOptionsPrefix(f"{prefix()}inactive_")  # the user's -ksp_type is for the one at full size
+            snes.setFromOptions()
         ksp.getPC().setType(PETSc.PC.Type.NONE)
         ksp.setType(PETSc.KSP.Type.PYTHON)
-        ksp.setPythonContext(InactiveSolve(snes, self.owner.held, self._goal))
+        ksp.setPythonContext(self)
+        return snes
 
-    def _goal(self, *, moved: bool) -> float:
-        """How exact a linear solve is: what the tolerance needs, but loose while the active set changes."""
-        thresholds = self.thresholds
-        least = thresholds.loose if moved else 0.0 if self.steady else thresholds.coarse_tolerance
-        return max(thresholds.margin**2 * self.tolerance / self.last, least)
+    def _python_matrix(self, sizes: Any) -> PETSc.Mat:
+        matrix = PETSc.Mat().createPython(sizes, self, comm=self._system.comm)
+        matrix.setUp()
+        return matrix
 
-    def finish(self, snes: PETSc.SNES) -> None:
-        """Take iterations and reason from the SNES, and free it."""
-        self.iterations, self.reason = snes.getIterationNumber(), snes.getConvergedReason()
-        self.linear = snes.getLinearSolveIterations()
-        snes.destroy()
+    def _set_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
+        rates = self._system.equations.tangents(x, self._attempt.models, self._attempt.foundation)
+        self._system.jacobian.set_rates(rates)
 
-    def outcome(self) -> Outcome:
-        """How it ended."""
-        left = np.inf if self.failure or not np.isfinite(self.last) else self.last
-        return Outcome(left <= self.tolerance, self.iterations, self.linear, left, self._reason(), self.stopped)
-
-    def _reason(self) -> str:
-        """Why it ended, in our words, and PETSc's."""
-        if self.failure:
-            return self.failure
-        if self.far:
-            return f"a displacement of more than {self.thresholds.runaway:.0e} times p0 L / E0"
-        name = _REASON.get(int(self.reason), str(self.reason))
-        words = f"{_WORDS[name]} ({name})" if name in _WORDS else name
-        return "interrupted" if self.stopped else words
-
-    def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-        self.owner.system.equations.residual(x, f, self.models)
-
-    def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
-        system = self.owner.system
-        system.jacobian.set_rates(system.equations.tangents(x, self.models, self.foundation))
-
-    def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
-        x, (f, _) = snes.getSolution(), snes.getFunction()[:2]
-        self.sizes = self.owner.convergence.sizes(x, f, self.lower, self.upper)
-        self.last = self.sizes.worst
-        if self.owner.progress:
-            self.owner.progress(iteration, self.last, self.owner.in_contact(x))
-        moved = self.owner.system.equations.from_base(x).norm(PETSc.NormType.INFINITY)
-        self.far = moved > self.thresholds.runaway
-        if self.last <= self.tolerance and not self.far:
-            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
-        self.stopped = self.owner.interrupted()
-        if self.stopped:
-            return PETSc.SNES.ConvergedReason.DIVERGED_FUNCTION_COUNT
-        if self.far or not np.isfinite(self.last):
+    def _test(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
+        """PETSc's convergence test: the residual of the inequality, and whether to give up."""
+        x, owner, reasons = snes.getSolution(), self._owner, PETSc.SNES.ConvergedReason
+        before, self._last = self._last, owner.measure(x, snes.getFunction()[0], *self._bounds)
+        if owner.progress:
+            owner.progress(iteration, self._last, owner.in_contact(x))
+        moved = self._system.equations.from_base(x).norm(PETSc.NormType.INFINITY)
+        if moved > self._thresholds.runaway:
+            self._reason = f"a displacement of more than {self._thresholds.runaway:.0e} times p0 L / E0"
+        elif self._last <= self._tolerance:
+            return reasons.CONVERGED_FNORM_RELATIVE
+        self._stopped = owner.interrupted()
+        if self._stopped:
+            self._reason = self._reason or "interrupted"
+            return reasons.DIVERGED_FUNCTION_COUNT
+        if self._reason or not np.isfinite(self._last):
             return NOT_A_NUMBER
-        reasons = PETSc.SNES.ConvergedReason
-        return reasons.DIVERGED_DTOL if self._stalls.gives_up(self.last) else reasons.CONVERGED_ITERATING
+        return reasons.DIVERGED_DTOL if self._gives_up(before) else reasons.CONVERGED_ITERATING
 
+    def _gives_up(self, before: float) -> bool:
+        """Whether for long no step has halved the residual, or two in a row have not changed it.
 
-class StallTest:
-    """Is told the residual of each step.
-
-    Args:
-        thresholds: when to give up.
-        full_steps: whether no line search shortens the steps: these may go round in a circle for ever. Those of a
-            search are of use where the energy falls, even if the residual does not.
-    """
-
-    def __init__(self, thresholds: Thresholds, *, full_steps: bool) -> None:
-        self._thresholds, self._full_steps = thresholds, full_steps
-        self._least = self._last = np.inf
-        self._useless, self._stood = 0, False
-
-    def gives_up(self, residual: float) -> bool:
-        """Whether to give up after a step: for long none has halved the residual, or two in a row have not changed it.
-
-        Args:
-            residual: relative, after the step.
+        Full steps may go round in a circle for ever; those of a line search are of use where the energy falls, even if
+        the residual does not.
         """
-        self._useless = 0 if residual < 0.5 * self._least else self._useless + 1
-        small, before = self._thresholds.coarse_tolerance, self._stood
-        self._stood = abs(residual - self._last) < small * self._last
-        self._least, self._last = min(self._least, residual), residual
-        counts = self._full_steps or residual < small
-        return (before and self._stood) or (counts and self._useless >= self._thresholds.few_steps)
-
-
-def unextracted(held: HeldPreconditioner) -> PETSc.Mat:
-    """J for SNES VI: its inactive part is multiplied at full size instead of being copied."""
-    sizes = held.system.jacobian.matrix.getSizes()
-    matrix = PETSc.Mat().createPython(sizes, _FullMatrix(held), comm=held.system.comm)
-    matrix.setUp()
-    return matrix
-
-
-class _FullMatrix:
-    """PETSc's view of J, which is symmetric."""
-
-    def __init__(self, held: HeldPreconditioner) -> None:
-        self._held = held
+        small, stood, left = self._thresholds.coarse_tolerance, self._stood, self._last
+        self._useless = 0 if left < 0.5 * self._least else self._useless + 1
+        self._stood = abs(left - before) < small * before
+        self._least = min(self._least, left)
+        counts = self._attempt.line_search == FULL_STEPS or left < small
+        return (stood and self._stood) or (counts and self._useless >= self._thresholds.few_steps)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Multiply y = J x; a line search that fails needs it to test for a minimum of the residual's norm. Collective.
-
-        Args:
-            _: the matrix whose context this is.
-            x: the vector.
-            y: where the product is written.
-        """
-        self._held.system.jacobian.matrix.mult(x, y)
+        """Multiply y = J x; a line search that fails needs it to test for a minimum of the residual's norm."""
+        self._system.jacobian.matrix.mult(x, y)
 
     multTranspose = mult
 
     def createSubMatrix(self, _: PETSc.Mat, rows: PETSc.IS, columns: PETSc.IS, into: PETSc.Mat | None) -> PETSc.Mat:
-        """The rows and columns of the inactive dofs, of which only the size is asked. Collective.
-
-        Args:
-            _: the matrix whose context this is.
-            rows: the inactive dofs.
-            columns: the same.
-            into: not used.
-        """
-        sizes = (rows.getLocalSize(), rows.getSize())
-        matrix = PETSc.Mat().createPython((sizes, sizes), self, comm=rows.comm)
-        matrix.setUp()
-        return matrix
-
-
-class InactiveSolve:
-    """The linear solve of a SNES VI step on its inactive dofs, as PETSc's KSP: :class:`HeldPreconditioner` solves it.
-
-    Args:
-        snes: the solver, which knows the inactive dofs.
-        held: the preconditioner, by which equations are solved at full size.
-        goal: how exact a step is to be, by whether the active set has changed.
-    """
-
-    def __init__(self, snes: PETSc.SNES, held: HeldPreconditioner, goal: Callable[..., float]) -> None:
-        self._snes, self._held, self._goal = snes, held, goal
-        self._active: Entities | None = None
+        """The rows and columns of the inactive dofs, of which only the size is asked."""
+        return self._python_matrix((rows.getLocalSize(), rows.getSize()))
 
     def solve(self, ksp: PETSc.KSP, load: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve J x = load on the inactive dofs. Collective.
-
-        Args:
-            ksp: the KSP whose context this is.
-            load: the right-hand side, on the inactive dofs.
-            x: where the solution is written.
-        """
-        inactive = self._snes.getVIInactiveSet()
-        goal = self._goal(moved=self._prepare(inactive))
-        iterations, reason = self._held.solve_reduced(inactive, load, x, goal)
+        """Solve J x = load on the inactive dofs: as exactly as the tolerance needs, or to tell an active set."""
+        inactive, limits = self._snes.getVIInactiveSet(), self._thresholds
+        least = 0.0 if self._attempt.steady else limits.coarse_tolerance
+        goal = limits.margin**2 * self._tolerance / self._last
+        moved = self._prepare(inactive)
+        rtol = max(goal, limits.loose if moved else least)
+        iterations, reason = self._owner.held.solve_reduced(inactive, load, x, rtol)
         ksp.setIterationNumber(iterations)
         ksp.setConvergedReason(reason)
 
     def _prepare(self, inactive: PETSc.IS) -> bool:
         """Prepare for the active dofs of this step; whether others were active in the last one. Collective."""
-        start, end = self._held.system.load.owner_range
-        active = np.ones(end - start, dtype=bool)
-        active[inactive.getIndices() - start] = False
+        active = np.ones(self._system.load.local_size, dtype=bool)
+        active[inactive.getIndices() - self._system.load.owner_range[0]] = False
         found = np.flatnonzero(active).astype(np.int32)
         moved = self._active is not None and not np.array_equal(found, self._active)
         self._active = found
-        self._held.prepare(found)
-        return bool(self._held.system.comm.allreduce(moved))
-
-
-FULL_STEPS = "basic"
-"""PETSc's name of the line search that shortens no step."""
-EXACT = "cp"
-"""PETSc's name of the one that looks for where the slope of the energy along a step is zero."""
-ENERGY = "bt"
-"""PETSc's name of the one that backtracks by the energy."""
+        self._owner.held.prepare(found)
+        return bool(self._system.comm.allreduce(moved))

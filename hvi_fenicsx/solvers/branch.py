@@ -174,18 +174,8 @@ class BranchIteration(Method):
             raise SolverError(f"a convex step raised the energy from {before:.12g} to {after:.12g}")
 
     def _result(self, x: PETSc.Vec, outcome: Outcome) -> SolveResult:
-        reason = "stationary" if outcome.converged else outcome.reason
         steady = self.counts.branch <= 1 and self.counts.newton <= len(self._tolerances())
-        return SolveResult(
-            u=self.system.displacement(x),
-            method=self.label,
-            converged=outcome.converged,
-            reason=reason,
-            counts=self.counts,
-            energies=tuple(self.energies),
-            interrupted=outcome.interrupted,
-            steady=steady,
-        )
+        return self.result(x, outcome, self.counts, energies=tuple(self.energies), steady=steady)
 
 
 def arguments(system: System, resting: PETSc.Vec, start: Start, broken_slip: float) -> list[Array]:

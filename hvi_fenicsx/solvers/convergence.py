@@ -37,9 +37,6 @@ class Sizes:
         return float(np.max([self.norm, self.traction, self.net]))
 
 
-NOT_MEASURED = Sizes(*(np.full(1, np.inf) for _ in range(4)))
-
-
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """How one solve ended.
@@ -95,21 +92,8 @@ class ConvergenceTest:
         on_lower = x.array_r[at] <= lower.array_r[at] + self._near
         on_upper = x.array_r[at] >= upper.array_r[at] - self._near
         r[at] = projected(r[at], on_lower, on_upper)
-        return self._measured(x, residual.array_r, r, (on_lower, on_upper))
-
-    def sizes_without_bounds(self, x: PETSc.Vec, residual: PETSc.Vec) -> Sizes:
-        """Size of the residual of an equation. Collective.
-
-        Args:
-            x: the displacement.
-            residual: of the equation at x.
-        """
-        r, nowhere = residual.array_r, np.zeros(len(self._blocks), dtype=bool)
-        return self._measured(x, r, r, (nowhere, nowhere))
-
-    def _measured(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Sizes:
-        """As :meth:`.NetForceTest.sizes`. Collective."""
-        return Sizes(*self._forces(projected, x), *self._net.sizes(x, residual, projected, on))
+        net = self._net.sizes(x, residual.array_r, r, (on_lower, on_upper))
+        return Sizes(*self._forces(r, x), *net)
 
     def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array]:
         """Norm and largest traction of a residual (n,) at x, relative, by body. Collective."""

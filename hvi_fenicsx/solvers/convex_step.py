@@ -25,8 +25,7 @@ from ..system import existence
 from ..system.equations import Cells, VertexModel
 from ..typing import Array
 from . import kink_bounds
-from .active_set import ENERGY, EXACT, FULL_STEPS
-from .attempts import Attempt, first_success
+from .active_set import ENERGY, EXACT, Attempt
 from .convergence import Counts, Outcome
 from .method import SolveContext
 
@@ -195,14 +194,12 @@ class ConvexStep:
         Returns:
             How it ended, and whether x is stationary.
         """
-        lower, upper = kink_bounds.slip_bounds(self._system, cells)
+        bounds = kink_bounds.slip_bounds(self._system, cells)
         if drops is not None:
-            lower, upper = kink_bounds.held_on(self._system.terms, (lower, upper), drops)
+            bounds = kink_bounds.held_on(self._system.terms, bounds, drops)
         exact = [VertexModel(law, c) for law, c in zip(self._laws, cells, strict=True)]
         most = 2 * self._thresholds.few_steps
-        found = self._solver.solve(
-            x, exact, self._options.tolerance, lower=lower, upper=upper, line_search=FULL_STEPS, max_iterations=most
-        )
+        found = self._solver.solve(x, Attempt(models=exact), self._options.tolerance, bounds, most)
         self._counts.add_outcome(found)
         if drops is None or not found.converged:
             return found, found.converged and not self.anywhere(self._overloaded(x, exact))
@@ -239,11 +236,11 @@ class ConvexStep:
         bounds = kink_bounds.slip_bounds(self._system, cells)
         attempts = self._attempts(models, steady=steady)
         most = self._options.max_iterations
-        return first_success(self._solver, x, attempts, tolerance, bounds, self._counts, most)
+        return self._solver.first_success(x, attempts, tolerance, bounds, self._counts, most)
 
     def _attempts(self, models: Sequence[VertexModel], *, steady: bool) -> Iterator[Attempt | str]:
         """Ways to solve the step; after the first failure a reason instead, where it has no solution."""
-        yield Attempt(models=models, line_search=FULL_STEPS, steady=steady)
+        yield Attempt(models=models, steady=steady)
         if not self._check_bounded:
             self._check_bounded = True
             if self._is_unbounded([m.xi for m in models if m.xi is not None]):
@@ -251,7 +248,7 @@ class ConvexStep:
         yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.foundation)
         secants = [replace(m, secant_from=m.law.length_scale) for m in models]
         yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
-        yield Attempt(models=models, line_search=FULL_STEPS)
+        yield Attempt(models=models)
 
     def _is_unbounded(self, xi: Sequence[Array]) -> bool:
         system = self._system

@@ -25,7 +25,7 @@ from ..system.held_solver import LinearSettings
 from ..system.multigrid import Levels
 from ..system.system import System
 from .active_set import ActiveSetSolver
-from .convergence import Counts
+from .convergence import Counts, Outcome
 
 Progress = Callable[[NewtonStep], None]
 """Called at each Newton step, on all ranks."""
@@ -186,6 +186,25 @@ class Method(ABC):
     def __init__(self, context: SolveContext) -> None:
         self.context = context
         self.system, self.solver, self.options = context.system, context.solver, context.options
+
+    def result(self, x: PETSc.Vec, outcome: Outcome, counts: Counts, **known: Any) -> SolveResult:
+        """What was found, by how the last solve ended. Collective.
+
+        Args:
+            x: the displacement.
+            outcome: of the last solve.
+            counts: of all solves.
+            known: further fields of the result.
+        """
+        return SolveResult(
+            u=self.system.displacement(x),
+            method=self.label,
+            converged=outcome.converged,
+            reason="stationary" if outcome.converged else outcome.reason,
+            counts=counts,
+            interrupted=outcome.interrupted,
+            **known,
+        )
 
     @abstractmethod
     def solve(self, start: PETSc.Vec | None = None) -> SolveResult:

@@ -13,8 +13,7 @@ from petsc4py import PETSc
 
 from ..system.equations import VertexModel
 from ..system.system import System
-from .active_set import ENERGY, EXACT, FULL_STEPS
-from .attempts import Attempt, first_success
+from .active_set import ENERGY, EXACT, Attempt
 from .convergence import Counts, Outcome
 from .method import Method, SolveResult, SolverTable, find
 from .resting_start import at_rest, resting_start
@@ -50,16 +49,14 @@ class LinearSolve(Method):
             counts.linear += outcome.linear
             falls, left = outcome.measure < self.system.thresholds.margin * left, outcome.measure
         self.context.tell(self.name, None, 1, outcome.measure, 0)
-        reason = "stationary" if outcome.converged else outcome.reason
-        return SolveResult(
-            u=self.system.displacement(x), method=self.name, converged=outcome.converged, reason=reason, counts=counts
-        )
+        return self.result(x, outcome, counts)
 
     def _step(self, x: PETSc.Vec, models: Sequence[VertexModel], left: float) -> Outcome:
         """One solve of the residual equation, of which ``left`` is known, and the residual left then. Collective."""
         rtol = self.system.thresholds.margin * self.options.tolerance / min(left, 1.0)
         step = self.solver.newton_step(x, np.empty(0, np.int32), models, rtol)
-        return self.solver.check_step(step, x, models, self.options.tolerance)
+        bounds = self.system.lower, self.system.upper
+        return self.solver.judged(step, x, models, self.options.tolerance, bounds)
 
 
 class ConvexProgramme(Method):
@@ -76,24 +73,14 @@ class ConvexProgramme(Method):
         Args:
             start: where to begin; by default with contact closed.
         """
-        counts, system = Counts(), self.system
-        laws = [term.law for term in system.terms]
+        counts = Counts()
         if start is None:
-            x, counts.linear = resting_start(self.solver, laws)
+            x, counts.linear = resting_start(self.solver, [term.law for term in self.system.terms])
         else:
             x = start.copy()
         with self.solver.reporting(self._progress):
             outcome = self._minimise(x, counts)
-        reason = "stationary" if outcome.converged else outcome.reason
-        return SolveResult(
-            u=system.displacement(x),
-            method=self.name,
-            converged=outcome.converged,
-            reason=reason,
-            counts=counts,
-            interrupted=outcome.interrupted,
-            steady=counts.newton <= 1,
-        )
+        return self.result(x, outcome, counts, steady=counts.newton <= 1)
 
     def _progress(self, iteration: int, residual: float, contact: int) -> None:
         self.context.tell(self.name, None, iteration, residual, contact)
@@ -102,13 +89,13 @@ class ConvexProgramme(Method):
         """Attempts until one converges, from and into x; the outcome of the best one. Collective."""
         bounds = self.system.lower, self.system.upper
         tolerance, most = self.options.tolerance, self.options.max_iterations
-        return first_success(self.solver, x, self._attempts(counts), tolerance, bounds, counts, most)
+        return self.solver.first_success(x, self._attempts(counts), tolerance, bounds, counts, most)
 
     def _attempts(self, counts: Counts) -> Iterator[Attempt]:
         """From the start, then from bodies at rest on their supports."""
         models = [VertexModel(term.law) for term in self.system.terms]
-        yield Attempt(models=models, line_search=FULL_STEPS, steady=self.context.steady)
-        yield Attempt(models=models, line_search=FULL_STEPS, start=self._from_rest(models, counts))
+        yield Attempt(models=models, steady=self.context.steady)
+        yield Attempt(models=models, start=self._from_rest(models, counts))
         yield Attempt(models=models, line_search=EXACT, foundation=self.system.thresholds.foundation)
         yield Attempt(models=models, line_search=ENERGY)
 

@@ -46,7 +46,7 @@ def resting_start(
     Returns:
         The displacement, and iterations of the linear solver.
     """
-    rtol = solver.thresholds.loose if rtol is None else rtol
+    rtol = solver.system.thresholds.loose if rtol is None else rtol
     system = solver.system
     contact = contact_dofs(system)
     bodies = system.problem.bodies.labels[contact // system.problem.scales.dimension]
