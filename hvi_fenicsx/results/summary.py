@@ -102,14 +102,13 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
     comm = solution.problem.domain.mesh.comm
     if not sum(agree(comm, len(solution.problem.bounds))) or examination is None:
         return None
-    gaps = [s.gap[np.isfinite(s.gap)] for s in states]
+    gaps = scales.displacement * np.concatenate([np.empty(0), *(s.gap[np.isfinite(s.gap)] for s in states)])
     resultant = comm.allreduce(sum(s.resultant for s in states))
     return {
         "vertices": comm.allreduce(sum(len(s.gap) for s in states)),
         "active": comm.allreduce(sum(int(np.count_nonzero(s.contact)) for s in states)),
-        "max_gap": largest(comm, max((float(np.max(g, initial=0.0)) for g in gaps), default=0.0)) * scales.displacement,
-        "max_penetration": largest(comm, max((float(np.max(0.0 - g, initial=0.0)) for g in gaps), default=0.0))
-        * scales.displacement,
+        "max_gap": largest(comm, float(np.max(gaps, initial=0.0))),
+        "max_penetration": largest(comm, float(np.max(0.0 - gaps, initial=0.0))),
         "penetration_between_nodes": None if (dip := examination.between_nodes) is None else dip * scales.displacement,
         "resultant": [float(f) * scales.force for f in resultant],
     }

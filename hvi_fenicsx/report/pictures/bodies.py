@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 
 from ...typing import Integers
 from ..body_mesh import BodyMesh
+from ..page import said
 from ..reader import Result
 from ..units import quantity, thousands, unit_for
 from .plane import PlaneCanvas
@@ -39,8 +40,6 @@ LINE = 40
 """Letters in one line of the legend."""
 MOST_NAMED = 4
 """Lines of the legend that regions may take."""
-_UNITS = {"displacement": ("m", "m"), "moment": ("N", "N\u202fm")}
-"""The units of what drives a part as a whole, in the plane and in space."""
 
 
 def _canvas(result: Result, subject: str, contacts: Mapping[str, Integers]) -> PlaneCanvas | SpaceCanvas:
@@ -78,17 +77,11 @@ def scene(result: Result) -> Figure:
 
 def _inside(result: Result) -> Iterator[str]:
     """What has no arrow: what acts everywhere, and moments and displacements of a part."""
-    d = result.body.dimension
-    yield from (f"“{part}”: {key} {_said(value, key, d)}" for part, key, value in result.driven if key != "force")
+    units = {"displacement": "m", "moment": "N" if result.body.dimension == 2 else "N\u202fm"}
+    for part, key, value in result.driven:
+        if key != "force":
+            yield f"“{part}”: {key} {said(value)} {units.get(key, '')}".rstrip()
     yield from (f"and {words}" for words in result.within)
-
-
-def _said(value: Any, key: str, dimension: int) -> str:
-    """A number with its unit, or those of a list in brackets; what is no number as it stands in the scene."""
-    if isinstance(value, list):
-        return f"({', '.join(_said(one, key, dimension) for one in value)})"
-    unit = _UNITS.get(key, ("", ""))[dimension - 2]
-    return quantity(float(value), unit) if isinstance(value, int | float) and unit else str(value)
 
 
 def body(result: Result) -> Figure:

@@ -1,8 +1,8 @@
 """``python3 -m hvi_fenicsx.report.pictures.drawings FOLDER``: draw a finished folder's pictures, print their names.
 
-A new picture of a body is a row of `PICTURES`. Each picture has a process of its own, as many at a time as there are
-processors: one that dies takes its picture with it and no other. Exit code 0, or 1 with a message for each picture that
-failed; the others are there even so.
+A new picture of a body has two lines in :func:`_of_body`. Each picture has a process of its own, as many at a time as
+there are processors: one that dies takes its picture with it and no other. Exit code 0, or 1 with a message for each
+picture that failed; the others are there even so.
 """
 
 from __future__ import annotations
@@ -57,36 +57,6 @@ class Drawing:
     rendered: bool = False
 
 
-Kind = tuple[str, str, Callable[[Result], bool], Callable[[Result], Figure]]
-PICTURES: list[Kind] = [
-    (
-        "body",
-        "The deformed body, its displacements magnified, with what acts on it.",
-        lambda result: result.body.displacement is not None,
-        bodies.body,
-    ),
-    (
-        "escape",
-        "The rigid motion along which the load carries the body away.",
-        lambda result: result.body.escape_mode is not None,
-        bodies.escape,
-    ),
-    (
-        "scene",
-        "The scene: the undeformed body with its supports, loads and contact parts.",
-        lambda result: bool(result.sides),
-        bodies.scene,
-    ),
-    (
-        "stress",
-        "Stress in the body (von Mises), constant in each cell; the scale may end below a peak in a corner.",
-        lambda result: result.body.von_mises is not None,
-        bodies.stress,
-    ),
-]
-"""The pictures of a body: name of the file, caption, whether a result has what is drawn, and what draws it."""
-
-
 def drawings_of(folder: Path) -> list[Drawing]:
     """What there is to draw of a finished folder, of whatever kind it is.
 
@@ -111,14 +81,27 @@ def drawings_of(folder: Path) -> list[Drawing]:
 
 def drawings(result: Result) -> Iterator[Drawing]:
     """What there is to draw of a result."""
-    alone = len(result.parts) == 1
-    for name, caption, wanted, make in PICTURES:
-        if wanted(result):
-            yield Drawing(result.folder / f"{name}.png", caption, partial(make, result), result.body.dimension == 3)
+    for name, caption, make in _of_body(result):
+        yield Drawing(result.folder / f"{name}.png", caption, partial(make, result), result.body.dimension == 3)
     for part in result.parts:
-        name, words = ("contact", "the contact part") if alone else (f"contact_{part.name}", f"“{part.name}”")
+        name, words = f"contact_{part.name}", f"“{part.name}”"
+        if len(result.parts) == 1:
+            name, words = "contact", "the contact part"
         caption = f"Along {words}: displacement, friction and pressure."
         yield Drawing(result.folder / f"{name}.png", caption, partial(contact.contact, result, part))
+
+
+def _of_body(result: Result) -> Iterator[tuple[str, str, Callable[[Result], Figure]]]:
+    """The pictures of a body: name of the file, caption, and what draws it."""
+    if result.body.displacement is not None:
+        yield "body", "The deformed body, its displacements magnified, with what acts on it.", bodies.body
+    if result.body.escape_mode is not None:
+        yield "escape", "The rigid motion along which the load carries the body away.", bodies.escape
+    if result.sides:
+        yield "scene", "The scene: the undeformed body with its supports, loads and contact parts.", bodies.scene
+    if result.body.von_mises is not None:
+        end = "the scale may end below a peak in a corner"
+        yield "stress", f"Stress in the body (von Mises), constant in each cell; {end}.", bodies.stress
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
