@@ -26,8 +26,7 @@ from ..certify.thresholds import DEFAULT as THRESHOLDS
 from ..paths.distances import Distances, StateOnGraphs
 from ..paths.state import Event, PathState
 from ..problem import references
-from ..problem.factored_problem import FactoredProblem
-from ..problem.problem import Problem
+from ..problem.problem import FactoredProblem, Problem
 from ..problem.vectors import product, turn
 from ..reduced.condensation import Condensation
 from ..runtime.mpi import total

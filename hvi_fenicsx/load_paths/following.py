@@ -16,8 +16,7 @@ from ..paths.follower import Follower
 from ..paths.load_path import LoadPath, PathRow
 from ..paths.state import End, Event, EventPlace, Follow, PathOptions, PathState, Position
 from ..paths.vertex_laws import is_straight
-from ..problem.factored_problem import FactoredProblem
-from ..problem.problem import Problem
+from ..problem.problem import FactoredProblem, Problem
 from ..reduced import loading
 from ..reduced.condensation import Condensation
 from ..runtime.writing import Record

@@ -15,8 +15,7 @@ from ..certify import certificate, plausibility
 from ..errors import InputError, SolverError
 from ..model import PathTable
 from ..paths.state import End
-from ..problem.factored_problem import FactoredProblem
-from ..problem.problem import Problem
+from ..problem.problem import FactoredProblem, Problem
 from ..reduced import loading
 from ..runtime.log import logger
 from ..solvers import frozen_mixity, obstacle_force

@@ -29,8 +29,6 @@ from .problem import PrescribedComponent, Problem
 from .scaling import Placed, PlacedContribution, Scales
 from .spaces import coefficients_of
 
-_BETWEEN = ", between the vertices of the mesh"
-
 
 @dataclass(frozen=True)
 class Formulation:
@@ -66,7 +64,11 @@ def compose(domain: Domain, model: Formulation) -> Problem:
     """
     effects = model.effects
     facets = domain_forms.find(domain, model.parts, effects)
-    sizes, evaluate = scaling.sizes(domain.length, effects), functools.partial(_evaluation, domain, facets)
+    sizes = scaling.sizes(domain.length, effects)
+
+    def evaluate(placed: Placed) -> Evaluate:
+        return functools.partial(_largest, domain, facets, placed)
+
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate)
     context = DomainForms(domain, facets, scales, effects, model.degree)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
@@ -74,29 +76,18 @@ def compose(domain: Domain, model: Formulation) -> Problem:
     return _problem(context, scales, contributions, model, tuple(implausible))
 
 
-def _evaluation(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> Evaluate:
-    """The function that finds a formula's largest absolute value where an effect acts."""
-    return functools.partial(_largest, domain, facets, placed)
-
-
 def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, formula: SpatialValue) -> float:
     """The largest absolute value of a formula where an effect acts. Collective."""
     found = _entities(domain, facets, placed)
-    largest = _largest_at(domain, placed, formula, _points(domain, found), "")
+    points = _points(domain, *found)
     if placed[1].drive is Drive.LOAD or placed[1].place is Place.BODY:  # integrated, not taken at vertices
-        largest = max(largest, _largest_at(domain, placed, formula, _midpoints(domain, found), _BETWEEN))
-    return largest
-
-
-def _largest_at(domain: Domain, placed: Placed, formula: SpatialValue, points: Array, where: str) -> float:
-    """The largest absolute value at points. Collective."""
-    values = formula.at(points)
-    finite = bool(np.all(np.isfinite(values)))
-    gathered = agree(domain.mesh.comm, (finite, float(np.max(np.abs(values), initial=0.0))))
-    if not all(ok for ok, _ in gathered):
-        text = f"the formula {formula.source!r} is not finite everywhere there{where}"
+        points = np.vstack([points, _midpoints(domain, *found)])
+    values = np.abs(formula.at(points))
+    largest = max(agree(domain.mesh.comm, float(np.max(np.where(np.isnan(values), np.inf, values), initial=0.0))))
+    if largest == np.inf:
+        text = f"the formula {formula.source!r} is not finite everywhere there"
         raise InputError(f"{scaling.place(placed)}: {text}")
-    return max(value for _, value in gathered)
+    return largest
 
 
 def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> tuple[int, Any]:
@@ -109,9 +100,8 @@ def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) ->
     return domain.dimension, domain.cells([where])
 
 
-def _points(domain: Domain, entities: tuple[int, Any]) -> Array:
+def _points(domain: Domain, dimension: int, found: Any) -> Array:
     """The vertices of entities, m, (n, 3)."""
-    dimension, found = entities
     if found is None:
         return domain.mesh.geometry.x
     if not len(found):
@@ -119,9 +109,8 @@ def _points(domain: Domain, entities: tuple[int, Any]) -> Array:
     return domain.mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(domain.mesh, dimension, found))]
 
 
-def _midpoints(domain: Domain, entities: tuple[int, Any]) -> Array:
+def _midpoints(domain: Domain, dimension: int, found: Any) -> Array:
     """The midpoints of entities, m, (n, 3): a load may be zero at all vertices, but for rounding."""
-    dimension, found = entities
     if found is None:
         found = np.arange(domain.mesh.topology.index_map(dimension).size_local, dtype=np.int32)
     if not len(found):

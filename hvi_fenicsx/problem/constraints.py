@@ -219,7 +219,7 @@ def check_bounds(context: DomainForms, bounds: Sequence[Bounds], prescribed: Arr
         un = np.sum(b.surface.values(prescribed) * b.surface.normals, axis=1)
         axis = np.argmax(np.abs(b.surface.normals), axis=1)
         held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
-        out = held & ((un < b.lower - DEFAULT.outside_bounds) | (un > b.upper + DEFAULT.outside_bounds))
+        out = held & ((un < b.lower - DEFAULT.same) | (un > b.upper + DEFAULT.same))
         bad += [f"{b.surface.part} at {b.surface.spot(i)}" for i in np.flatnonzero(out)[:1]]
     found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
     if found:
@@ -251,7 +251,7 @@ def _contradiction(one: Bounds, other: Bounds, unit: float) -> list[str]:
     low = np.where(along > 0, other.lower[j], -other.upper[j])
     high = np.where(along > 0, other.upper[j], -other.lower[j])
     low, high = np.maximum(low, one.lower[i]), np.minimum(high, one.upper[i])
-    bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > DEFAULT.outside_bounds * (1.0 + np.abs(low))))
+    bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > DEFAULT.same * (1.0 + np.abs(low))))
     shared = "" if one is other else f", a vertex of boundary.{other.surface.part} too"
     return [
         f"{one.surface.part}: at {one.surface.spot(i[k])}{shared}, u·n would have to be at least "

@@ -169,29 +169,19 @@ def find(domain: Domain, parts: Mapping[str, BoundaryPart], effects: Sequence[Pl
     found = {name: part.facets(domain) for name, part in parts.items()}
     for name, part in parts.items():
         if not sum(agree(domain.mesh.comm, len(found[name]))):
-            raise InputError(_empty(domain, name, part))
+            raise InputError(_empty(name, part))
     _check_overlap(domain, found, effects)
     return found
 
 
-def _empty(domain: Domain, name: str, part: BoundaryPart) -> str:
-    """What is said of a part without facets. Collective."""
+def _empty(name: str, part: BoundaryPart) -> str:
+    """What is said of a part without facets."""
     if part.where is None:
         return f"boundary.{name}: no facet lies on it; see `on`"
-    points = np.vstack(agree(domain.mesh.comm, _ends(domain, part)))
-    low, high = points.min(axis=0), points.max(axis=0)
-    ends = ", ".join(f"{axis} from {a:.4g} to {b:.4g} m" for axis, a, b in zip("xyz", low, high, strict=False))
-    sides = ", ".join(part.on)
     return (
-        f"boundary.{name}.where: no facet of {sides} has its midpoint where {part.where.source}; {sides} has {ends}; "
+        f"boundary.{name}.where: no facet of {', '.join(part.on)} has its midpoint where {part.where.source}; "
         "change the inequality, or take smaller cells"
     )
-
-
-def _ends(domain: Domain, part: BoundaryPart) -> Array:
-    """Lowest and highest corner of a part's sides on this rank, (2, d); no rows where it has none."""
-    corners = facet_sizes.corners(domain.mesh, domain.facets(part.on)).reshape(-1, domain.dimension)
-    return np.array([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else corners
 
 
 def _check_overlap(domain: Domain, facets: Mapping[str, Entities], effects: Sequence[Placed]) -> None:

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 from dolfinx.fem.petsc import assemble_matrix
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..effects import Averaged, Contribution, Effect, Place
@@ -29,9 +27,6 @@ from . import spaces
 from .scaling import DEFAULT, Scales
 from .spaces import Dilatation, coefficients_of
 from .vectors import LinearForm, nodal, nodal_sum, nodal_values
-
-ROUNDING = 1e-10
-"""Forces of a rigid motion that are less than this part of those of a stretch are rounding."""
 
 
 def feels_no_rigid_motion(form: Any, space: fem.FunctionSpace) -> bool:
@@ -51,19 +46,7 @@ def feels_no_rigid_motion(form: Any, space: fem.FunctionSpace) -> bool:
 
     motions = rigid_fields(points, RigidBody(dimension=d, centre=np.zeros(3)))
     sizes = [force(motions[:, k]) for k in range(motions.shape[1])]
-    return max(sizes) <= ROUNDING * force(points[:, :d])
-
-
-def pieces(mesh: dmesh.Mesh, most: int = DEFAULT.piece) -> Iterator[Entities]:
-    """The cells that this rank owns in pieces, as many on all ranks. Collective.
-
-    Args:
-        mesh: the mesh.
-        most: cells of a piece.
-    """
-    owned = mesh.topology.index_map(mesh.topology.dim).size_local
-    number = mesh.comm.allreduce(max(-(-owned // most), 1), op=MPI.MAX)
-    yield from np.array_split(np.arange(owned, dtype=np.int32), number)
+    return max(sizes) <= DEFAULT.same * force(points[:, :d])
 
 
 def on_cells(form: Any, cells: Entities) -> Any:
@@ -293,26 +276,14 @@ class Bulk:
             (part.work(part.averaged.modulus * ufl.tr(one), v) for part in self.dilatations), ufl.Form([])
         )
 
-    def energy_in_cells(self, v: Any) -> LinearForm:
-        """a(v, v) of every owned cell, without what is averaged, (cells, 1). Collective.
-
-        Args:
-            v: a displacement of any space, or a sum of such in UFL.
-        """
-        return LinearForm(self.energy_form(v, ufl.TestFunction(self._constants)))
-
     def energy_by_cell(self, v: Any) -> Array:
-        """The same, not negative, for v as it is, (cells,), piece by piece of a large mesh. Collective.
+        """a(v, v) of every owned cell, without what is averaged, not negative, (cells,). Collective.
 
         Args:
             v: a displacement of any space, or a sum of such in UFL.
         """
-        parts = list(pieces(self.space.mesh))
-        if len(parts) == 1:
-            return np.maximum(self.energy_in_cells(v).values()[:, 0], 0.0)
         form = self.energy_form(v, ufl.TestFunction(self._constants))
-        each = [LinearForm(on_cells(form, part)).values()[part, 0] for part in parts]
-        return np.maximum(np.concatenate(each), 0.0)
+        return np.maximum(LinearForm(form).values()[:, 0], 0.0)
 
     def pressures(self, u: fem.Function) -> list[fem.Function]:
         """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""

@@ -22,9 +22,6 @@ from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .scaling import DEFAULT, PlacedContribution, Scales
 
-_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""Relative, what dividing a displacement by a stretch may add."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class LawTerm:
@@ -121,7 +118,7 @@ class LawTerm:
     def _off_rounding(self, argument: Array) -> Array:
         """Arguments (m,), on a convex kink where only rounding keeps them off: a bound may hold them there."""
         for kink in self.law.convex.kinks:
-            argument = np.where(np.abs(argument - kink) <= _ROUNDING * np.abs(kink), kink, argument)
+            argument = np.where(np.abs(argument - kink) <= DEFAULT.rounding * np.abs(kink), kink, argument)
         return argument
 
     def reach(self, near: float | Array) -> Array:

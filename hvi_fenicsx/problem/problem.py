@@ -7,14 +7,16 @@ SI; the forms contain the factors.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
+from petsc4py import PETSc
 
+from ..effects import load_name
 from ..formula import SpatialValue
 from ..mesh import nodes
 from ..mesh.boundary_part import BoundaryPart
@@ -267,3 +269,65 @@ class Problem:
     def on_bodies(self, forces: Array) -> Array:
         """Forces of bounds and laws by owned vertex (n, d) as those that act on the bodies. Collective."""
         return forces if self.coupling is None else self.coupling.forces_on_bodies(forces)
+
+
+class FactoredProblem:
+    """A problem whose parts of some names are multiplied by a factor. Creation is collective.
+
+    Args:
+        problem: the problem at the factor 1.
+        scaled: the names of what the factor multiplies, such as ``pull.traction`` or ``grip.displacement``.
+    """
+
+    def __init__(self, problem: Problem, scaled: Collection[str]) -> None:
+        self._factor = fem.Constant(problem.space.mesh, PETSc.ScalarType(1.0))
+        conditions, self._values = list(problem.conditions), list[tuple[fem.Function, Array]]()
+        names = [load_name(where, effect) for where, effect, c in problem.contributions for _ in c.conditions]
+        for number in (number for number, name in enumerate(names) if name in scaled):
+            conditions[number], values = _scaled_condition(problem, number)
+            self._values.append((values, values.x.array.copy()))
+        moved = [bounds.move is not None and bounds.move.name in scaled for bounds in problem.bounds]
+        bounds = [
+            replace(once, lower=once.lower.copy(), upper=once.upper.copy()) if moves else once
+            for once, moves in zip(problem.bounds, moved, strict=True)
+        ]
+        pairs = zip(bounds, problem.bounds, strict=True)
+        self._bounds = [(own, once) for own, once in pairs if own is not once]
+        self._problem = replace(
+            problem,
+            linear=self._times_factor(problem.linear, scaled),
+            bulk=replace(problem.bulk, strains=self._times_factor(problem.bulk.strains, scaled)),
+            conditions=tuple(conditions),
+            bounds=tuple(bounds),
+        )
+
+    def _times_factor(self, named: Mapping[str, Any], scaled: Collection[str]) -> dict[str, Any]:
+        return {name: self._factor * form if name in scaled else form for name, form in named.items()}
+
+    def at(self, factor: float) -> Problem:
+        """The problem at a factor. It holds until the next call, which changes its loads.
+
+        Args:
+            factor: λ.
+        """
+        self._factor.value = factor
+        for values, once in self._values:
+            values.x.array[:] = factor * once
+        for own, stated in self._bounds:
+            assert stated.move is not None
+            back = (1.0 - factor) * stated.move.by
+            own.lower[:], own.upper[:] = stated.lower - back, stated.upper - back
+        return self._problem
+
+
+def _scaled_condition(problem: Problem, number: int) -> tuple[fem.DirichletBC, fem.Function]:
+    """A condition of its own, and its values, which will be changed. Collective."""
+    prescribed = problem.prescribed[number]
+    component = problem.space.sub(prescribed.component)
+    collapsed, _ = component.collapse()
+    dofs = fem.locate_dofs_topological((component, collapsed), problem.domain.dimension - 1, prescribed.facets)
+    everywhere = np.zeros(len(problem.points) * problem.scales.dimension)
+    problem.conditions[number].set(everywhere)
+    values = fem.Function(collapsed)
+    values.x.array[dofs[1]] = everywhere[dofs[0]]
+    return fem.dirichletbc(values, dofs, component), values

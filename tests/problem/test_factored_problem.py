@@ -9,7 +9,7 @@ from scenes import STEEL, Table, quadratic_linear
 
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.certify import certificate
-from hvi_fenicsx.problem.factored_problem import FactoredProblem
+from hvi_fenicsx.problem.problem import FactoredProblem
 from hvi_fenicsx.problem.vectors import assembled, nodal
 from hvi_fenicsx.runtime import forms
 
