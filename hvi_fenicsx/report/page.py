@@ -58,7 +58,7 @@ def write(folder: Path) -> Path:
     kind, words = _headline(result)
     contact = [{"name": part.name, "rows": list(contact_rows(part))} for part in result.parts]
     given = {"contact": contact, "forces": _forces(result), "reproduce": _reproduce(result)}
-    return _page("run.html.j2", folder, result=result, verdict={"kind": kind, "words": words}, **given)
+    return _page("run.html.j2", folder, result.title, result=result, verdict={"kind": kind, "words": words}, **given)
 
 
 def write_path(folder: Path) -> Path:
@@ -73,7 +73,7 @@ def write_path(folder: Path) -> Path:
         part: {**found, "force": [unless_noise(f, result.largest_force) for f in found["force"]]}
         for part, found in result.path["peak_forces"].items()
     }
-    return _page("path.html.j2", folder, result=result, forces=forces)
+    return _page("path.html.j2", folder, result.title, result=result, forces=forces)
 
 
 def write_equilibria(folder: Path) -> Path:
@@ -83,7 +83,8 @@ def write_equilibria(folder: Path) -> Path:
         ResultError: no search is there, or its files are damaged.
         NotWrittenError: the page cannot be written.
     """
-    return _page("equilibria.html.j2", folder, result=reader.read_equilibria(folder), most=MOST)
+    result = reader.read_equilibria(folder)
+    return _page("equilibria.html.j2", folder, result.title, result=result, most=MOST)
 
 
 def write_study(folder: Path) -> Path:
@@ -99,19 +100,14 @@ def write_study(folder: Path) -> Path:
         given = {key: study[key] for key in ("sentences", "points", "ranks", "version", "quantities")}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ResultError(f"{file}: no finished study, or damaged ({error})") from None
-    title = f"{study['scene'] or 'untitled'}: what accuracy costs"
-    return _rendered("study.html.j2", folder, title=title, pictures=_pictures(folder), **given)
+    return _page("study.html.j2", folder, f"{study['scene'] or 'untitled'}: what accuracy costs", **given)
 
 
-def _page(template: str, folder: Path, *, result: Any, **given: Any) -> Path:
-    """Write the page of a result folder, and list it among the folder's files."""
-    page = _rendered(template, folder, result=result, title=result.title, pictures=_pictures(folder), **given)
+def _page(template: str, folder: Path, title: str, **given: Any) -> Path:
+    """Write the page of a folder, and list it among the folder's files."""
+    words = _environment().get_template(template).render(title=title, pictures=_pictures(folder), **given)
+    writing.text(folder / NAME, words)
     manifest.add(folder, [NAME])
-    return page
-
-
-def _rendered(template: str, folder: Path, **given: Any) -> Path:
-    writing.text(folder / NAME, _environment().get_template(template).render(given))
     return folder / NAME
 
 

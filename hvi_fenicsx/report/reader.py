@@ -13,11 +13,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..typing import Array, Integers, Mask
+from ..geometry import ROUNDING
+from ..typing import Array, Mask
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
 from .solution_arrays import ContactPart, ResultError, SolutionArrays
-from .units import ROUNDING
 
 Row = Mapping[str, str]
 """The cells of a row by the names of the columns."""
@@ -86,11 +86,6 @@ class Result(Finished):
         """The parts of Γc, in the order of ``contact.csv``; none where the body is carried off."""
         found = {} if self.carried_off else self.arrays.parts
         return tuple(map(self._without_noise, found.values()))
-
-    @property
-    def sides(self) -> Mapping[str, Integers]:
-        """The facets of each boundary table of the scene, (k, 2) or (k, 3)."""
-        return self.arrays.sides
 
     @property
     def solvability(self) -> Mapping[str, Any]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..geometry import ROUNDING
+
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
-ROUNDING = 1e-9
-"""Values whose largest is so small a part of what is beside them are rounding."""
 
 
 @dataclass(frozen=True)

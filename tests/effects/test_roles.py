@@ -142,7 +142,7 @@ def test_the_users_effects_are_drawn(folder: Path) -> None:
     pull = next(load for load in loaded if load.side.part == "pull")
     y = found.body.points[pull.side.vertices, 1]
     np.testing.assert_allclose(pull.traction, np.stack([2e6 * (1 - y), 0 * y, 0 * y], axis=1), atol=1e-6)
-    assert {name for name in found.sides if touches(found.roles(name))} == {"floor", "press"}
+    assert {name for name in found.arrays.sides if touches(found.roles(name))} == {"floor", "press"}
     assert found.resists("floor", "slip")
     assert not found.resists("floor", "opening")
     assert found.within == ["a centrifugal force"]

@@ -342,9 +342,9 @@ def test_the_pieces_of_several_ranks_are_one_body(tmp_path: Path) -> None:
     a, b = (body.points[body.boundary[:, i]] for i in (0, 1))
     assert len(body.boundary) == 32
     assert np.isclose(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2, 1.0)  # the body is on the left of its edges
-    assert set(three.sides) == set(one.sides)
-    for name, facets in three.sides.items():
-        assert corners(body, facets) == corners(one.body, one.sides[name])
+    assert set(three.arrays.sides) == set(one.arrays.sides)
+    for name, facets in three.arrays.sides.items():
+        assert corners(body, facets) == corners(one.body, one.arrays.sides[name])
     for part, like in zip(three.parts, one.parts, strict=True):
         assert corners(body, part.facets) == corners(one.body, like.facets)
         np.testing.assert_array_equal(part.points, body.points[part.vertices])

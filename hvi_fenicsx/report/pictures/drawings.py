@@ -97,7 +97,7 @@ def _of_body(result: Result) -> Iterator[tuple[str, str, Callable[[Result], Figu
         yield "body", "The deformed body, its displacements magnified, with what acts on it.", bodies.body
     if result.body.escape_mode is not None:
         yield "escape", "The rigid motion along which the load carries the body away.", bodies.escape
-    if result.sides:
+    if result.arrays.sides:
         yield "scene", "The scene: the undeformed body with its supports, loads and contact parts.", bodies.scene
     if result.body.von_mises is not None:
         end = "the scale may end below a peak in a corner"

@@ -282,7 +282,7 @@ def loaded_sides(result: Result, factor: float = 1.0) -> list[LoadedSide]:
         if np.any(traction):
             found.append(LoadedSide(side, factor * traction))
         if np.any(force := forces.get(side.part, np.zeros(3))):
-            measure = float(result.body.sizes(result.body.oriented(result.sides[side.part])).sum())
+            measure = float(result.body.sizes(result.body.oriented(result.arrays.sides[side.part])).sum())
             spread = np.broadcast_to(factor * force / measure, side.normals.shape)
             found.append(LoadedSide(side, spread, factor * float(np.linalg.norm(force))))
     return found
@@ -301,7 +301,7 @@ def held_sides(result: Result) -> list[HeldSide]:
 def roles_by_side(result: Result) -> Iterator[tuple[Side, Sequence[Mapping[str, Any]]]]:
     """The pieces of each boundary part, with the roles of its effects."""
     body = result.body
-    for name, own in result.sides.items():
+    for name, own in result.arrays.sides.items():
         facets = body.oriented(own)
         lines = [np.column_stack([c[:-1], c[1:]]) for c in chains(facets)] if body.dimension == 2 else [facets]
         for piece in lines:
