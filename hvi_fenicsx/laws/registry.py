@@ -113,7 +113,7 @@ def require_number(owner: str, **parameters: Any) -> None:
         InputError: with the first that is none.
     """
     for key, value in parameters.items():
-        if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= sys.float_info.max:
+        if isinstance(value, bool) or not isinstance(value, Real) or not abs(float(value)) <= sys.float_info.max:
             raise InputError(f"{owner}: {key} = {value!r} is not usable; give a finite number")
 
 

@@ -124,7 +124,7 @@ def create(
 
 def _width(key: str, epsilon: Any) -> float:
     """A width ε; refused where it is no finite number > 0."""
-    if isinstance(epsilon, bool) or not isinstance(epsilon, Real) or not 0.0 < epsilon <= _LARGEST:
+    if isinstance(epsilon, bool) or not isinstance(epsilon, Real) or not 0.0 < float(epsilon) <= _LARGEST:
         raise InputError(
             f"smoothing: {key} = {epsilon!r} must be a finite number > 0; "
             f"for the unsmoothed law leave smoothing and {key} away"

@@ -172,9 +172,10 @@ def _piece(domain: Domain, within: Mask) -> Piece:
     here = np.arange(len(parents), dtype=np.int32)
     sides = {n: cell_facets.in_copies(side, whole, parents, mesh, here) for n, side in domain.sides.items()}
     regions = {n: np.flatnonzero(np.isin(parents, own)).astype(np.int32) for n, own in domain.regions.items()}
-    present = (_present(whole.comm, found) for found in (sides, regions))
     return Piece(
-        domain=Domain.from_mesh(mesh, *present, domain.curves, one_piece=True),
+        domain=Domain.from_mesh(
+            mesh, _present(whole.comm, sides), _present(whole.comm, regions), domain.curves, one_piece=True
+        ),
         numbers=np.asarray(whole.geometry.input_global_indices, dtype=np.int64)[own],
     )
 
