@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from dolfinx import fem
@@ -96,7 +96,7 @@ class Quantity(ABC):
         return 0.0 if found is None else found.smoothing / (found.energy_norm or 1.0)
 
 
-Value = fem.Function | Array
+Value: TypeAlias = fem.Function | Array
 """A quantity, SI: numbers, or a P1 vector field that is zero off Γc."""
 
 

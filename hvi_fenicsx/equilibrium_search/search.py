@@ -172,7 +172,7 @@ def find(task: Task) -> Found:
 def _all(task: Task) -> Found:
     """All points of polylines, proven; those of curved laws are near them."""
     problem, search, below = task.problem, Enumeration(problem=task.problem, cut=task.stop), None
-    known = list(task.known if task.saved is None else task.saved["x"])
+    known: list[Array] = [*task.known] if task.saved is None else [*task.saved["x"]]
 
     def tell(_: Enumeration) -> None:
         found = f"{len(search.points)} found, {counted(search.cells, 'cell', 'cells')}, {len(search.waiting)} open"
@@ -182,8 +182,8 @@ def _all(task: Task) -> Found:
     for x in known:
         search.enter(x)
     if task.saved is not None:
-        boxes = zip(task.saved["low"], task.saved["high"], strict=True)
-        search.waiting = [Box.around(low=low, high=high, x=0.5 * (low + high)) for low, high in boxes]
+        boxes: Array = np.stack([task.saved["low"], task.saved["high"]], axis=1)
+        search.waiting = [Box.around(low=box[0], high=box[1], x=0.5 * (box[0] + box[1])) for box in boxes[:]]
     else:
         search.start()
         if (

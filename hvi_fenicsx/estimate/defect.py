@@ -230,8 +230,8 @@ class LeastEnergy:
         self._bubbles, self._stiffness, self._under = bubbles, stiffness, under
         self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
         self._e = bubbles.x.array[: load.size].reshape(load.shape)
-        parts = (p.blocks for p in (*under.bounds, *under.prescribed))
-        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *parts]))
+        bounded, prescribed = ([part.blocks for part in parts] for parts in (under.bounds, under.prescribed))
+        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *bounded, *prescribed]))
         for given in under.prescribed:
             self._e[given.blocks, given.component] = given.values
 

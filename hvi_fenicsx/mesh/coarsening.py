@@ -197,8 +197,10 @@ def _in_space(surface: _Surface, cells: _CellSample, factor: float) -> tuple[Arr
         return None
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "surface.npz")
-        wanted = {"places": cells.midpoints, "sizes": factor * cells.sizes, "turn": 2.0 * DEFAULT.outline_turn}
-        np.savez(source, points=surface.corners.reshape(-1, 3)[first], triangles=triangles, **wanted)
+        np.savez(
+            source, points=surface.corners.reshape(-1, 3)[first], triangles=triangles, places=cells.midpoints,
+            sizes=factor * cells.sizes, turn=2.0 * DEFAULT.outline_turn,
+        )  # fmt: skip
         try:
             done = processes.run(gmsh_process.__name__, [os.fspath(source)], DEFAULT.gmsh_seconds)
         except subprocess.TimeoutExpired:

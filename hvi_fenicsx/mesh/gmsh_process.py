@@ -154,7 +154,7 @@ def within(rings: Sequence[Array]) -> tuple[Array, Integers]:
     with gmsh_arrays.session() as gmsh:
         geo, loops = gmsh.model.geo, []
         for ring in rings:
-            points = [geo.addPoint(x, y, 0.0) for x, y in ring[:-1].tolist()]
+            points = [geo.addPoint(float(x), float(y), 0.0) for x, y in ring[:-1]]
             loops.append(geo.addCurveLoop([geo.addLine(*ends) for ends in pairwise([*points, points[0]])]))
         geo.addPlaneSurface(loops)
         geo.synchronize()
