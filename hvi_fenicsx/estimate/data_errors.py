@@ -309,10 +309,10 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[Conta
             np.add.at(found, on.facets.cells, _unprescribed(problem, on, part))
     for bounds, *values in gaps(problem):
         state = next(s for s in states if s.surface is bounds.surface)
-        for value, sign, bound in zip(values, (-1.0, 1.0), (bounds.upper, -bounds.lower), strict=True):
-            if value is not None:
+        for gap, sign, bound in zip(values, (-1.0, 1.0), (bounds.upper, -bounds.lower), strict=True):
+            if gap is not None:
                 on, nodal = modes(bounds.surface.facets), (sign * state.contact_pressure, bound + sign * state.normal)
-                within = np.asarray(-sign * on.beyond_nodes(value) / problem.scales.displacement)
+                within = np.asarray(-sign * on.beyond_nodes(gap) / problem.scales.displacement)
                 np.add.at(found, on.facets.cells, _moved_pressure(problem, bubbles, bounds.surface, on, nodal, within))
     return found
 
@@ -551,7 +551,7 @@ def _held(problem: Problem, part: _Part, forces: Array, examination: Examination
 def _loads(problem: Problem, part: _Part) -> Array:
     """The tractions that the mesh lacks of the loads on a part, at the sample points, nondimensional, (f, q, d)."""
     on, missing = part.on, part.missing
-    found = np.zeros((*missing.shape, problem.scales.dimension))
+    found: Array = np.zeros((*missing.shape, problem.scales.dimension))
     for load in (effect.surface_load() for where, effect, _ in problem.contributions if where == part.name):
         if load is None:
             continue
@@ -562,7 +562,7 @@ def _loads(problem: Problem, part: _Part) -> Array:
         if load.pressure is not None and load.pressure.everywhere:
             there -= on.of(load.pressure)[:, :, None] * _outward(problem, on)[:, None]
         found += np.where(missing[:, :, None] == 0.0, 0.0, missing[:, :, None] * there)
-    return found / problem.scales.stress
+    return np.asarray(found / problem.scales.stress)
 
 
 def _sums(problem: Problem, part: _Part) -> Array:
@@ -575,7 +575,7 @@ def _sums(problem: Problem, part: _Part) -> Array:
         moments = domain_forms.of_points(problem.domain.mesh.comm, at[:, :d], areas)
         for effect in spread:
             found += sign * counted[:, :, None] * effect.spread_at(moments, at).reshape(found.shape)
-    return found / problem.scales.stress
+    return np.asarray(found / problem.scales.stress)
 
 
 def _of_loads(problem: Problem, inverse: DualNorm, parts: Sequence[_Part], lacking: Sequence[Array]) -> Array:

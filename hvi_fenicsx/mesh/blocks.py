@@ -316,8 +316,8 @@ class GridTransfer(NestedGridTransfer):
         order = np.argsort(-within, axis=1)  # the path to the highest corner takes the largest coordinate first
         falling = np.pad(np.take_along_axis(within, order, axis=1), ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
         ways = np.pad(np.cumsum(np.eye(len(cells), dtype=PETSc.IntType)[order], axis=1), ((0, 0), (1, 0), (0, 0)))
-        numbers = _flat((corner[:, None] + ways).reshape(-1, len(cells)), cells).reshape(falling[:, 1:].shape)
-        numbers = _numbered(numbers, coarse, far, self.size, cells)
+        at = _flat((corner[:, None] + ways).reshape(-1, len(cells)), cells).reshape(falling[:, 1:].shape)
+        numbers = _numbered(at, coarse, far, self.size, cells)
         return weighted_rows(numbers, -np.diff(falling, axis=1), fine.dofmap.index_map_bs)
 
 
