@@ -92,7 +92,8 @@ def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
     )
     for kind, name, look in kinds:
         if np.any(kind):
-            axes.add_collection(LineCollection(np.stack([points[:-1], points[1:]], axis=1)[kind], label=name, **look))
+            pieces = list(np.stack([points[:-1], points[1:]], axis=1)[kind])
+            axes.add_collection(LineCollection(pieces, label=name, **look))
 
 
 def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: Sequence[Unit]) -> None:

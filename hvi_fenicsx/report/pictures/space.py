@@ -224,7 +224,7 @@ class SpaceCanvas(Canvas):
             plotter.camera_position = [middle + 10 * wide * self.toward, middle, self.up]
             plotter.enable_parallel_projection()  # type: ignore[call-arg]
             plotter.camera.parallel_scale = (top - bottom) / 2
-            plotter.reset_camera_clipping_range()  # type: ignore[call-arg]
+            plotter.reset_camera_clipping_range()
             image = plotter.screenshot(transparent_background=True, return_img=True)
         finally:
             plotter.close()
