@@ -13,12 +13,11 @@ import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..errors import InputError
 from ..geometry import spot
 from ..mesh import hierarchy
 from ..mesh.domain import Domain
 from ..rigid import AnyBody, JoinedBodies, Mode, RigidBody, rigid_fields
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, refuse
 from ..typing import Array, Entities, Integers
 
 
@@ -145,13 +144,12 @@ def _vertices(domain: Domain, space: fem.FunctionSpace, cells: Integers, points:
     labels[corners] = cells[: len(corners), None]
     hinges = corners[labels[corners] != cells[: len(corners), None]]
     apart = np.flatnonzero(labels != hierarchy.of_owners(space.dofmap.index_map, labels))
-    first = points[np.concatenate([hinges, apart])[:1]]
-    found = [p for rank in agree(domain.mesh.comm, first.tolist()) for p in rank]
-    if found:
-        raise InputError(
-            f"the mesh: at {spot(found[0][: domain.dimension])} two bodies share a vertex but no facet, and would turn "
-            "about it as about a hinge; let them share a facet, or give each its own vertex"
-        )
+    said = [
+        f"the mesh: at {spot(point[: domain.dimension])} two bodies share a vertex but no facet, and would turn "
+        "about it as about a hinge; let them share a facet, or give each its own vertex"
+        for point in points[np.concatenate([hinges, apart])[:1]]
+    ]
+    refuse(domain.mesh.comm, said)
     return labels
 
 

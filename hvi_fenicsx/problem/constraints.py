@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..formula import SpatialValue
 from ..geometry import spot
 from ..mesh import nodes
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, refuse
 from ..typing import Array, Entities
 from . import contact_surface
 from .contact_surface import Surface
@@ -75,9 +75,8 @@ def _stated(context: DomainForms, where: Surface, obstacle: Towards) -> Array:
     """
     found = obstacle.towards(where.points[:, : context.dimension])
     bad = np.flatnonzero(~np.all(np.isfinite(found), axis=1))
-    said = [where.spot(i) for i in bad[:1]]
-    for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
-        raise InputError(f"boundary.{where.part}.contact: no direction leads from {text} to the obstacle; state one")
+    said = f"boundary.{where.part}.contact: no direction leads from {{}} to the obstacle; state one"
+    refuse(context.domain.mesh.comm, [said.format(where.spot(i)) for i in bad[:1]])
     return found
 
 
@@ -220,10 +219,12 @@ def check_bounds(context: DomainForms, bounds: Sequence[Bounds], prescribed: Arr
         axis = np.argmax(np.abs(b.surface.normals), axis=1)
         held = np.isin(b.surface.blocks * context.dimension + axis, fixed)
         out = held & ((un < b.lower - DEFAULT.same) | (un > b.upper + DEFAULT.same))
-        bad += [f"{b.surface.part} at {b.surface.spot(i)}" for i in np.flatnonzero(out)[:1]]
-    found = [b for rank in agree(context.domain.mesh.comm, bad) for b in rank]
-    if found:
-        raise InputError(f"boundary.{found[0]}: the prescribed displacement violates the contact bound there")
+        bad += [
+            f"boundary.{b.surface.part} at {b.surface.spot(i)}: the prescribed displacement violates the contact bound "
+            "there"
+            for i in np.flatnonzero(out)[:1]
+        ]
+    refuse(context.domain.mesh.comm, bad)
 
 
 def check_contradictions(context: DomainForms, scales: Scales, bounds: Sequence[Bounds]) -> None:
@@ -239,9 +240,7 @@ def check_contradictions(context: DomainForms, scales: Scales, bounds: Sequence[
     """
     pairs = combinations_with_replacement(bounds, 2)
     bad = [text for one, other in pairs for text in _contradiction(one, other, scales.displacement)]
-    found = [text for rank in agree(context.domain.mesh.comm, bad) for text in rank]
-    if found:
-        raise InputError(f"boundary.{found[0]}; change one of them, or leave the vertex out of one part")
+    refuse(context.domain.mesh.comm, bad)
 
 
 def _contradiction(one: Bounds, other: Bounds, unit: float) -> list[str]:
@@ -254,8 +253,9 @@ def _contradiction(one: Bounds, other: Bounds, unit: float) -> list[str]:
     bad = np.flatnonzero((np.abs(along) > 0.5) & (low - high > DEFAULT.same * (1.0 + np.abs(low))))
     shared = "" if one is other else f", a vertex of boundary.{other.surface.part} too"
     return [
-        f"{one.surface.part}: at {one.surface.spot(i[k])}{shared}, u·n would have to be at least "
-        f"{low[k] * unit:.6g} m and at most {high[k] * unit:.6g} m"
+        f"boundary.{one.surface.part}: at {one.surface.spot(i[k])}{shared}, u·n would have to be at least "
+        f"{low[k] * unit:.6g} m and at most {high[k] * unit:.6g} m; change one of them, or leave the vertex out of one "
+        "part"
         for k in bad[:1]
     ]
 
@@ -317,9 +317,7 @@ def _check_agreement(
         apart = np.abs(these[i] - those[j]) > rounding * size
         differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
         bad += [_disagreement(context, int(dof), (one, other), pair, scales) for dof, *pair in differing]
-    found = [text for rank in agree(context.domain.mesh.comm, bad[:1]) for text in rank]
-    if found:
-        raise InputError(found[0])
+    refuse(context.domain.mesh.comm, bad[:1])
 
 
 def _values(condition: fem.DirichletBC, values: Array) -> tuple[Entities, Array]:

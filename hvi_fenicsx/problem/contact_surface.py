@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..geometry import spot, tangents
-from ..runtime.mpi import agree, largest
+from ..runtime.mpi import agree, largest, refuse
 from ..typing import Array, Entities, Integers
 from .facets import is_curved
 from .scaling import DEFAULT
@@ -216,14 +216,8 @@ def _at_shared_vertices(
                 break
             normals[name][i] = found.direction
             rows.append(found)
-    _refuse(comm, bad)
+    refuse(comm, bad)
     return normals
-
-
-def _refuse(comm: MPI.Comm, bad: Sequence[str]) -> None:
-    found = [text for rank in agree(comm, list(bad)) for text in rank]
-    if found:
-        raise InputError(found[0])
 
 
 def _shared(
@@ -273,18 +267,11 @@ def _turned(normal: _Row, rows: Sequence[_Row]) -> _Row | str:
 def _refusal(normal: _Row, row: _Row, limit: float) -> str:
     """Why two directions cannot stand at one vertex, and what to do."""
     angle = math.degrees(math.acos(min(abs(float(row.direction @ normal.direction)), 1.0)))
-    remedy = (
-        ""
-        if normal.exact
-        else (
-            ", leave it out of the part (`where`), or state the normal: contact = { obstacle = { point = ..., normal "
-            "= ... } }, of a round obstacle its `direction`"
-        )
-    )
     return (
         f"its normal makes an angle of {angle:.6g}° with the direction of {row.name}; they must be orthogonal or "
         f"equal, here to within {math.degrees(limit):.2g}°. Move the edge of the part, prescribe all components "
-        f"there{remedy}"
+        "there, leave it out of the part (`where`), or state the normal: contact = { obstacle = { point = ..., normal "
+        "= ... } }, of a round obstacle its `direction`"
     )
 
 

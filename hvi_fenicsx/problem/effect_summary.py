@@ -14,7 +14,6 @@ import numpy as np
 
 from ..effects import BoundaryLaw, Contribution, Direction, Effect, Place
 from ..laws import Superpotential, describe
-from .contact_surface import Surface
 from .problem import Problem
 from .scaling import PlacedContribution
 
@@ -101,11 +100,7 @@ def _terms(contribution: Contribution) -> Iterator[str]:
 
 def _bounded(problem: Problem, part: str | None) -> int:
     """Vertices of a part, over all ranks. Collective."""
-    return _vertices(problem, [s for s in problem.surfaces if s.part == part])
-
-
-def _vertices(problem: Problem, surfaces: Sequence[Surface]) -> int:
-    return int(problem.domain.mesh.comm.allreduce(sum(len(s.blocks) for s in surfaces)))
+    return int(problem.domain.mesh.comm.allreduce(sum(len(s.blocks) for s in problem.surfaces if s.part == part)))
 
 
 def _prescribed(problem: Problem, part: str | None, contribution: Contribution) -> int:

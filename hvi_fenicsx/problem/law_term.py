@@ -16,7 +16,7 @@ from ..effects import BoundaryLaw, Direction
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..laws import Length, Mixity, Superpotential
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, refuse
 from ..typing import Array, Entities, Mask
 from .contact_surface import Surface
 from .domain_forms import DomainForms
@@ -264,9 +264,8 @@ def _term(
             "ring that bounds cannot follow; smooth it: [solver] smoothing and epsilon"
         )
     if law.contradictions is not None:
-        said = agree(context.domain.mesh.comm, law.contradictions(where.points))
-        if texts := [text for rank in said for text in rank]:
-            raise InputError(f"boundary.{where.part}.{key}: {texts[0]}")
+        said = law.contradictions(where.points)
+        refuse(context.domain.mesh.comm, [f"boundary.{where.part}.{key}: {text}" for text in said])
     return LawTerm(
         surface=where,
         direction=law.direction,
@@ -290,13 +289,12 @@ def _factor(context: DomainForms, where: Surface, key: str, given: SpatialValue)
     """
     found, most = given.at(where.points), DEFAULT.largest_scale
     bad = np.flatnonzero(~((found >= 1.0 / most) & (found <= most)))
-    said = [f"{found[i]:g} at {where.spot(i)}" for i in bad[:1]]
-    for text in (text for rank in agree(context.domain.mesh.comm, said) for text in rank):
-        reason = (
-            f"it must be positive at every vertex, from {1.0 / most:g} to {most:g}. Where there is no law, leave that "
-            "piece out: `where`"
-        )
-        raise InputError(f"boundary.{where.part}.{key} = {given.source!r} is {text}; {reason}")
+    said = [
+        f"boundary.{where.part}.{key} = {given.source!r} is {found[i]:g} at {where.spot(i)}; it must be positive at "
+        f"every vertex, from {1.0 / most:g} to {most:g}. Where there is no law, leave that piece out: `where`"
+        for i in bad[:1]
+    ]
+    refuse(context.domain.mesh.comm, said)
     return found
 
 

@@ -123,18 +123,19 @@ def ball(frame: Array) -> Polytope:
     return Polytope(np.vstack([frame, -frame]), none, np.zeros(0))
 
 
-def vertices(frame: Array, rank: float) -> Array:
+def vertices(frame: Array) -> Array:
     """The corners (v, k) of the ball |y| <= 1.
 
     Args:
         frame: rigid coefficients of the basis motions, (n, k).
-        rank: singular values this small beside the largest count as zero.
     """
     k = frame.shape[1]
     chosen = [frame[list(rows)] for rows in combinations(range(len(frame)), k)]
     signs = np.array(list(product((1.0, -1.0), repeat=k)))
-    corners = np.vstack([np.linalg.solve(rows, signs.T).T for rows in chosen if np.linalg.cond(rows) * rank < 1.0])
-    return np.asarray(corners[np.abs(corners @ frame.T).max(axis=1) <= 1.0 + rank])
+    corners = np.vstack(
+        [np.linalg.solve(rows, signs.T).T for rows in chosen if np.linalg.cond(rows) * DEFAULT.rounding < 1.0]
+    )
+    return np.asarray(corners[np.abs(corners @ frame.T).max(axis=1) <= 1.0 + DEFAULT.rounding])
 
 
 def idle(frame: Array, load: Array) -> Polytope:

@@ -212,7 +212,7 @@ class Analysis:
         gram = sum(
             (g for g, c in zip(self.reduced.traces, c4, strict=True) if c > 0.0), np.zeros((len(self.work),) * 2)
         )
-        corners = vertices(self.reduced.frame, DEFAULT.rounding) if c4.any() else ()
+        corners = vertices(self.reduced.frame) if c4.any() else ()
         trace = max((float(y @ gram @ y) for y in corners), default=0.0)
         return float(np.sqrt(c4**2 @ self.reduced.areas * trace))
 

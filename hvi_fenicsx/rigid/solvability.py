@@ -47,7 +47,6 @@ class LoadFactors:
         mode: the motion that limits the load at `held`, None where nothing does.
         peak_mode: the motion that limits the load at `peak`, likewise.
         peak_from: see above; above peak: no factor is borne.
-        tie: relative difference of two factors that is rounding.
     """
 
     held_from: float
@@ -56,14 +55,13 @@ class LoadFactors:
     mode: Mode | None
     peak_mode: Mode | None
     peak_from: float = -np.inf
-    tie: float = DEFAULT.rounding
 
     @property
     def never_held(self) -> bool:
         """Whether no factor is held."""
         if not np.isfinite(self.held):
             return self.held_from >= self.held
-        return self.held - self.held_from <= self.tie * abs(self.held)
+        return self.held - self.held_from <= DEFAULT.rounding * abs(self.held)
 
     def summary(self) -> dict[str, object]:
         """For JSON: null for infinite. Where no factor is held, or every factor escapes, a flag says so."""

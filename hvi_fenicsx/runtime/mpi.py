@@ -6,7 +6,7 @@ import math
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any, TypeVar
@@ -31,6 +31,20 @@ def agree(comm: MPI.Comm, value: T) -> list[T]:
         value: this rank's.
     """
     return comm.allgather(value)
+
+
+def refuse(comm: MPI.Comm, reasons: Iterable[str]) -> None:
+    """Refuse the input for the first reason that any rank has. Collective.
+
+    Args:
+        comm: the ranks.
+        reasons: this rank's.
+
+    Raises:
+        InputError: on all ranks alike.
+    """
+    for reason in (reason for rank in agree(comm, list(reasons)) for reason in rank):
+        raise InputError(reason)
 
 
 def on_root(comm: MPI.Comm, action: Callable[[], T], *, asleep: bool = False) -> T:
