@@ -9,6 +9,8 @@ import csv
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -74,9 +76,12 @@ def write_whole(
         sigma = None if solved is None else stress_of_parts(solution.problem.bulk, solved.u)
         arrays, record = gathering.solution_arrays(solution, sigma), {**summary(solution), **given}
         on_root(comm, lambda: _write_basis(folder, solution.scene, arrays, record))
-        _write_fields(work, solution, sigma)
-        if pictures:
-            on_root(comm, lambda: made("pictures", tell, lambda: draw(work)), asleep=True)
+        with ThreadPoolExecutor(1) as pool:  # one rank draws while it writes fields; several would wait for that one
+            drawing = pool.submit(draw, work) if pictures and comm.size == 1 else None
+            _write_fields(work, solution, sigma)
+            drawn = partial(draw, work) if drawing is None else drawing.result
+            if pictures:
+                on_root(comm, lambda: made("pictures", tell, drawn), asleep=True)
         record["time"] = timer.report()
         on_root(comm, lambda: write_record(work, record))
         if report:
