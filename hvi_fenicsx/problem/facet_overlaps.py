@@ -115,7 +115,8 @@ def overlaps(first: Facets, second: Facets) -> Overlaps:
     d = first.dimension
     number, other = _candidates(first, second)
     local = first.own_coordinates(number, second.points[other])
-    pair, of_second = np.arange(len(other)), np.broadcast_to(np.eye(d), (len(other), d, d))
+    pair: Integers = np.arange(len(other))
+    of_second: Array = np.broadcast_to(np.eye(d), (len(other), d, d))
     if second.curved and d == 3:
         pair, of_second = _parts(second, other)
     outlines = local[:, :d, :-1]
@@ -213,7 +214,8 @@ def _visible(pieces: Array, outline: Integers, number: Integers, distance: Array
     kept, sizes, under = np.ones(len(pieces), dtype=bool), _sizes(pieces), number[outline]
     for crowded in np.flatnonzero(np.bincount(under, weights=sizes, minlength=1) > 1.0 + DEFAULT.uncovered):
         here, nearer = np.flatnonzero(under == crowded), pieces[:0]
-        for one in sorted(set(outline[here]), key=distance.__getitem__):
+        several = np.unique(outline[here])
+        for one in several[np.argsort(distance[several], kind="stable")]:
             own = here[outline[here] == one]
             kept[own] = _common(pieces[own], nearer) < 0.5 * sizes[own].sum()
             nearer = np.concatenate([nearer, pieces[own[kept[own]]]])
@@ -244,7 +246,7 @@ def _angles(simplices: Array) -> Array:
         return np.ones(simplices.shape[:2])
     one, other = (np.roll(simplices, step, axis=1) - simplices for step in (1, -1))
     turn = one[:, :, 0] * other[:, :, 1] - one[:, :, 1] * other[:, :, 0]
-    return np.abs(np.arctan2(turn, np.sum(one * other, axis=2)))
+    return np.asarray(np.abs(np.arctan2(turn, np.sum(one * other, axis=2))))
 
 
 def _parts(second: Facets, other: Integers) -> tuple[Integers, Array]:
@@ -253,7 +255,7 @@ def _parts(second: Facets, other: Integers) -> tuple[Integers, Array]:
     Two neighbours share a chord. Where a side ends it has to end where the other does: the edge is cut into parts.
     """
     rim = _rim_edges(second)[other]
-    pairs, corners = [], []
+    pairs, corners = list[Integers](), list[Array]()
     for pattern in np.unique(rim, axis=0):
         here, parts = np.flatnonzero(np.all(rim == pattern, axis=1)), _fan(pattern)
         pairs.append(np.repeat(here, len(parts)))
@@ -270,7 +272,8 @@ def _fan(pattern: Mask) -> Array:
         a, b = np.eye(3)[(edge + 1) % 3], np.eye(3)[(edge + 2) % 3]
         many = DEFAULT.rim_parts if pattern[edge] else 1
         around += [a + (b - a) * step / many for step in range(many)]
-    return np.stack([np.full((len(around), 3), 1 / 3), around, [*around[1:], around[0]]], axis=1)
+    ring = np.array(around)
+    return np.stack([np.full_like(ring, 1 / 3), ring, np.roll(ring, -1, axis=0)], axis=1)
 
 
 def _curved_outlines(

@@ -6,7 +6,7 @@ side, and those that are prescribed, on another part with contact or laws, or on
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -155,7 +155,7 @@ def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array) -> Non
     Raises:
         InputError: on all ranks alike, with the place where they overlap most.
     """
-    deepest = [(float(gap[i]), surface.spot(i)) for i in _lowest(gap)]
+    deepest = [(float(gap[i]), surface.spot(i)) for i in np.argsort(gap)[:1]]
     depth, at = min((place for rank in agree(comm, deepest) for place in rank), default=(0.0, ""))
     if depth < -DEFAULT.overlap * pair.first.width:
         raise InputError(
@@ -163,10 +163,6 @@ def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array) -> Non
             f'of "{pair.sides.first}": move one of the bodies, name the sides that face each other, or mesh '
             "curved sides more finely"
         )
-
-
-def _lowest(gap: Array) -> Iterable[int]:
-    return (int(np.argmin(gap)),) if len(gap) else ()
 
 
 @dataclass(frozen=True, kw_only=True)
