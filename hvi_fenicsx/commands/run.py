@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .. import console, results
 from ..errors import ExitCode, InputError
 from ..load_paths import last_borne
+from ..report.page import picture_process
 from ..results.whole import write_whole
 from ..workflow import Solution, find_solution, prepare
 from . import session
@@ -53,15 +55,16 @@ def _goal(options: argparse.Namespace) -> Goal | None:
 def _run(call: Session) -> int:
     """Solve, write and tell; the exit code. Collective."""
     goal = _goal(call.options)
-    options, given = call.options, dict[str, Any](call.given)
-    if goal is None:
-        solution = _solved(call)
-    else:
-        reached = _solved_to_goal(call, goal)
-        solution = reached.solution
-        given |= {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
-    wanted = {"pictures": not options.no_pictures, "report": not options.no_report}
-    record = write_whole(call.folder, solution, given, call.timer, LOG.info, **wanted)
+    options, given, drawn = call.options, dict[str, Any](call.given), not call.options.no_pictures
+    with picture_process(call.folder.work) if drawn and COMM.rank == 0 else nullcontext() as process:
+        if goal is None:
+            solution = _solved(call)
+        else:
+            reached = _solved_to_goal(call, goal)
+            solution = reached.solution
+            given |= {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
+        wanted: dict[str, Any] = {"pictures": drawn, "report": not options.no_report, "process": process}
+        record = write_whole(call.folder, solution, given, call.timer, LOG.info, **wanted)
     return int(record["exit_code"])
 
 

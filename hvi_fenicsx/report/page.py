@@ -17,6 +17,7 @@ import re
 import shlex
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -265,51 +266,89 @@ class PictureError(ReportError):
     """A picture could not be drawn; those that could are in the folder."""
 
 
+@dataclass(frozen=True)
+class PictureProcess:
+    """A process that draws a folder's pictures; what it needs for that it loads before it is told to.
+
+    Attributes:
+        folder: whose pictures it draws.
+        command: by which they can be drawn again.
+        child: the process; where there is none, why.
+    """
+
+    folder: Path
+    command: list[str]
+    child: subprocess.Popen[str] | str
+
+    def begin(self) -> None:
+        """Let it draw: the folder has all that pictures are drawn from."""
+        if isinstance(self.child, subprocess.Popen) and self.child.stdin and self.child.poll() is None:
+            with contextlib.suppress(OSError):  # it has failed already: then `finish` tells
+                self.child.stdin.write("draw\n")
+                self.child.stdin.flush()
+
+    def finish(self, timeout: float = 120) -> list[Path]:
+        """Wait for the pictures; they are listed in the folder.
+
+        Args:
+            timeout: seconds after which the process is given up.
+
+        Returns:
+            The pictures, as paths.
+
+        Raises:
+            PictureError: the process failed; its message says which picture and why.
+            NotWrittenError: there is no room for a picture.
+        """
+        if isinstance(self.child, str):
+            raise PictureError(f"no process draws: {self.child}")
+        try:
+            names, errors = self.child.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            raise PictureError(f"not drawn within {timeout:g} s; {shlex.join(self.command)} tries again") from None
+        writing.raise_handed_over(self.child.returncode, errors)
+        if self.child.returncode != 0:
+            raise PictureError(_message(errors, self.child.returncode))
+        manifest.add(self.folder, names.splitlines())
+        return [self.folder / name for name in names.splitlines()]
+
+
 def draw(folder: Path, *, timeout: float = 120) -> list[Path]:
-    """Draw all pictures of a result folder into it; for rank 0 alone.
+    """Draw all pictures of a finished folder; for rank 0 alone.
 
     Args:
         folder: a finished result.
-        timeout: seconds after which the child is ended.
-
-    Returns:
-        The pictures, as paths.
-
-    Raises:
-        PictureError: the child failed; its message says which picture and why.
-        NotWrittenError: there is no room for a picture.
+        timeout: as for :meth:`PictureProcess.finish`, which tells the errors too.
     """
-    command = [*processes.PYTHON, "-m", f"{__package__}.pictures.drawings", os.path.abspath(folder)]
-    with _child(command, folder) as child:
-        try:
-            names, errors = child.communicate(timeout=timeout)
-        except subprocess.TimeoutExpired:
-            raise PictureError(f"not drawn within {timeout:g} s; {shlex.join(command)} tries again") from None
-    writing.raise_handed_over(child.returncode, errors)
-    if child.returncode != 0:
-        raise PictureError(_message(errors, child.returncode))
-    manifest.add(folder, names.splitlines())
-    return [folder / name for name in names.splitlines()]
+    with picture_process(folder) as process:
+        process.begin()
+        return process.finish(timeout)
 
 
 @contextlib.contextmanager
-def _child(command: list[str], folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """What draws; whatever happens, of it nothing remains: no process (it leads a group), no half-written file."""
+def picture_process(folder: Path) -> Iterator[PictureProcess]:
+    """What will draw; whatever happens, of it nothing remains: no process (it leads a group), no half-written file.
+
+    Args:
+        folder: a result that will be finished; for rank 0 alone.
+    """
     # One thread for linear algebra: the child forks, and what it draws needs none.
     alone, pipe = {**processes.environment(), "OMP_NUM_THREADS": "1"}, subprocess.PIPE
+    command = [*processes.PYTHON, "-m", f"{__package__}.pictures.drawings", os.path.abspath(folder)]
+    child: subprocess.Popen[str] | str
     try:  # in the result's folder: in the current one matplotlib would read a file of settings
         child = subprocess.Popen(
-            command, env=alone, cwd=folder, start_new_session=True, stdin=subprocess.DEVNULL,
-            stdout=pipe, stderr=pipe, text=True,
+            [*command, "--when-told"], env=alone, cwd=folder, start_new_session=True, stdin=pipe, stdout=pipe,
+            stderr=pipe, text=True,
         )  # fmt: skip
     except OSError as error:
-        raise PictureError(f"no process draws: {error.strerror or error}") from None
+        child = error.strerror or str(error)
     try:
-        yield child
+        yield PictureProcess(Path(folder), command, child)
     finally:
-        if child.returncode != 0:
+        if isinstance(child, subprocess.Popen) and child.returncode != 0:
             processes.end(child)
-            for file in folder.glob(f".*{UNFINISHED}"):
+            for file in Path(folder).glob(f".*{UNFINISHED}"):
                 file.unlink(missing_ok=True)
 
 

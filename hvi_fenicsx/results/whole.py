@@ -5,12 +5,11 @@ Tables are comma-separated values, in SI: ``contact.csv``, ``boundary.csv``, ``p
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from ..problem import references, spaces
 from ..problem.stress import stress_of_parts
 from ..problem.vectors import NodalForces
 from ..report import page, solution_arrays
-from ..report.page import draw
+from ..report.page import PictureProcess
 from ..report.solution_arrays import ContactPart, ReportError, SolutionArrays
 from ..runtime import writing
 from ..runtime.cost import Timer
@@ -56,6 +55,7 @@ def write_whole(
     *,
     pictures: bool = True,
     report: bool = True,
+    process: PictureProcess | None = None,
 ) -> dict[str, Any]:
     """Write all files but ``run.log``. Collective.
 
@@ -67,21 +67,22 @@ def write_whole(
         tell: is given a line on rank 0 where pictures or page cannot be made; that does not cost the run.
         pictures: whether pictures are drawn.
         report: whether the page is written.
+        process: draws the pictures, on rank 0; by default one that begins here.
 
     Returns:
         The summary, on all ranks.
     """
     work, comm, solved = folder.work, folder.comm, solution.solve_result
-    with timer("output"):
+    with timer("output"), contextlib.ExitStack() as stack:
         sigma = None if solved is None else stress_of_parts(solution.problem.bulk, solved.u)
         arrays, record = gathering.solution_arrays(solution, sigma), {**summary(solution), **given}
         on_root(comm, lambda: _write_basis(folder, solution.scene, arrays, record))
-        with ThreadPoolExecutor(1) as pool:  # one rank draws while it writes fields; several would wait for that one
-            drawing = pool.submit(draw, work) if pictures and comm.size == 1 else None
-            _write_fields(work, solution, sigma)
-            drawn = partial(draw, work) if drawing is None else drawing.result
-            if pictures:
-                on_root(comm, lambda: made("pictures", tell, drawn), asleep=True)
+        if pictures and comm.rank == 0:
+            process = process or stack.enter_context(page.picture_process(work))
+            process.begin()
+        _write_fields(work, solution, sigma)
+        if pictures:
+            on_root(comm, lambda: process and made("pictures", tell, process.finish), asleep=True)
         record["time"] = timer.report()
         on_root(comm, lambda: write_record(work, record))
         if report:

@@ -34,6 +34,8 @@ _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 """What mpirun tells each process, before MPI is started."""
 CODE_FILE = "HVI_EXIT_CODE_FILE"
 """The variable that names a file for the ranks' exit code, where this program has started mpirun."""
+_NICENESS = 10
+"""The niceness of a process that stands back: it gets a tenth of the time of one that does not."""
 _PR_SET_PDEATHSIG = 1
 """prctl(2)."""
 _MPI = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDRA_", "MPI_LOCAL")
@@ -168,8 +170,9 @@ def die_with_parent(number: signal.Signals = signal.SIGTERM) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 
 
-def unbind() -> None:
-    """Have this process take any of the machine's processors: an mpirun may bind a rank, and its children, to one."""
+def stand_back() -> None:
+    """Have this process take what the ranks leave of any of the machine's processors: mpirun may bind a rank to one."""
+    os.nice(_NICENESS)
     if sys.platform == "linux":
         with contextlib.suppress(OSError):
             os.sched_setaffinity(0, range(os.cpu_count() or 1))

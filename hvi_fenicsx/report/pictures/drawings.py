@@ -108,11 +108,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command; its exit code."""
     parser = argparse.ArgumentParser(description="Draw a result's pictures.")
     parser.add_argument("folder", type=Path, help="a finished result folder")
-    folder = parser.parse_args(arguments).folder
+    parser.add_argument("--when-told", action="store_true", help="wait for a line on the standard input")
+    options = parser.parse_args(arguments)
     processes.die_with_parent()  # or it would write into the folder of the next run
-    processes.unbind()
+    processes.stand_back()  # the ranks may still be computing
+    if options.when_told and not sys.stdin.readline():
+        return 1
     try:
-        found, at_once = drawings_of(folder), os.cpu_count() or 1
+        found, at_once = drawings_of(options.folder), os.cpu_count() or 1
     except HviError as error:
         return _complain(str(error))
     with x_server(wanted=any(drawing.rendered for drawing in found)):
