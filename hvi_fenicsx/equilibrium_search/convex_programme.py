@@ -297,11 +297,11 @@ def _tangent(left: _Piece, right: _Piece) -> tuple[float, float, float]:
     if not apart(a.high, b.low) and (not apart(left.start, a.high) or a.rate(a.high) <= first):
         return first, a.high, b.low
     marks = [a.rate(left.start), a.rate(a.high), first, b.rate(b.high)]
-    p, most, exact = min(marks), max(marks), np.finfo(float)
+    p, most, rounding = min(marks), max(marks), float(np.finfo(float).eps)
     if _apart_at(most, left, right) >= 0.0:
         p = most
     elif _apart_at(p, left, right) > 0.0:
-        p = brentq(_apart_at, p, most, (left, right), exact.tiny, 4.0 * exact.eps)
+        p = brentq(_apart_at, p, most, (left, right), rounding * max(abs(p), abs(most)), 4.0 * rounding, maxiter=1000)
     (x, value), (y, other) = left.support(p), right.support(p)
     return ((other - value) / (y - x) if y > x else p), x, y
 

@@ -88,7 +88,8 @@ class Overlaps:
         """
         d, (above, below) = rule.shape[1], self.sides
         first, second = (np.repeat(numbers[chosen], len(rule)) for numbers in (self.first, self.second))
-        on_first, on_second = ((rule @ on[chosen]).reshape(-1, d) for on in (self.on_first, self.on_second))
+        on_first: Array = (rule @ self.on_first[chosen]).reshape(-1, d)
+        on_second: Array = (rule @ self.on_second[chosen]).reshape(-1, d)
         sizes = above.areas[first]
         if above.curved:
             sizes = np.linalg.norm(across(slopes(above.points[first], on_first)), axis=1) / (d - 1)

@@ -82,7 +82,7 @@ def write_whole(
             process.begin()
         _write_fields(work, solution, sigma)
         if pictures:
-            on_root(comm, lambda: process and made("pictures", tell, process.finish), asleep=True)
+            on_root(comm, lambda: made("pictures", tell, lambda: process and process.finish()), asleep=True)
         record["time"] = timer.report()
         on_root(comm, lambda: write_record(work, record))
         if report:

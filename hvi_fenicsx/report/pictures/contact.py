@@ -139,7 +139,8 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
         note = _fallen(axes, part["branch_t" if field.kind == "friction" else "branch_n"] > 0, s, values, field.colour)
     axes.set_title(note, loc="right", size=11.5, color=GREY)
     everywhere: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "color": ORANGE, "alpha": 0.16, "lw": 0}
-    axes.fill_between(s, 0.0, 1.0, where=part.lifted.tolist(), **everywhere)
+    lifted: Any = part.lifted  # matplotlib takes arrays, which its types do not say
+    axes.fill_between(s, 0.0, 1.0, where=lifted, **everywhere)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)  # zero is always in sight
     axes.margins(0.015, 0.06)
     few_ticks(axes, "y")
