@@ -20,16 +20,16 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LIMITS = {
-    "lines of code": 34420,
-    "tokens": 409100,
-    "files": 320,
-    "lines of the largest room": 3200,
+    "lines of code": 31300,
+    "tokens": 377600,
+    "files": 240,
+    "lines of the largest room": 3100,
     "flat modules": 12,
-    "tuning numbers": 255,
-    "class names used twice": 8,
+    "tuning numbers": 165,
+    "class names used twice": 4,
     "lines of the longest function": 45,
     "floors": 15,
-    "lines of tests": 21400,
+    "lines of tests": 21300,
     "lines of benchmarks": 2600,
 }
 """They go down with the house, never up without a reason that is written beside."""
