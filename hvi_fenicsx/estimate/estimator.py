@@ -22,7 +22,7 @@ from ..runtime.mpi import total
 from ..system.multigrid import Levels
 from ..system.system import System
 from ..typing import Array
-from . import data_errors, defect, dual_norm
+from . import data_errors, defect, dual_norm, part_ends
 from .bubbles import DEFAULT, BlockForces, BubbleStiffness, summed
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
@@ -92,7 +92,7 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
     energy = _energy(problem, u, examination)
     field, cells = _discretisation(traces, inverse, energy)
     cells += data_errors.squares(problem, traces.bubbles, examination.states)
-    cells += data_errors.squares_at_ends(problem, traces.bubbles, u, examination, inverse)
+    cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse)
     smoothed = any(term.law != term.exact for term in problem.terms)
     smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])
