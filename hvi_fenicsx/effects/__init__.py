@@ -2,30 +2,32 @@
 
 from ..class_registry import load_modules
 from .base import (
-    Averaged,
     BodySizes,
-    BoundaryLaw,
-    Condition,
-    Contribution,
-    Direction,
     Drive,
     Effect,
     Evaluate,
     FormContext,
-    NormalBounds,
-    ObstacleForce,
-    ObstacleMove,
     Place,
     SideMoments,
     Sides,
     SurfaceLoad,
-    Towards,
     from_python,
     in_words,
     load_name,
     names_in_python,
 )
 from .contact import Contact
+from .contribution import (
+    Averaged,
+    BoundaryLaw,
+    Condition,
+    Contribution,
+    Direction,
+    NormalBounds,
+    ObstacleForce,
+    ObstacleMove,
+    Towards,
+)
 from .elasticity import Anisotropic, Isotropic, Orthotropic
 from .law_effects import Adhesion, Cohesion, Friction, LawEffect, Support
 from .loads import BodyForce, Displacement, Force, Moment, Pressure, Temperature, Traction

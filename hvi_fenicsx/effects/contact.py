@@ -23,20 +23,8 @@ from ..formula import Computed, Formula, SpatialValue
 from ..geometry import ROUNDING
 from ..schema import ExistingFile, Finite, Positive, Table, choose, refusal
 from ..typing import Array
-from .base import (
-    BodySizes,
-    Contribution,
-    Drive,
-    Effect,
-    Evaluate,
-    FormContext,
-    NormalBounds,
-    ObstacleForce,
-    ObstacleMove,
-    Place,
-    Sides,
-    from_python,
-)
+from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, Sides, from_python
+from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
 from .values import FormulaField, Value, as_value, require_components
 
 Vector = Annotated[

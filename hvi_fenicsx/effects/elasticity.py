@@ -16,7 +16,8 @@ from ..errors import InputError
 from ..geometry import ROUNDING
 from ..schema import Finite, Names, Positive, refusal
 from ..typing import Array
-from .base import Averaged, Contribution, Effect, FormContext, Place, Sides, from_python
+from .base import Effect, FormContext, Place, Sides, from_python
+from .contribution import Averaged, Contribution
 
 _LOCKING = 0.45
 """Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""

@@ -29,19 +29,8 @@ from ..geometry import ROUNDING, spot
 from ..laws import Mixity, mixities
 from ..schema import Mistake, OneOf, refusal, shown, validation_error
 from ..typing import Array
-from .base import (
-    ONE,
-    BodySizes,
-    BoundaryLaw,
-    Contribution,
-    Direction,
-    Effect,
-    Evaluate,
-    FormContext,
-    Place,
-    Sides,
-    from_python,
-)
+from .base import BodySizes, Effect, Evaluate, FormContext, Place, Sides, from_python
+from .contribution import ONE, BoundaryLaw, Contribution, Direction
 from .values import FormulaField, Value
 
 _PLACES = np.outer([0, 1, -1], np.ones(3))

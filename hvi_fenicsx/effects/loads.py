@@ -15,20 +15,8 @@ from ..errors import InputError
 from ..formula import SpatialValue
 from ..schema import Finite, refusal
 from ..typing import Array
-from .base import (
-    BodySizes,
-    Condition,
-    Contribution,
-    Drive,
-    Effect,
-    Evaluate,
-    FormContext,
-    Place,
-    SideMoments,
-    Sides,
-    SurfaceLoad,
-    from_python,
-)
+from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, SideMoments, Sides, SurfaceLoad, from_python
+from .contribution import Condition, Contribution
 from .elasticity import Elasticity, strain, voigt
 from .values import FormulaField, Listed, OneValue, Value, Vector, as_value
 
