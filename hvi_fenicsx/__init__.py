@@ -36,7 +36,7 @@ _NAMES = {
     "model": ("Body", "Model", "dump_scene", "read_scene", "read_tables"),
     "model.energy": ("Energy",),
     "runtime.log": ("NewtonStep", "set_log_level"),
-    "runtime.versions": ("__version__",),
+    "runtime.manifest": ("__version__",),
     "workflow": ("prepare",),
 }
 _HOME = {name: room for room, names in _NAMES.items() for name in names}
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from .model import Body, Model, dump_scene, read_scene, read_tables
     from .model.energy import Energy
     from .runtime.log import NewtonStep, set_log_level
-    from .runtime.versions import __version__
+    from .runtime.manifest import __version__
     from .workflow import prepare
 
 

@@ -78,8 +78,8 @@ def cell(content: dict[str, Any]) -> str:
 def reference() -> str:
     """The public names, in the order of the alphabet."""
     tree = ast.parse((ROOT / "hvi_fenicsx" / "__init__.py").read_text(encoding="utf-8"))
-    tables = [node for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME"]
-    names = [name for name in ast.literal_eval(tables[0].value) if not name.startswith("__")]
+    tables = [node for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_NAMES"]
+    names = [name for room in ast.literal_eval(tables[0].value).values() for name in room if not name.startswith("__")]
     return "# Python reference\n\n" + "\n".join(f"::: hvi_fenicsx.{name}" for name in sorted(names))
 
 

@@ -164,7 +164,7 @@ class Observable(Quantity):
         return extrapolated((size, near[0], far[0] if far else np.nan), change, further)
 
     def _norm(self, own: Value, other: Value | None) -> float:
-        """Of a quantity, or of its difference from another one."""
+        """The norm of a quantity, or of its difference from another one."""
         difference = own.x.array if isinstance(own, fem.Function) else own
         if other is not None:
             difference = difference - (other.x.array if isinstance(other, fem.Function) else other)

@@ -267,7 +267,7 @@ def _any(problem: ScalarProblem, cell: Box) -> list[Box]:
 
 
 def _middle_joint(problem: ScalarProblem, cell: Box, i: int, *, only_drops: bool) -> tuple[float, float]:
-    """Of the joints of a law inside a cell the one in the middle, and the rise of its traction there."""
+    """The middle one of the joints of a law inside a cell, and the rise of its traction there."""
     inside = itertools.pairwise(on_interval(problem.chains[i], float(cell.low[i]), float(cell.high[i])))
     joints = [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in inside]
     chosen = [one for one in joints if not only_drops or one[1] < -problem.arcs.rounding[i]]

@@ -66,7 +66,7 @@ class Overlaps:
 
     @property
     def areas(self) -> Array:
-        """Of their projections along the normals, m^(d-1), (k,)."""
+        """The sizes of their projections along the normals, m^(d-1), (k,)."""
         return _sizes(self.on_first[:, :, 1:]) * self.sides[0].areas[self.first]
 
     def points(self, degree: int) -> OverlapPoints:

@@ -192,11 +192,21 @@ class Facets:
         return np.asarray(np.linalg.inv(np.concatenate([sides, self.normals[:, None]], axis=1)))
 
     def own_coordinates(self, facets: Integers, points: Array) -> Array:
-        """Points (p, n, d) in the coordinates of facets (p,), (p, n, d)."""
+        """Points in the coordinates of facets, (p, n, d).
+
+        Args:
+            facets: their numbers, (p,).
+            points: for each facet, (p, n, d).
+        """
         return np.asarray(np.einsum("pvi,pij->pvj", points - self.corners[facets, :1], self._frames[facets]))
 
     def normals_at(self, facets: Integers, barycentric: Array) -> Array:
-        """The outward unit normals at points (p, d) of facets (p,), (p, d)."""
+        """The outward unit normals at points of facets, (p, d).
+
+        Args:
+            facets: their numbers, (p,).
+            barycentric: the point of each, (p, d).
+        """
         found = across(slopes(self.points[facets], barycentric))
         found /= np.linalg.norm(found, axis=1, keepdims=True)
         return np.asarray(found * np.sign(np.sum(found * self.normals[facets], axis=1, keepdims=True)))

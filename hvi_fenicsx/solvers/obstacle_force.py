@@ -62,7 +62,7 @@ class PressedObstacle:
 
     @property
     def difference(self) -> float:
-        """Of what is borne from the force, relative to it."""
+        """The distance of what is borne from the force, relative to it."""
         return float(abs(self.borne / np.linalg.norm(self.force) - 1.0))
 
     @property

@@ -6,10 +6,17 @@ from pathlib import Path
 
 import pytest
 
+import hvi_fenicsx as hvi
 from hvi_fenicsx.runtime.manifest import __version__, with_revision
 
 COMMIT = "3812cfc10a9d4f5e6b7c8d9e0f1a2b3c4d5e6f70"
 SHOWN = f"{__version__}+g3812cfc10a"
+
+
+def test_every_public_name_is_there() -> None:
+    """They are loaded when they are first used, each from the module that is listed for it."""
+    assert all(hasattr(hvi, name) for name in hvi.__all__)
+    assert hvi.__version__ == __version__
 
 
 def git_folder(folder: Path, log: str = f"0000 {COMMIT} A <a@b> 1 +0000\tcommit: x\n") -> Path:
