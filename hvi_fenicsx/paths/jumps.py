@@ -113,13 +113,12 @@ def _held_back(problem: CondensedProblem, branch: Branch, held: bool, step: Call
 
 def _evened(points: ContactPoints, motion: Array) -> Array:
     """Forces in the direction of a motion, of the size of each point's area; of the size 1 at most."""
-    found: Array = np.zeros_like(motion)
+    found = np.zeros_like(motion)
     for laws, unknowns in zip(points.laws, points.unknowns(), strict=True):
         own = float(np.linalg.norm(motion[unknowns]))
         if laws and own > points.thresholds.slow * _largest(motion):
             found[unknowns] = sum(law.weight for law in laws) * motion[unknowns] / own
-    found /= _largest(found) or 1.0
-    return found
+    return found / (_largest(found) or 1.0)
 
 
 def _moved(problem: CondensedProblem, branch: Branch, held: bool, step: Callable[[], None]) -> Landing | None:
