@@ -9,17 +9,13 @@ from freeze import QUICK, Case, cases, golden
 from runs import hvi
 
 FAST = {
-    "curved": ("exponential friction", "glued plates in space"),
+    "curved": ("exponential friction", "slip in space"),
     "paths": ("drop, 4 vertices", "block up to slide", "two arms, pulled apart"),
 }
 """A few seconds in all."""
 WHOLE = ("curved", "ranks")
 """Sets of which all cases are in the long tier; of others those that are quick."""
 KNOWN = {
-    "curved: exponential glue lifted at its end": "a jump ends where bonds have kept other memories, with fewer kinks",
-    "curved: slip in space": "a jump ends on the next piece: its kink is not an event of its own",
-    "curved: slip in space remembers": "likewise",
-    "paths: teeth on a free block": "a jump ends at another stable equilibrium",
     "curved: glued plates, opening and slip": "two kinks without a way between, in unloading, are gone",
     "curved: energies that differ by mode": "a path that was lost at a fold jumps, and is followed to its end",
     "demos: run ball_on_block": "the estimate differs by 8e-4: gaps between vertices are seen by one rule",
