@@ -54,16 +54,12 @@ def landing(
         step: called before each step; it may end the jump by an exception.
     """
     kept, before, points = branch.points.kept(), branch.values.x, branch.points
-
-    def stays(z: Array) -> bool:
-        differs = _differs(points.values(z).x, before, points)
-        return differs and (points.straight or _leads_on(problem, branch, z, heading, step))
-
     for way in (_held_back, _moved, _pushed):
         with suppress(Refused, np.linalg.LinAlgError):
             found = way(problem, branch, held, step)
-            if found is not None and (found.z is None or stays(found.z)):
-                return found
+            if found is not None and (found.z is None or _differs(points.values(found.z).x, before, points)):
+                if points.straight or found.z is None or _leads_on(problem, branch, found.z, heading, step):
+                    return found
         points.restore(kept)
     return None
 
