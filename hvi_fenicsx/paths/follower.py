@@ -308,8 +308,7 @@ class Follower(LoadHistory):
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
         factor = self.factor
-        heading, held = (1 if aim > factor else -1), self._is_held(factor)
-        found = landing(self._problem, self._branch, heading, held=held, step=self._check)
+        found = landing(self._problem, self._branch, held=self._is_held(factor), step=self._check)
         if found is not None and found.z is not None:
             yield from self._goes_on(self._landed(found.z, factor, aim, found.inverse))
             return

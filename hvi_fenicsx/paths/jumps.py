@@ -41,15 +41,12 @@ class Landing:
     inverse: CellInverse | None = None
 
 
-def landing(
-    problem: CondensedProblem, branch: Branch, heading: int, *, held: bool, step: Callable[[], None]
-) -> Landing | None:
+def landing(problem: CondensedProblem, branch: Branch, *, held: bool, step: Callable[[], None]) -> Landing | None:
     """Where a jump leads; None where this was not found, with the points where they were.
 
     Args:
         problem: the problem.
         branch: it is at the state; after the jump its points are where they are then.
-        heading: 1 where larger factors are wanted, -1 where smaller ones are.
         held: whether there is an equilibrium at these loads whatever the bonds remember, so that no way leads off.
         step: called before each step; it may end the jump by an exception.
     """
@@ -58,8 +55,7 @@ def landing(
         with suppress(Refused, np.linalg.LinAlgError):
             found = way(problem, branch, held, step)
             if found is not None and (found.z is None or _differs(points.values(found.z).x, before, points)):
-                if points.straight or found.z is None or _leads_on(problem, branch, found.z, heading, step):
-                    return found
+                return found
         points.restore(kept)
     return None
 
@@ -67,18 +63,6 @@ def landing(
 def _differs(x: Array, before: Array, points: ContactPoints) -> bool:
     """Whether displacements are not those of the state itself."""
     return _largest(x - before) > points.thresholds.none * max(_largest(x), _largest(before))
-
-
-def _leads_on(problem: CondensedProblem, branch: Branch, z: Array, heading: int, step: Callable[[], None]) -> bool:
-    """Whether a way leads from a state to wanted loads."""
-    points, rate = branch.points, heading * problem.force_rate
-    kept, leads_on = points.kept(), False
-    onward = branch_from(points, problem.load(branch.factor), rate, z, 0.0)
-    with suppress(Refused, np.linalg.LinAlgError):
-        onward.set_out(1.0, step)
-        leads_on = onward.rising >= 0.0 and not np.any(points.unresisted(onward.values, rate).driven)
-    points.restore(kept)
-    return leads_on
 
 
 def _largest(values: Array) -> float:
@@ -126,8 +110,8 @@ def _moved(problem: CondensedProblem, branch: Branch, held: bool, step: Callable
 def _pushed(problem: CondensedProblem, branch: Branch, held: bool, step: Callable[[], None]) -> Landing | None:
     """The same under loads that are larger at first: where many bonds reach an end together, the body rests."""
     load, rate = problem.load(branch.factor), problem.force_rate
-    push = -(branch.trend or 1) * branch.points.thresholds.slow * _largest(load) / (_largest(rate) or 1.0)
-    found = _overdamped(problem, branch, branch.z, load + push * rate, held, step)
+    push = (branch.trend or 1) * branch.points.thresholds.slow * _largest(load) / (_largest(rate) or 1.0)
+    found = _overdamped(problem, branch, branch.z, load - push * rate, held, step)
     return found if found is None or found.z is None else _overdamped(problem, branch, found.z, load, held, step)
 
 
