@@ -130,6 +130,10 @@ class Branch(ABC):
     def motion(self) -> Array:
         """How fast the displacements change along the branch, (n,)."""
 
+    @abstractmethod
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        """Motions in which the energy may fall, (n,) each, and the point that leads it."""
+
     @property
     def values(self) -> Values:
         """Displacements and forces of all points."""
@@ -154,6 +158,14 @@ class Branch(ABC):
         Raises:
             Refused: there is no end of passing.
             numpy.linalg.LinAlgError: the factor stands along the branch.
+        """
+
+    def set_out_as(self, other: Branch, check: Callable[[], None]) -> None:  # noqa: B027
+        """Set out from the same state as another branch goes, and let the points pass that have to.
+
+        Args:
+            other: which one.
+            check: is called before each passage; it may raise an error to end them.
         """
 
     @abstractmethod

@@ -10,7 +10,7 @@ the energies say.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -215,6 +215,38 @@ class CurvedBranch(Events):
         """Unstable, or away from the factor: a bond that turns back makes the path stable, and turn."""
         return self.unstable > 0 or (aim - self.factor) * self.trend < 0.0
 
+    @override
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        drops, motion, groups = self.points.on_drops(), self.motion, self.points.unknowns()
+        if drops:
+            found = [self._after_drops(drops), motion]
+        else:
+            free = self.points.motions(self.here.values)
+            lowest = free.ways.T @ np.linalg.eigh(free.matrix)[1][:, 0] if len(free.slopes) else np.zeros_like(motion)
+            lowest *= np.sign(self._into_cell(lowest) or float(lowest @ motion)) or 1.0
+            found = [lowest, motion, -lowest]
+        for one in found:
+            for k in drops or [int(np.argmax([np.max(np.abs(one[group])) for group in groups]))]:
+                yield one, k
+
+    def _after_drops(self, drops: list[int]) -> Array:
+        """How a body moves when points on drops go on: these outwards, all others follow."""
+        found, directions, points = np.zeros_like(self.z), self.directions, self.points
+        for k in drops:
+            unit = np.sign(directions[k]) or 1.0
+            found[points.unknowns_of(k)] = unit * self._gradient(self.here.y, k)[points.unknowns_of(k)]
+        free = points.motions(self.here.values)
+        if len(free.slopes):
+            found -= free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (points.stiffness @ found))[0]
+        return found
+
+    def _into_cell(self, motion: Array) -> float:
+        """How far a motion takes points at ends of their segments into these: many may be there at once."""
+        s, points, values = self.here.values.s, self.points, self.here.values
+        allowed = points.allowances(values, self.directions, float(np.max(np.abs(self.here.tangent))))
+        low, high = (s <= points.low + allowed), (s >= points.high - allowed)
+        return float((values.moves > 0.0) * (low * 1.0 - high) @ points.along(values, motion))
+
     @property
     @override
     def motion(self) -> Array:
@@ -224,6 +256,14 @@ class CurvedBranch(Events):
     def beyond(self) -> Array:
         ways, _ = self._ends()
         return self.z + min(self.limits.near, float(np.min(ways, initial=np.inf))) * self.here.tangent[:-1]
+
+    @override
+    def set_out_as(self, other: Branch, check: Callable[[], None]) -> None:
+        assert isinstance(other, CurvedBranch)
+        along = other.here.tangent.copy()
+        along[-1] = 0.0
+        self.head(along)
+        Crossing(self, check).run()
 
     @override
     def balanced(self, factor: float) -> Array:

@@ -14,7 +14,7 @@ from .branch import Branch, Move, Passage, Refused, StepEnd, event_of
 from .curve import CurvedBranch
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
-from .jumps import landing
+from .jumps import Jump
 from .pivoting import StraightBranch
 from .relations import ContactPoints
 from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped, place_of
@@ -308,11 +308,12 @@ class Follower(LoadHistory):
     def _jump(self, aim: float) -> Iterator[PathState]:
         """On to the next stable equilibrium at the same factor, or off."""
         factor = self.factor
-        found = landing(self._problem, self._branch, held=self._is_held(factor), step=self._check)
-        if found is not None and found.z is not None:
-            yield from self._goes_on(self._landed(found.z, factor, aim, found.inverse))
+        heading, held = (1 if aim > factor else -1), self._is_held(factor)
+        landing = Jump(self._problem, self._branch, heading, held=held, step=self._check).landing()
+        if landing is not None and landing.z is not None:
+            yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
             return
-        if found is None:
+        if landing is None:
             self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
         else:
             self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")

@@ -15,7 +15,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array
 from .branch import Refused, StepEnd, advancing
 from .curve import branch_from
-from .jumps import OverdampedMotion
+from .motion import OverdampedMotion
 from .relations import ContactPoints
 from .segments import Segment, SegmentKind
 from .thresholds import FollowingThresholds

@@ -1,30 +1,27 @@
 """From a state that is not stable to the next stable equilibrium at the same loads.
 
-A body moves as an overdamped one, θ D x' = f - S x - r, by implicit steps in time, each followed from event to event
-like a path: what is left of the forces is applied little by little while a stiffness θ D holds back. A law that drops
-does so at once, and θ falls from step to step, so that the energy falls all the way until equilibrium is reached or a
-body is out of all reach. Bonds remember on the way.
-
-Where all graphs are straight, a force t c that holds back against the motion mostly leads there at once: the loads
-f(λ) + t c, t < 0, give a branch of equilibria that begins at the state with t = 0. The energy falls along it,
-dE = t cᵀdx, and where t is 0 again is an equilibrium of the loads alone. Where the branch goes on for ever with t < 0
-a body comes off.
+A force t c holds the body back, against the way in which it leaves, while it goes: the loads f(λ) + t c, t < 0, give a
+branch of equilibria that begins at the state with t = 0. The energy falls along it, dE = t cᵀdx, and where t is 0 again
+is an equilibrium of the loads alone. Where the branch goes on for ever with t < 0 a body comes off; with t = 0 it is in
+equilibrium wherever it goes. Where no such branch leads to an end soon, the body moves as an overdamped one
+(:mod:`.motion`). Bonds remember on the way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
-from ..reduced.condensed_stiffness import CellInverse, CondensedStiffness, DenseStiffness
+from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .branch import Branch, Refused, StepEnd, advancing
-from .curve import CurvedBranch, branch_from
+from .curve import branch_from
+from .motion import OverdampedMotion
 from .relations import ContactPoints
 
 
@@ -41,246 +38,148 @@ class Landing:
     inverse: CellInverse | None = None
 
 
-def landing(problem: CondensedProblem, branch: Branch, *, held: bool, step: Callable[[], None]) -> Landing | None:
-    """Where a jump leads; None where this was not found, with the points where they were.
+class Jump:
+    """A jump from a state.
 
     Args:
         problem: the problem.
         branch: it is at the state; after the jump its points are where they are then.
+        heading: 1 where larger factors are wanted, -1 where smaller ones are.
         held: whether there is an equilibrium at these loads whatever the bonds remember, so that no way leads off.
         step: called before each step; it may end the jump by an exception.
     """
-    kept, before, points = branch.points.kept(), branch.values.x, branch.points
-    for way in (_held_back, _moved, _pushed):
-        with suppress(Refused, np.linalg.LinAlgError):
-            found = way(problem, branch, held, step)
-            if found is not None and (found.z is None or _differs(points.values(found.z).x, before, points)):
+
+    def __init__(
+        self, problem: CondensedProblem, branch: Branch, heading: int, *, held: bool, step: Callable[[], None]
+    ) -> None:
+        self._problem, self._branch, self._points = problem, branch, branch.points
+        self._load, self._heading, self._held, self._step = problem.load(branch.factor), heading, held, step
+        self._z, self._values, self._directions = branch.z.copy(), branch.values, branch.directions.copy()
+
+    def landing(self) -> Landing | None:
+        """Where it leads; None where this was not found, with the points where they were."""
+        kept = self._points.kept()
+        for way in (self._held_back, self._released, self._pushed_off):
+            found = way()
+            if found is not None:
                 return found
-        points.restore(kept)
-    return None
-
-
-def _differs(x: Array, before: Array, points: ContactPoints) -> bool:
-    """Whether displacements are not those of the state itself."""
-    return _largest(x - before) > points.thresholds.none * max(_largest(x), _largest(before))
-
-
-def _largest(values: Array) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
-
-
-def _held_back(problem: CondensedProblem, branch: Branch, held: bool, step: Callable[[], None]) -> Landing | None:
-    """The end of the branch along which a force against the motion, even on all bonds, holds back."""
-    points, load = branch.points, problem.load(branch.factor)
-    restraint = points.unresisted(branch.values, _evened(points, branch.motion)).balanced
-    if not points.straight or not np.any(restraint):
+            self._points.restore(kept)
         return None
-    none = points.thresholds.none * max(_largest(load), _largest(branch.values.force)) / _largest(restraint)
-    motion, back = branch.motion.copy(), branch_from(points, load, restraint, branch.z, 0.0, branch.inverse(), -1)
-    if back.motion @ motion <= 0.0 or back.rising > points.thresholds.undecided:
+
+    def _held_back(self) -> Landing | None:
+        """The landing of the first restraint whose branch leads to an end soon."""
+        kept, ways = self._points.kept(), (False,) if self._points.straight else (False, True)
+        for (restraint, k), against in itertools.product(_restraints(self._branch), ways):
+            with suppress(Refused, np.linalg.LinAlgError):
+                found = self._restrained(restraint, k, against=against)
+                if found is not None:
+                    return found
+            self._points.restore(kept)
         return None
-    for move in advancing(back, 0.0, step, points.thresholds.waits * (2 + len(points))):
-        away = move.outcome is StepEnd.AWAY
-        if move.outcome is StepEnd.FACTOR or (away and abs(back.factor) <= none):
-            stable = points.unstable_directions(back.values) == 0
-            return Landing(z=back.z.copy(), inverse=back.inverse()) if stable else None
-        if away:
-            return Landing(z=None) if back.stands and back.factor < 0.0 and not held else None
-        if back.factor > none:
+
+    def _restrained(self, restraint: Array, k: int, *, against: bool) -> Landing | None:
+        """The landing of the branch along which a restraint grows at first; None where none is found.
+
+        It sets out as the path goes, or against the restraint.
+        """
+        points, inverse = self._points, self._branch.inverse()
+        restraint = points.unresisted(self._values, restraint).balanced * float(np.mean(points.forces))
+        branch = branch_from(points, self._load, restraint, self._z, 0.0, inverse, heading=-1)
+        if against:
+            branch.set_out(-1.0, self._step)
+        else:
+            branch.set_out_as(self._branch, self._step)
+        back = points.straight and branch.directions[k] * self._directions[k] <= 0.0
+        if back or branch.rising > self._points.thresholds.undecided:
             return None
-    return None
+        forces = self._load, self._values.force
+        largest = max(float(np.max(np.abs(force), initial=0.0)) for force in forces)
+        none = points.thresholds.none * largest / float(np.max(np.abs(restraint)))
+        return self._at_its_end(branch, none)
+
+    def _at_its_end(self, branch: Branch, none: float) -> Landing | None:
+        limits, standing, x = self._points.thresholds, 0, self._values.x
+        most = limits.waits * (2 + len(self._points) * self._points.straight)
+        for move in advancing(branch, 0.0, self._step, most):
+            stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
+            standing, x = standing + 1 if stands else 0, branch.values.x
+            anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
+            if move.outcome is StepEnd.FACTOR or anywhere:
+                stable = self._points.unstable_directions(branch.values) == 0
+                return self._landed(branch.z.copy(), branch.inverse()) if stable else None
+            if move.outcome is StepEnd.AWAY:
+                off = branch.stands and branch.factor < 0.0 and not self._held
+                return Landing(z=None) if off else None
+            if move.outcome is StepEnd.STUCK or branch.factor > none or standing > limits.waits + 4 * len(self._points):
+                return None
+        return None
+
+    def _landed(self, z: Array, inverse: CellInverse | None = None) -> Landing | None:
+        """The landing at a stable equilibrium; None where it is the state itself, or a curve leads back from there."""
+        x, before = self._points.values(z).x, self._values.x
+        size = max(float(np.max(np.abs(x), initial=0.0)), float(np.max(np.abs(before), initial=0.0)))
+        if float(np.max(np.abs(x - before), initial=0.0)) <= self._points.thresholds.none * size:
+            return None
+        return Landing(z=z, inverse=inverse) if self._points.straight or self._leads_on(z) else None
+
+    def _leads_on(self, z: Array) -> bool:
+        """Whether a way leads from a state to wanted loads."""
+        kept, rate, leads_on = self._points.kept(), self._heading * self._problem.force_rate, False
+        onward = branch_from(self._points, self._load, rate, z, 0.0)
+        with suppress(Refused, np.linalg.LinAlgError):
+            onward.set_out(1.0, self._step)
+            leads_on = onward.rising >= 0.0 and not np.any(self._points.unresisted(onward.values, rate).driven)
+        self._points.restore(kept)
+        return leads_on
+
+    def _released(self) -> Landing | None:
+        """The landing of an overdamped motion, from a little farther along the path: there smaller loads are borne."""
+        return self._come_to_rest(self._z if self._points.on_drops() else self._branch.beyond())
+
+    def _come_to_rest(self, z: Array) -> Landing | None:
+        found = self._relaxed(z, self._load)
+        return found if found is None or found.z is None else self._landed(found.z)
+
+    def _relaxed(self, z: Array, load: Array) -> Landing | None:
+        relaxation = OverdampedMotion(self._problem, self._points, z, load, held=self._held, step=self._step)
+        if not relaxation.run(self._directions):
+            return None
+        return Landing(z=None if relaxation.escapes else relaxation.z)
+
+    def _pushed_off(self) -> Landing | None:
+        """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
+        rate = self._problem.force_rate
+        push = self._points.thresholds.slow * self._heading
+        push = push * np.max(np.abs(self._load)) / np.max(np.abs(rate), initial=1e-300)
+        found = self._relaxed(self._z.copy(), self._load + push * rate)
+        return found if found is None or found.z is None else self._come_to_rest(found.z)
 
 
-def _evened(points: ContactPoints, motion: Array) -> Array:
-    """Forces in the direction of a motion, of the size of each point's area; of the size 1 at most."""
+def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:
+    """Forces against the ways in which a body may leave, of size 1, and the point that leads.
+
+    They are even on all bonds that move, as the motion is, and on one point alone.
+    """
+    points, seen = branch.points, list[Array]()
+    for motion, k in branch.leaving():
+        size = float(np.max(np.abs(motion), initial=0.0))
+        if size == 0.0:
+            continue
+        alone, group = np.zeros_like(motion), points.unknowns_of(k)
+        alone[group] = motion[group]
+        for force in (_evened(points, motion, size), motion, alone):
+            found = np.asarray(force / (np.max(np.abs(force)) or 1.0))
+            known = any(np.allclose(found, other, rtol=0.0, atol=points.thresholds.slow) for other in seen)
+            if np.any(found) and not known:
+                seen.append(found)
+                yield found, k
+
+
+def _evened(points: ContactPoints, motion: Array, size: float) -> Array:
+    """Forces in the direction of a motion, of the size of each point's area."""
     found = np.zeros_like(motion)
     for laws, unknowns in zip(points.laws, points.unknowns(), strict=True):
         own = float(np.linalg.norm(motion[unknowns]))
-        if laws and own > points.thresholds.slow * _largest(motion):
+        if laws and own > points.thresholds.slow * size:
             found[unknowns] = sum(law.weight for law in laws) * motion[unknowns] / own
-    return found / (_largest(found) or 1.0)
-
-
-def _moved(problem: CondensedProblem, branch: Branch, held: bool, step: Callable[[], None]) -> Landing | None:
-    """The end of an overdamped motion, from a little farther along the path: there smaller loads are borne."""
-    z = branch.z if branch.points.on_drops() else branch.beyond()
-    return _overdamped(problem, branch, z, problem.load(branch.factor), held, step)
-
-
-def _pushed(problem: CondensedProblem, branch: Branch, held: bool, step: Callable[[], None]) -> Landing | None:
-    """The same under loads that are larger at first: where many bonds reach an end together, the body rests."""
-    load, rate = problem.load(branch.factor), problem.force_rate
-    push = (branch.trend or 1) * branch.points.thresholds.slow * _largest(load) / (_largest(rate) or 1.0)
-    found = _overdamped(problem, branch, branch.z, load - push * rate, held, step)
-    return found if found is None or found.z is None else _overdamped(problem, branch, found.z, load, held, step)
-
-
-def _overdamped(
-    problem: CondensedProblem, branch: Branch, z: Array, load: Array, held: bool, step: Callable[[], None]
-) -> Landing | None:
-    motion = OverdampedMotion(problem, branch.points, z, load, held=held, step=step)
-    if not motion.run(branch.directions):
-        return None
-    return Landing(z=None if motion.escapes else motion.z)
-
-
-class _Went(Enum):
-    """How a step in time went, and by what θ changes after it."""
-
-    WELL = 0.4
-    PARTLY = 8.0
-    """Up to where what holds back is too little for the rest; the energy has fallen as far as that."""
-    NOWHERE = 64.0
-
-
-class OverdampedMotion:
-    """The motion at constant loads.
-
-    Args:
-        problem: the problem.
-        points: where they are; changed.
-        z: their coordinates, (n,).
-        load: f, (n,).
-        held: whether no way leads off at these loads, however far the body goes.
-        step: called before each step; it may end the motion by an exception.
-
-    Attributes:
-        z: the coordinates now, (n,).
-        escapes: whether a body is out of reach.
-        theta: what holds back in the next step, in units of the damping.
-    """
-
-    def __init__(
-        self,
-        problem: CondensedProblem,
-        points: ContactPoints,
-        z: Array,
-        load: Array,
-        *,
-        held: bool,
-        step: Callable[[], None],
-    ) -> None:
-        self._problem, self._points, self._load, self._step = problem, points, load, step
-        self._limits = points.thresholds
-        self.z, self.escapes, self.theta = z.copy(), False, 1.0
-        self._infinite = np.inf if held else self._limits.far * (points.scale + self._extent())
-
-    def run(self, directions: Array) -> bool:
-        """Move to equilibrium; whether one was found, or the body escapes.
-
-        Args:
-            directions: in which points that are on a drop go on, (m,).
-        """
-        elastic = self._points.elastic
-        try:
-            self._leave_drops(directions)
-            return self._moved()
-        except (Refused, np.linalg.LinAlgError):
-            return False
-        finally:
-            self._points.elastic = elastic
-
-    def _moved(self) -> bool:
-        for _ in range(self._limits.waits**2 * (1 + len(self._points))):
-            if self._at_rest() and self._settled():
-                return True
-            if self._is_out_of_reach():
-                self.escapes = True
-                return True
-            self.theta *= self._stepped_or_back().value
-            if self.theta > 1e12:
-                return False
-        return False
-
-    def _is_out_of_reach(self) -> bool:
-        return self._extent() > self._infinite
-
-    def _extent(self) -> float:
-        return float(np.max(np.abs(self._points.values(self.z).lengths), initial=0.0))
-
-    def _left(self) -> Array:
-        """What is left of the forces, (n,)."""
-        values = self._points.values(self.z)
-        return np.asarray(self._load - self._problem.elastic @ values.x - values.force)
-
-    def _at_rest(self) -> bool:
-        """Whether hardly any force is left, and the body would not leave by itself what is left of it."""
-        values = self._points.values(self.z)
-        acting = (self._load, self._problem.elastic @ values.x, values.force)
-        size = max(float(np.max(np.abs(force), initial=0.0)) for force in acting)
-        rests = bool(np.max(np.abs(self._left()), initial=0.0) <= 1e-9 * size)
-        self._points.elastic = self._problem.elastic  # without what holds back
-        return rests and self._points.unstable_directions(values) == 0
-
-    def _settled(self) -> bool:
-        """The equilibrium itself, from where the motion is slow; whether it is stable, and on the points' segments."""
-        self._points.elastic = self._problem.elastic
-        try:
-            z = branch_from(self._points, self._load, np.zeros_like(self._load), self.z, 0.0).balanced(0.0)
-        except (Refused, np.linalg.LinAlgError):
-            return False
-        values, low, high = self._points.values(z), self._points.low, self._points.high
-        allowed = self._points.thresholds.reached * (1.0 + np.abs(values.s))
-        beyond = np.maximum(low - values.s, values.s - high) > allowed
-        if np.any(beyond) or self._points.unstable_directions(values):
-            return False
-        self.z = z
-        return True
-
-    def _stepped_or_back(self) -> _Went:
-        """One step in time; where it led nowhere, nothing has changed."""
-        kept, z, went = self._points.kept(), self.z, _Went.NOWHERE
-        with suppress(Refused, np.linalg.LinAlgError):
-            went = self._stepped()
-        if went is _Went.NOWHERE:
-            self._points.restore(kept)
-            self.z = z
-        return went
-
-    def _stepped(self) -> _Went:
-        """One step in time, up to the first drop, or to where the body is out of reach."""
-        points, left, values = self._points, self._left(), self._points.values(self.z)
-        points.elastic = self._held_back()
-        if points.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
-            return _Went.NOWHERE
-        branch = branch_from(points, points.elastic @ values.x + values.force, left, self.z, 0.0)
-        branch.set_out(1.0, self._step)
-        if isinstance(branch, CurvedBranch):
-            branch.shortest = self._limits.small
-        went = self._followed(branch)
-        self.z = branch.z.copy()
-        if points.on_drops():
-            self._leave_drops(branch.directions)
-            return _Went.WELL
-        return went
-
-    def _held_back(self) -> CondensedStiffness:
-        """The stiffness with what holds back."""
-        points, elastic = self._points, self._problem.elastic
-        if points.straight:
-            return elastic.raised(self.theta * points.stiffest)
-        return DenseStiffness(elastic.array + self.theta * np.diag(points.forces / points.length))
-
-    def _followed(self, branch: Branch) -> _Went:
-        """Along the branch of one step, until all that was left of the forces is applied or a law drops."""
-        points = self._points
-        for _ in range(self._limits.waits * (2 + len(points))):
-            if branch.rising < 0.0 or points.on_drops():
-                break
-            self._step()
-            move = branch.advance(1.0)
-            self.z = branch.z.copy()
-            if move.outcome is StepEnd.FACTOR or self._is_out_of_reach():
-                return _Went.WELL
-            if move.outcome is StepEnd.AWAY:
-                return _Went.NOWHERE
-            if move.outcome is StepEnd.STUCK:
-                break
-            if move.outcome in (StepEnd.END, StepEnd.TURNED):
-                branch.pass_on(move, self._step)
-        return _Went.PARTLY if branch.factor > 0.0 else _Went.NOWHERE
-
-    def _leave_drops(self, directions: Array) -> None:
-        """Let the laws that drop do so."""
-        for k in self._points.on_drops():
-            self._points.leave(self.z, k, forward=bool(directions[k] >= 0.0))
+    return found

@@ -12,7 +12,7 @@ random: each coordinate then has a part of the order ε as well, which says who 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from typing_extensions import override
@@ -67,6 +67,7 @@ class StraightBranch(Branch):
         self.points, self.state = points, StraightState(points, z)
         self._constant, self.rate, self._factor = constant, rate, factor
         self.heading, self.trend, self.unstable, self._driven = heading, 0, 0, 0.0
+        self._leader = 0
         self._stiffest, self._live = _largest(self._stiffness.diagonal), _largest(rate)
         self._perturb()
         self.state.hold(rate)
@@ -107,6 +108,18 @@ class StraightBranch(Branch):
     @override
     def directions(self) -> Array:
         return self.rates
+
+    @override
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        k, inverse = self._leader, self.inverse() or self.state.inverse()
+        rise, own = float(self.points.rise[k]), np.eye(1, len(self.z), self._leader)[0]
+        if not rise:
+            found = self.state.softest(inverse, own)
+            yield found * (np.sign(found[k] * self.rates[k]) or 1.0), k
+            return
+        way = np.sign(self.rates[k]) * (rise if rise > 0.0 else 1.0)  # on a drop: it goes on, and all others follow
+        pull = np.where(self.points.moving, -way * self.points.elastic.column(k), 0.0)
+        yield np.where(self.points.moving, inverse.solve(pull), way * own), k
 
     @property
     @override
@@ -281,6 +294,8 @@ class StraightBranch(Branch):
         change = _change(before, after) if trend * self.trend < 0 else 0
         neutral = stood or self.stands or self.state.held is not held
         self.unstable = self.points.unstable_directions(self.values) if neutral else self.unstable + change
+        if change > 0 or neutral:
+            self._leader = i
         return [Passage(point=i, before=before, after=after)]
 
     def _turn_back(self, i: int, *, forward: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellColumns, CellInverse
@@ -102,6 +103,34 @@ class StraightState:
         moving = self.points.moving
         found = self._stiffness @ np.where(moving, coordinates, 0.0)
         return np.asarray(found + np.where(moving, self.tangent, self.points.rise) * coordinates)
+
+    def softest(self, inverse: CellInverse, start: Array) -> Array:
+        """The eigenvector of the negative eigenvalue next to zero, or of the greatest one; zero where points stand.
+
+        By Lanczos' method on the inverse.
+
+        Args:
+            inverse: of the equations.
+            start: where the iteration begins, (n,).
+        """
+        found, free = np.zeros(len(self)), np.flatnonzero(self.points.moving)
+
+        def response(v: Array) -> Array:
+            spread = np.zeros(len(self))
+            spread[free] = v.ravel()
+            return inverse.solve(spread)[free]
+
+        begin = response(start[free])
+        found[free] = begin if np.any(begin) else 1.0
+        if free.size < 2 or not np.any(begin):
+            return found
+        operator = LinearOperator((free.size, free.size), matvec=response, dtype=np.float64)
+        try:
+            accuracy = self.points.thresholds.none
+            found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=accuracy)[1][:, 0]
+        except ArpackNoConvergence:
+            pass
+        return found
 
 
 def coordinates_at(problem: CondensedProblem, points: ContactPoints, state: PathState) -> Array:
