@@ -92,7 +92,7 @@ def unknown(kind: str, name: Any, allowed: Iterable[str]) -> str:
     return f"unknown {kind} {shown(name)}; {hint}allowed: {', '.join(known) or 'none'}"
 
 
-def _message(error: ErrorDetails, table: type[Keyed]) -> str:
+def _message(error: ErrorDetails, table: type[Table]) -> str:
     """What is allowed and what is there, without pydantic's own terms."""
     kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
     if kind == "missing":
@@ -172,7 +172,7 @@ def validation_error(mistakes: Iterable[Mistake]) -> ValidationError:
     return ValidationError.from_exception_data("scene", details)
 
 
-def mistakes_of(error: ValidationError, table: type[Keyed]) -> list[Mistake]:
+def mistakes_of(error: ValidationError, table: type[Table]) -> list[Mistake]:
     """What pydantic found, in plain words.
 
     Args:
@@ -187,16 +187,7 @@ def mistakes_of(error: ValidationError, table: type[Keyed]) -> list[Mistake]:
     return [Mistake(tuple(e["loc"]), _message(e, table)) for e in found]
 
 
-class Keyed(BaseModel):
-    """What has keys of its own, for messages."""
-
-    @classmethod
-    def allowed_keys(cls) -> list[str]:
-        """All keys that it may have."""
-        return list(cls.model_fields)
-
-
-class Table(Keyed):
+class Table(BaseModel):
     """A table of the scene file: frozen, no unknown keys, no silent conversions."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
@@ -214,6 +205,11 @@ class Table(Keyed):
         values = [value for _, value in self]
         inner = (file for table in values if isinstance(table, Table) for file in table.files())
         return (*(value for value in values if isinstance(value, Path)), *inner)
+
+    @classmethod
+    def allowed_keys(cls) -> list[str]:
+        """All keys that it may have."""
+        return list(cls.model_fields)
 
     @classmethod
     def made(cls, keys: Mapping[str, Any]) -> Self:

@@ -11,9 +11,12 @@ from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, ValidationError, create_model
 
+from ..class_registry import hint
 from ..errors import InputError
-from ..schema import Keyed, located_error, mistakes_of, plain, unknown, validation_error
 from .base import Superpotential, registered
+
+_STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
+
 
 _FOLLOWS_PRESSURE = ("coulomb", "amontons", "mohr_coulomb")
 """Names of friction laws in which the friction follows the contact pressure."""
@@ -44,31 +47,10 @@ def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
             "the traction μ p"
         )
     if law is None:
-        raise InputError(unknown("law", name, available()))
-    table = _table(law)
-    try:
-        # As JSON, strict means what a scene file means by it: a list is a tuple, an integer is a float.
-        checked = table.model_validate_json(json.dumps(plain(dict(parameters)), default=repr))
-    except ValidationError as error:
-        found = validation_error(mistakes_of(error, table))
-        raise InputError(f"law {name!r}: {located_error(found)}") from found
-    return law(**{key: getattr(checked, key) for key in checked.model_fields_set})
-
-
-class _Parameters(Keyed):
-    """The parameters of a law."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
-
-
-def _table(law: type[Superpotential]) -> type[_Parameters]:
-    """The table of the parameters, in the types that the law's constructor declares."""
-    hints = get_type_hints(law.__init__)
-    fields: dict[str, Any] = {
-        key: (hints.get(key, Any), ... if p.default is p.empty else p.default)
-        for key, p in inspect.signature(law).parameters.items()
-    }
-    return create_model(law.__name__, __base__=_Parameters, **fields)
+        raise InputError(f"unknown law {name!r}{hint(name, available())}; available: {', '.join(available())}")
+    allowed = inspect.signature(law).parameters
+    _check_keys(name, parameters, allowed)
+    return law(**_checked(law, parameters, allowed))
 
 
 def describe(law: Superpotential) -> dict[str, Any]:
@@ -79,6 +61,45 @@ def describe(law: Superpotential) -> dict[str, Any]:
 
 def _listed(value: Any) -> Any:
     return [_listed(entry) for entry in value] if isinstance(value, list | tuple) else value
+
+
+def _check_keys(name: str, given: Mapping[str, Any], allowed: Mapping[str, inspect.Parameter]) -> None:
+    listing = f"law {name!r} takes {', '.join(allowed) or 'no parameters'}"
+    for key in given:
+        if key not in allowed:
+            raise InputError(f"law {name!r}: unknown parameter {key!r}{hint(key, allowed)}; {listing}")
+    missing = [key for key, p in allowed.items() if p.default is p.empty and key not in given]
+    if missing:
+        raise InputError(f"law {name!r}: {', '.join(missing)} missing; {listing}")
+
+
+def _checked(
+    law: type[Superpotential], given: Mapping[str, Any], allowed: Mapping[str, inspect.Parameter]
+) -> dict[str, Any]:
+    """The given values in the types that the law's constructor declares."""
+    hints = get_type_hints(law.__init__)
+    fields: dict[str, Any] = {key: (hints.get(key, Any), ...) for key in allowed if key in given}
+    model = create_model(law.__name__, __config__=_STRICT, **fields)
+    try:
+        # As JSON, strict means what a scene file means by it: a list is a tuple, an integer is a float.
+        checked = model.model_validate_json(json.dumps(dict(given), default=_plain))
+    except ValidationError as error:
+        raise InputError(_message(law.name, error)) from error
+    return {key: getattr(checked, key) for key in fields}
+
+
+def _plain(value: Any) -> Any:
+    """Numpy's numbers and arrays, and tomlkit's wrappers, as plain data."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise InputError(f"{value!r} is not plain data; give numbers, booleans, strings or lists of them")
+
+
+def _message(name: str, error: ValidationError) -> str:
+    """One line for the first thing that is wrong."""
+    first = error.errors()[0]
+    where = "".join(f"[{part}]" if isinstance(part, int) else str(part) for part in first["loc"])
+    return f"law {name!r}: {where} = {first['input']!r} is not usable: {first['msg']}"
 
 
 def require_number(owner: str, **parameters: Any) -> None:
