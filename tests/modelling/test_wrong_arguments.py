@@ -67,7 +67,7 @@ def solved(body: hvi.Body, traction: Any) -> hvi.Solution:
             lambda: hvi.Isotropic(youngs_modulus=1e9, poisson_ratio=0.3, model="three_dimensional"),
             "is not for 2D; use plane",
         ),
-        (lambda: hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: must be a table, like"),  # type: ignore[arg-type]
+        (lambda: hvi.Contact("bottom", obstacle=3), "^Contact on bottom: obstacle: must be a table with a shape"),  # type: ignore[arg-type]
         (lambda: hvi.Friction("bottom", "graph"), "^Friction on bottom: law .graph.: points missing"),  # type: ignore[arg-type]
     ],
 )
