@@ -23,7 +23,7 @@ from ..problem.problem import Problem
 from ..typing import Array, Entities, Mask
 from . import bubbles
 from .bubbles import DEFAULT, BlockForces, gathered, summed
-from .traces import InterfacePoints, PartPoints, Trace
+from .traces import InterfacePoints, PartPoints, Trace, frames
 
 
 def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
@@ -255,6 +255,8 @@ class LawTraces:
         for law in state.laws:
             force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
+        if (interface := self.problem.interface_of(state.surface)) is not None and interface.curved:
+            axes = frames(state.surface)
         points = self.part(state.surface, axes)
         return points.tested(points.interpolated(np.einsum("mkd,md->mk", axes, force), along=True))[0]
 

@@ -16,7 +16,7 @@ from dolfinx import fem, la
 from mpi4py import MPI
 
 from ..mesh import facets, nodes
-from ..problem import dual_basis, spaces
+from ..problem import curved_overlaps, dual_basis, spaces
 from ..problem.contact_surface import Surface
 from ..problem.facets import Facets
 from ..problem.interfaces import Interface
@@ -66,7 +66,7 @@ class PartPoints:
         weights: as of :class:`.InterfacePoints`; so are all further ones.
     """
 
-    reference = 0
+    normals, reference = None, 0
 
     def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, degree: int) -> None:
         self._field, self._surface, d = fem.Function(problem.space), surface, problem.scales.dimension
@@ -131,7 +131,22 @@ class Trace:
         self._surface, self._directions, self.weights = surface, directions, points.weights
         own = points.of_nodes(directions)
         self._rotations = rotations(own, points.reference)
-        self._vectors = self._on_facets(points.functions, turned(self._rotations, own))
+        self._vectors = self._turned(turned(self._rotations, own))
+
+    def _turned(self, own: Array) -> Array:
+        """Directions of nodes (facets, n, k, d) at the points, (f, q, k, d). Collective.
+
+        On curved facets of interfaces they turn as the facets do: they are interpolated as those of one node, turned
+        with the normals.
+        """
+        facets, normals = self._points.facets, self._points.normals
+        if normals is None:
+            return self._on_facets(self._points.functions, own)
+        at_nodes = self._points.of_nodes(self._surface.normals)
+        one = at_nodes[np.arange(len(own)), self._points.reference]
+        alike = own @ rotations_between(np.broadcast_to(one[:, None], at_nodes.shape), at_nodes)
+        back = rotations_between(normals, np.broadcast_to(one[facets, None], normals.shape))
+        return np.asarray(self._on_facets(self._points.functions, alike) @ back)
 
     def interpolated(self, values: Array, by: Basis = "functions", *, along: bool = False) -> Array:
         """Values at the owned nodes (m, k), interpolated at the points, (f, q, k). Collective.
@@ -239,6 +254,27 @@ def turned_back(rotations: Array, values: Array) -> Array:
         values: the components along the directions of one node of each facet, (f, n, k).
     """
     return np.asarray(np.einsum("fnkl,fnl->fnk", rotations, values))
+
+
+def frames(surface: Surface) -> Array:
+    """Normal and tangents of the nodes of a part, (m, d, d).
+
+    Args:
+        surface: the part.
+    """
+    return np.concatenate([surface.normals[:, None], surface.tangents], axis=1)
+
+
+def rotations_between(one: Array, other: Array) -> Array:
+    """The rotations that take unit vectors to others the shortest way, (..., d, d); these must not be opposite.
+
+    Args:
+        one: unit vectors, (..., d).
+        other: unit vectors, (..., d).
+    """
+    both, cosine = one + other, np.sum(one * other, axis=-1)[..., None, None]
+    bent = both[..., :, None] * both[..., None, :] / (1.0 + cosine)
+    return np.asarray(np.eye(one.shape[-1]) - bent + 2.0 * other[..., :, None] * one[..., None, :])
 
 
 @dataclass(frozen=True)
@@ -397,6 +433,7 @@ class InterfacePoints:
         functions: the basis functions of the first side's nodes at the points, (f, q, n).
         hats: the functions that are linear from node to node, (f, q, n).
         at_ends: the basis functions at the corners of the intersections, (f, d, n).
+        normals: of the first side at the points where facets are curved, else None, (f, q, d).
         sides: the bubbles of both sides.
         reference: a node of each facet's carriers, (facets,).
     """
@@ -411,6 +448,8 @@ class InterfacePoints:
         self.facets = overlaps.first[own]
         places = [on.reshape(*self.weights.shape, d) for on in (points.on_first, points.on_second)]
         first = interface.first
+        normals = curved_overlaps.normals(first, points) if interface.curved else None
+        self.normals = None if normals is None else normals.reshape(*self.weights.shape, d)
         self.functions, self.at_ends = first.functions(places[0]), first.functions(overlaps.on_first[own])
         self.hats = nodes.hats(first.degree, places[0].reshape(-1, d)).reshape(self.functions.shape)
         self.sides = (
