@@ -255,7 +255,7 @@ class LawTraces:
         for law in state.laws:
             force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
-        if (interface := self.problem.interface_of(state.surface)) is not None and interface.curved:
+        if (interface := self.problem.interface_of(state.surface)) is not None and interface.first.curved:
             axes = frames(state.surface)
         points = self.part(state.surface, axes)
         return points.tested(points.interpolated(np.einsum("mkd,md->mk", axes, force), along=True))[0]

@@ -16,7 +16,7 @@ from dolfinx import fem, la
 from mpi4py import MPI
 
 from ..mesh import facets, nodes
-from ..problem import curved_overlaps, dual_basis, spaces
+from ..problem import dual_basis, spaces
 from ..problem.contact_surface import Surface
 from ..problem.facets import Facets
 from ..problem.interfaces import Interface
@@ -448,7 +448,7 @@ class InterfacePoints:
         self.facets = overlaps.first[own]
         places = [on.reshape(*self.weights.shape, d) for on in (points.on_first, points.on_second)]
         first = interface.first
-        normals = curved_overlaps.normals(first, points) if interface.curved else None
+        normals = first.normals_at(points.first, points.on_first) if interface.first.curved else None
         self.normals = None if normals is None else normals.reshape(*self.weights.shape, d)
         self.functions, self.at_ends = first.functions(places[0]), first.functions(overlaps.on_first[own])
         self.hats = nodes.hats(first.degree, places[0].reshape(-1, d)).reshape(self.functions.shape)
