@@ -36,7 +36,7 @@ def chosen() -> list[object]:
             name = f"{group}: {case.name}"
             known_marks = [pytest.mark.xfail(reason=KNOWN[name])] if name in KNOWN else []
             if case.name in FAST.get(group, ()):
-                found.append(pytest.param(case, id=name))
+                found.append(pytest.param(case, id=name, marks=known_marks))
             elif (
                 case.name in known
                 and group not in LEFT_TO_OTHERS
