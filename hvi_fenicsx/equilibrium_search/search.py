@@ -183,7 +183,7 @@ def _all(task: Task) -> Found:
         search.enter(x)
     if task.saved is not None:
         boxes: Array = np.stack([task.saved["low"], task.saved["high"]], axis=1)
-        search.waiting = [Box.around(low=box[0], high=box[1], x=0.5 * (box[0] + box[1])) for box in boxes[:]]
+        search.waiting = [Box.around(low=box[0], high=box[1], x=0.5 * (box[0] + box[1])) for box in boxes]
     else:
         search.start()
         if (
