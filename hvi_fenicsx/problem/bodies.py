@@ -40,8 +40,7 @@ class MeshBodies:
 
     def single(self) -> tuple[RigidBody, ...]:
         """All bodies, one by one."""
-        each = (body.bodies if isinstance(body, JoinedBodies) else (body,) for body in self.bodies)
-        return tuple(one for several in each for one in several)
+        return tuple(one for body in self.bodies for one in body.bodies)
 
     def number_at(self, blocks: npt.NDArray[np.integer]) -> Integers:
         """The numbers of the single bodies of some vertices, (m,).
@@ -49,7 +48,7 @@ class MeshBodies:
         Args:
             blocks: local vertices, (m,).
         """
-        counts = [len(body.bodies) if isinstance(body, JoinedBodies) else 1 for body in self.bodies]
+        counts = [len(body.bodies) for body in self.bodies]
         return np.cumsum([0, *counts])[self.labels[blocks]] + self.members[blocks]
 
     def fields(self, points: Array, blocks: npt.NDArray[np.integer], body: AnyBody) -> Array:

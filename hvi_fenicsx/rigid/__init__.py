@@ -5,17 +5,14 @@ from .least_energy import OneSidedSupports, RestingPosition, least_energy
 from .limit_analysis import analyse, gives_way, load_factors
 from .motions import (
     AnyBody,
-    FixedDirections,
     JoinedBodies,
     Mode,
-    MotionFields,
-    Movable,
     RigidBody,
-    fields_at,
     kernel,
     modes,
     null_space,
     rigid_fields,
+    works,
 )
-from .reduction import ContactCone, Resistance, RigidProblem, pressed, without_obstacles
+from .reduction import Resistance, RigidProblem, pressed, without_obstacles
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, combine, combine_factors, undecided

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -72,6 +71,11 @@ class RigidBody:
         """Number of translations among them; they come first."""
         return self.dimension
 
+    @property
+    def bodies(self) -> tuple[RigidBody, ...]:
+        """This one alone."""
+        return (self,)
+
     def describe(self, coefficients: Array, *, signed: bool) -> str:
         """A motion in words, and whose it is.
 
@@ -85,15 +89,17 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class JoinedBodies:
-    """Bodies that meet in interfaces, as far as their rigid motions need it; nondimensional.
+    """Bodies that meet in interfaces, and obstacles that slide along given directions; nondimensional.
 
     Attributes:
-        bodies: at least two; the index of each is its number here.
+        bodies: the index of each is its number here.
         index: the number of the whole among all that do not meet.
+        obstacles: their names; the way of each is a translation, after those of the bodies.
     """
 
     bodies: tuple[RigidBody, ...]
     index: int = 0
+    obstacles: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -101,19 +107,14 @@ class JoinedBodies:
         return self.bodies[0].dimension
 
     @property
-    def name(self) -> str:
-        """All names."""
-        return " and ".join(body.name for body in self.bodies)
-
-    @property
     def motions(self) -> int:
         """Number of rigid motions."""
-        return sum(body.motions for body in self.bodies)
+        return sum(body.motions for body in self.bodies) + len(self.obstacles)
 
     @property
     def shifts(self) -> int:
         """Number of translations among them; they come first."""
-        return sum(body.shifts for body in self.bodies)
+        return sum(body.shifts for body in self.bodies) + len(self.obstacles)
 
     def own(self, number: int) -> Integers:
         """Which of the motions are those of one body, (3|6,).
@@ -126,69 +127,31 @@ class JoinedBodies:
         return np.r_[number * shifts : (number + 1) * shifts, first : first + spins]
 
     def describe(self, coefficients: Array, *, signed: bool) -> str:
-        """A motion in words: what the bodies do that move, those together that do the same.
+        """A motion in words: what the bodies do that move, those together that do the same, and which obstacles move.
 
         Args:
             coefficients: on the basis of this module.
             signed: whether the name has the sense too.
         """
         found: dict[str, list[str]] = {}
+        size = np.abs(coefficients) / np.abs(coefficients).max()
         for number, body in enumerate(self.bodies):
-            own = np.asarray(coefficients)[self.own(number)]
-            if np.abs(own).max() > NEGLIGIBLE * np.abs(coefficients).max():
-                motion = describe(own, body.centre, body.length, signed=signed)
+            own = self.own(number)
+            if size[own].max() > NEGLIGIBLE:
+                motion = describe(coefficients[own], body.centre, body.length, signed=signed)
                 found.setdefault(motion, []).append(body.name)
-        return ", ".join(f"{motion} of {' and '.join(names)}" for motion, names in found.items())
+        moved = ", ".join(
+            motion + (f" of {' and '.join(names)}" if any(names) else "") for motion, names in found.items()
+        )
+        ways = size[self.shifts - len(self.obstacles) : self.shifts]
+        who = " and ".join(name for name, way in zip(self.obstacles, ways, strict=True) if way > NEGLIGIBLE)
+        if not who:
+            return moved
+        return f"{moved}, together with the obstacle of {who}" if moved else f"the obstacle of {who} alone"
 
 
 AnyBody = RigidBody | JoinedBodies
 """What moves."""
-
-
-class Movable(Protocol):
-    """What has rigid motions: a body, bodies that meet, and what else moves with them."""
-
-    @property
-    def dimension(self) -> int:
-        """2 or 3."""
-
-    @property
-    def index(self) -> int:
-        """Its number."""
-
-    @property
-    def motions(self) -> int:
-        """Number of rigid motions."""
-
-    @property
-    def shifts(self) -> int:
-        """Number of translations among them; they come first."""
-
-    def describe(self, coefficients: Array, *, signed: bool) -> str:
-        """A motion in words.
-
-        Args:
-            coefficients: on the basis, (motions,).
-            signed: whether the name has the sense too.
-        """
-
-
-@dataclass(frozen=True)
-class MotionFields:
-    """What the basis motions are at some vertices: the displacement, on an interface the relative one.
-
-    Attributes:
-        values: (m, motions, d).
-    """
-
-    values: Array
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-
-Places = Array | MotionFields
-"""Points (m, 3) of one body, nondimensional, or the motions there."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +169,7 @@ class Mode:
     body: int = 0
 
 
-def mode_of(coefficients: Array, body: Movable, *, signed: bool) -> Mode:
+def mode_of(coefficients: Array, body: AnyBody, *, signed: bool) -> Mode:
     """The motion with the given coefficients, with its name.
 
     Args:
@@ -215,20 +178,6 @@ def mode_of(coefficients: Array, body: Movable, *, signed: bool) -> Mode:
         signed: whether the name has the sense too.
     """
     return Mode(body.describe(coefficients, signed=signed), tuple(float(c) for c in coefficients), body.index)
-
-
-def fields_at(places: Places, body: Movable) -> Array:
-    """The basis motions, (m, motions, d). Local to the rank.
-
-    Args:
-        places: points of the body, or the motions there.
-        body: what moves.
-    """
-    if isinstance(places, MotionFields):
-        return places.values
-    if not isinstance(body, RigidBody):
-        raise ValueError("points do not say which of several bodies they belong to; give MotionFields")
-    return rigid_fields(places, body)
 
 
 def rigid_fields(points: Array, body: RigidBody) -> Array:
@@ -250,20 +199,17 @@ def rigid_fields(points: Array, body: RigidBody) -> Array:
     return fields
 
 
-@dataclass(frozen=True)
-class FixedDirections:
-    """Conditions direction·y(x) = 0; each rank gives its own rows.
+def works(directions: Array, fields: Array) -> Array:
+    """The work of a direction at each of some places in the basis motions, (m, motions).
 
-    Attributes:
-        points: x, (k, 3), or the motions there.
-        directions: (k, d).
+    Args:
+        directions: (m, d).
+        fields: the basis motions there, (m, motions, d).
     """
-
-    points: Places
-    directions: Array
+    return np.einsum("md,mnd->mn", directions, fields)
 
 
-def kernel(comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections]) -> Array:
+def kernel(comm: MPI.Comm, body: AnyBody, fixed: Sequence[Array]) -> Array:
     """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
 
     First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
@@ -273,19 +219,15 @@ def kernel(comm: MPI.Comm, body: Movable, fixed: Sequence[FixedDirections]) -> A
     Args:
         comm: the ranks of the mesh.
         body: the body that moves.
-        fixed: the conditions, on each rank its own.
+        fixed: rows that are zero for all motions of Y, on each rank its own, (q, 3|6).
     """
-    rows = np.vstack([np.zeros((0, body.motions)), *(_condition_rows(part, body) for part in fixed)])
+    rows = np.vstack([np.zeros((0, body.motions)), *fixed])
     factors = comm.gather(triangle(rows), root=0)
-    basis = None if factors is None else _natural_null_space(np.vstack(factors), body.shifts)
+    basis = None if factors is None else natural_basis(null_space(np.vstack(factors)), body.shifts)
     return np.asarray(comm.bcast(basis, root=0))
 
 
-def _natural_null_space(rows: Array, shifts: int) -> Array:
-    return natural_basis(null_space(rows), shifts)
-
-
-def modes(basis: Array, body: Movable) -> tuple[Mode, ...]:
+def modes(basis: Array, body: AnyBody) -> tuple[Mode, ...]:
     """The motions of a kernel's basis. Local.
 
     Args:
@@ -356,11 +298,6 @@ def _reduce(span: Array) -> Array:
 def _snap(values: Array) -> Array:
     """The values, with zero for what is rounding in an orthonormal basis."""
     return np.where(np.abs(values) < 1e-13, 0.0, values)
-
-
-def _condition_rows(part: FixedDirections, body: Movable) -> Array:
-    """(k, 3|6): the work of each condition on the basis motions."""
-    return np.asarray(np.einsum("kd,knd->kn", part.directions, fields_at(part.points, body)))
 
 
 NEGLIGIBLE = DEFAULT.rounding

@@ -17,30 +17,7 @@ from ..laws import Length
 from ..laws.base import Directional
 from ..typing import Array
 from .cutting_planes import Functional, SlipIntegral, merged
-from .motions import (
-    DEFAULT,
-    NEGLIGIBLE,
-    FixedDirections,
-    Mode,
-    MotionFields,
-    Movable,
-    Places,
-    fields_at,
-    kernel,
-)
-
-
-@dataclass(frozen=True)
-class ContactCone:
-    """Unilateral contact: y·n <= 0.
-
-    Attributes:
-        points: vertices (m, 3), or the motions there.
-        normals: n, outward, of unit length, (m, d).
-    """
-
-    points: Places
-    normals: Array
+from .motions import DEFAULT, AnyBody, JoinedBodies, Mode, kernel
 
 
 def _linear_part(law: Directional) -> float:
@@ -60,7 +37,7 @@ class Resistance:
     """One part that carries a law.
 
     Attributes:
-        points: vertices (m, 3), or the motions there.
+        fields: the basis motions at its vertices, on an interface the relative ones, (m, motions, d).
         weights: lumped areas (m,).
         directions: (m, r, d). r = 1: the law acts on the scalar slip y·direction (in 2D the tangent; for a
             normal law the inward normal for opening, the outward one for penetration). Else it acts on a length.
@@ -70,7 +47,7 @@ class Resistance:
         length: of the r components; None: their Euclidean length.
     """
 
-    points: Places
+    fields: Array
     weights: Array
     directions: Array
     growth: Directional
@@ -86,6 +63,11 @@ class Resistance:
             raise InputError("a law of a length needs the same growth and peak on both sides")
 
     @property
+    def slips(self) -> Array:
+        """What the law acts on, of each basis motion, (m, r, motions)."""
+        return np.einsum("mrd,mnd->mrn", self.directions, self.fields)
+
+    @property
     def measured(self) -> Length:
         """The length that it acts on; of one component its size."""
         return self.length or Length.plain(self.directions.shape[1])
@@ -98,16 +80,16 @@ class RigidProblem:
     Attributes:
         body: the body.
         loads: by name, the work <g, y> (3|6,) on the basis motions.
-        fixed: directions in which it cannot move.
-        contact: unilateral contact.
+        fixed: rows (q, motions) that are zero for all motions it can make; each rank gives its own.
+        contact: rows y·n, likewise, that unilateral contact keeps from being positive; n is outward, of unit length.
         resistances: the parts that carry laws.
         force: sum of the absolute nodal forces: beside it a work is rounding or not, however well loads balance.
     """
 
-    body: Movable
+    body: AnyBody
     loads: Mapping[str, Array]
-    fixed: tuple[FixedDirections, ...] = ()
-    contact: tuple[ContactCone, ...] = ()
+    fixed: tuple[Array, ...] = ()
+    contact: tuple[Array, ...] = ()
     resistances: tuple[Resistance, ...] = ()
     force: float = 0.0
 
@@ -116,19 +98,14 @@ class RigidProblem:
             if not np.isfinite(work).all():
                 raise InputError(f"load {name!r}: its work on a rigid motion is not finite")
 
-    def conditions(self) -> tuple[FixedDirections, ...]:
+    def conditions(self) -> tuple[Array, ...]:
         """The fixed conditions, and those of laws whose growth is infinite both ways (linear springs)."""
-        rows = [
-            FixedDirections(p.points, p.directions[:, r])
-            for p in self._springs
-            for r in np.flatnonzero(p.measured.two_sided())
-        ]
+        rows = [p.slips[:, r] for p in self._springs for r in np.flatnonzero(p.measured.two_sided())]
         return (*self.fixed, *rows)
 
-    def cones(self) -> tuple[ContactCone, ...]:
+    def cones(self) -> tuple[Array, ...]:
         """Unilateral contact, and that of springs which resist an opening alone."""
-        held = [p for p in self._springs if p.measured.opens]
-        return (*self.contact, *(ContactCone(p.points, p.directions[:, 0]) for p in held))
+        return (*self.contact, *(p.slips[:, 0] for p in self._springs if p.measured.opens))
 
     @property
     def _springs(self) -> list[Resistance]:
@@ -225,14 +202,14 @@ def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, ReducedProblem
 
 def _own_rows(problem: RigidProblem, basis: Array) -> _Rows:
     """What this rank has of the reduced problem."""
-    normals = [_work(p.points, p.normals[:, None, :], problem.body, basis)[:, 0] for p in problem.cones()]
-    contact = unit_rows(np.vstack([np.zeros((0, basis.shape[1])), *normals]), DEFAULT.exact)
-    slips = [_work(p.points, p.directions, problem.body, basis) * p.weights[:, None, None] for p in problem.resistances]
+    normals = np.vstack([np.zeros((0, basis.shape[1])), *(rows @ basis for rows in problem.cones())])
     return _Rows(
-        contact=np.unique(contact, axis=0),
-        slips=tuple(SlipIntegral(merged(w), p.measured) for w, p in zip(slips, problem.resistances, strict=True)),
+        contact=np.unique(unit_rows(normals, DEFAULT.exact), axis=0),
+        slips=tuple(
+            SlipIntegral(merged(p.slips @ basis * p.weights[:, None, None]), p.measured) for p in problem.resistances
+        ),
         areas=np.array([float(p.weights.sum()) for p in problem.resistances]),
-        traces=np.array([_trace(p, problem.body, basis) for p in problem.resistances]),
+        traces=np.array([_trace(p, basis) for p in problem.resistances]),
     )
 
 
@@ -247,79 +224,10 @@ def unit_rows(rows: Array, tiny: float) -> Array:
     return np.asarray(rows[length > tiny] / length[length > tiny, None])
 
 
-def _trace(part: Resistance, body: Movable, basis: Array) -> Array:
+def _trace(part: Resistance, basis: Array) -> Array:
     """∫ y·y over this rank's vertices of a part, as a quadratic form on the kernel's basis, (k, k)."""
-    fields = np.einsum("mnd,nk->mdk", fields_at(part.points, body), basis)
-    return np.asarray(np.einsum("m,mdk,mdl->kl", part.weights, fields, fields))
-
-
-def _work(points: Places, directions: Array, body: Movable, basis: Array) -> Array:
-    """direction·y of each basis motion of the kernel: directions (m, r, d) give (m, r, k)."""
-    return np.asarray(np.einsum("mrd,mnd->mrn", directions, fields_at(points, body)) @ basis)
-
-
-@dataclass(frozen=True)
-class PressedBody:
-    """A body and obstacles that slide along given directions; nondimensional.
-
-    Attributes:
-        body: the body.
-        obstacles: their names.
-    """
-
-    body: Movable
-    obstacles: tuple[str, ...]
-
-    @property
-    def dimension(self) -> int:
-        """2 or 3."""
-        return self.body.dimension
-
-    @property
-    def index(self) -> int:
-        """The number of the body."""
-        return self.body.index
-
-    @property
-    def motions(self) -> int:
-        """Number of rigid motions, those of the obstacles among them."""
-        return self.body.motions + len(self.obstacles)
-
-    @property
-    def shifts(self) -> int:
-        """Number of translations: the body's, then the obstacles'."""
-        return self.body.shifts + len(self.obstacles)
-
-    def own(self, coefficients: Array) -> Array:
-        """The coefficients of the body alone."""
-        return np.delete(coefficients, range(self.body.shifts, self.shifts))
-
-    def describe(self, coefficients: Array, *, signed: bool) -> str:
-        """A motion in words.
-
-        Args:
-            coefficients: on the basis of the body, with those of the obstacles after its translations.
-            signed: whether the name has the sense too.
-        """
-        least = NEGLIGIBLE * np.abs(coefficients).max()
-        own, ways = self.own(coefficients), coefficients[self.body.shifts : self.shifts]
-        who = " and ".join(name for name, way in zip(self.obstacles, ways, strict=True) if abs(way) > least)
-        moved = self.body.describe(own, signed=signed) if np.abs(own).max() > least else ""
-        if not who:
-            return moved
-        return f"{moved}, together with the obstacle of {who}" if moved else f"the obstacle of {who} alone"
-
-    def widened(self, fields: Array, ways: Array | None = None) -> MotionFields:
-        """The basis motions at some vertices, with those of the obstacles.
-
-        Args:
-            fields: of the body, (m, motions, d).
-            ways: of the obstacles, (m, obstacles, d); None: they move nothing there.
-        """
-        m, _, d = fields.shape
-        ways = np.zeros((m, len(self.obstacles), d)) if ways is None else ways
-        at = self.body.shifts
-        return MotionFields(np.concatenate([fields[:, :at], ways, fields[:, at:]], axis=1))
+    fields = np.einsum("mnd,nk->mdk", part.fields, basis)
+    return np.einsum("m,mdk,mdl->kl", part.weights, fields, fields)
 
 
 def pressed(problem: RigidProblem, forces: Mapping[str, float], ways: Sequence[Array]) -> RigidProblem:
@@ -328,23 +236,20 @@ def pressed(problem: RigidProblem, forces: Mapping[str, float], ways: Sequence[A
     Args:
         problem: of the body, the obstacles at rest.
         forces: the size of each force, by the name of its obstacle.
-        ways: what a unit of each obstacle's way does at the vertices of each contact cone: the cone admits motions y
-            with (y + way)·n <= 0, (m, obstacles, d).
+        ways: what a unit of each obstacle's way adds to the rows of each contact, (m, obstacles).
     """
-    body = PressedBody(problem.body, tuple(forces))
-    nothing = np.zeros(len(forces))
-    loads = {name: _inserted(body, work, nothing) for name, work in problem.loads.items()}
-    for i, (name, force) in enumerate(forces.items()):
-        loads[name] = _inserted(body, np.zeros(problem.body.motions), force * np.eye(len(forces))[i])
+    body, places = problem.body, [problem.body.shifts] * len(forces)
+    loads = {name: np.insert(work, places, 0.0) for name, work in problem.loads.items()}
+    for (name, force), own in zip(forces.items(), np.eye(len(forces)), strict=True):
+        loads[name] = np.insert(np.zeros(body.motions), places, force * own)
     return RigidProblem(
-        body=body,
+        body=JoinedBodies(body.bodies, body.index, tuple(forces)),
         loads=loads,
-        fixed=tuple(FixedDirections(_widened(body, f), f.directions) for f in problem.fixed),
-        contact=tuple(
-            ContactCone(_widened(body, cone, way), cone.normals)
-            for cone, way in zip(problem.contact, ways, strict=True)
+        fixed=tuple(np.insert(rows, places, 0.0, axis=1) for rows in problem.fixed),
+        contact=tuple(np.insert(rows, places, way, axis=1) for rows, way in zip(problem.contact, ways, strict=True)),
+        resistances=tuple(
+            replace(part, fields=np.insert(part.fields, places, 0.0, axis=1)) for part in problem.resistances
         ),
-        resistances=tuple(replace(part, points=_widened(body, part)) for part in problem.resistances),
         force=problem.force + sum(forces.values()),
     )
 
@@ -356,17 +261,8 @@ def without_obstacles(problem: RigidProblem, mode: Mode | None) -> Mode | None:
         problem: of the body and its obstacles.
         mode: one of its motions.
     """
-    if mode is None or not isinstance(problem.body, PressedBody):
+    body = problem.body
+    if mode is None or not isinstance(body, JoinedBodies):
         return mode
-    own = problem.body.own(np.array(mode.coefficients))
+    own = np.delete(mode.coefficients, range(body.shifts - len(body.obstacles), body.shifts))
     return replace(mode, coefficients=tuple(map(float, own))) if own.any() else None
-
-
-def _inserted(body: PressedBody, work: Array, more: Array) -> Array:
-    return np.insert(work, body.body.shifts, more)
-
-
-def _widened(
-    body: PressedBody, part: FixedDirections | ContactCone | Resistance, ways: Array | None = None
-) -> MotionFields:
-    return body.widened(fields_at(part.points, body.body), ways)

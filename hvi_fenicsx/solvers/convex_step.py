@@ -20,7 +20,7 @@ from ..laws.base import Directional
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..problem.scaling import DEFAULT
-from ..rigid import AnyBody, Resistance, RigidProblem, fields_at, gives_way
+from ..rigid import AnyBody, Resistance, RigidProblem, gives_way
 from ..system import existence
 from ..system.equations import Cells, VertexModel
 from ..typing import Array
@@ -295,7 +295,7 @@ def _majorant(
     here = [one for one in terms if existence.acts_on(problem, body, one[0])]
     mine = [xi[existence.inside(problem, body, term.surface.blocks)] for term, _, xi in here]
     parts = list(zip(whole.resistances, here, mine, strict=True))
-    works = sum((_work(body, part, term, xi) for part, (term, _, _), xi in parts), np.zeros(body.motions))
+    works = sum((_work(part, term, xi) for part, (term, _, _), xi in parts), np.zeros(body.motions))
     return replace(
         whole,
         loads={**whole.loads, "ξ": problem.domain.mesh.comm.allreduce(works)},
@@ -323,9 +323,8 @@ def _majorised(part: Resistance, term: LawTerm, growth: Directional, xi: Array) 
     return replace(part, weights=part.weights * np.maximum(1.0 - xi / growth.plus, 0.0), growth=growth, peak=growth)
 
 
-def _work(body: AnyBody, part: Resistance, term: LawTerm, xi: Array) -> Array:
+def _work(part: Resistance, term: LawTerm, xi: Array) -> Array:
     """∫ ξ·y over this rank's vertices for the rigid basis, (3|6,); 0 for a law of |u_t|."""
     if term.radial:
-        return np.zeros(body.motions)
-    fields = fields_at(part.points, body)
-    return np.asarray(np.einsum("m,md,mnd->n", part.weights * xi, part.directions[:, 0, :], fields))
+        return np.zeros(part.fields.shape[1])
+    return np.asarray((part.weights * xi) @ part.slips[:, 0])

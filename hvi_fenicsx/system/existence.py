@@ -17,12 +17,8 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..rigid import (
     AnyBody,
-    ContactCone,
-    FixedDirections,
     LoadFactors,
     Mode,
-    MotionFields,
-    Movable,
     Resistance,
     RigidProblem,
     Solvability,
@@ -31,6 +27,7 @@ from ..rigid import (
     kernel,
     modes,
     null_space,
+    works,
 )
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers, Mask
@@ -117,21 +114,20 @@ def _with_obstacles(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[
     return tuple(replace(one, loads={n: np.zeros(one.body.motions) for n in names} | dict(one.loads)) for one in found)
 
 
-def _meets(problem: Problem, body: Movable, bounds: Bounds) -> bool:
+def _meets(problem: Problem, body: AnyBody, bounds: Bounds) -> bool:
     """Whether bounds act on a body. Collective."""
     mine = bool(inside(problem, body, bounds.surface.blocks).any())
     return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
 
 
-def _ways(problem: Problem, body: Movable, names: Sequence[str]) -> list[Array]:
-    """What obstacles do at the vertices of each contact cone of a body, (m, obstacles, d)."""
+def _ways(problem: Problem, body: AnyBody, names: Sequence[str]) -> list[Array]:
+    """What a unit of each obstacle's way adds to the rows of each contact of a body, (m, obstacles)."""
     found: list[Array] = []
     for bounds in (b for b in problem.bounds if not _bilateral(b)):
         mine = inside(problem, body, bounds.surface.blocks)
-        normals = bounds.surface.normals[mine]
-        ways = np.zeros((len(normals), len(names), normals.shape[1]))
+        ways = np.zeros((np.count_nonzero(mine), len(names)))
         if (force := bounds.force) is not None:
-            ways[:, names.index(force.name)] = -force.rate[mine, None] * normals
+            ways[:, names.index(force.name)] = -force.rate[mine]
         found.append(ways)
     return found
 
@@ -158,8 +154,8 @@ def motions(problem: Problem, *, contact_closed: bool, without: Sequence[Mode] =
     """
     found: list[Mode] = []
     for body in problem.bodies:
-        held = [_normals(problem, body, b.surface) for b in problem.bounds] if contact_closed else []
-        basis = kernel(problem.domain.mesh.comm, body, (prescribed_directions(problem, body), *held))
+        held = [normals(problem, body, b.surface) for b in problem.bounds] if contact_closed else []
+        basis = kernel(problem.domain.mesh.comm, body, (prescribed(problem, body), *held))
         left_out = np.array([mode.coefficients for mode in without if mode.body == body.index])
         if len(left_out):
             basis = basis @ null_space(left_out @ basis)
@@ -185,14 +181,13 @@ def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBo
         forces: the loads of rigid motions by name.
         body: the body.
     """
-    held = [_normals(problem, body, b.surface) for b in problem.bounds if _bilateral(b)]
-    cones = [_normals(problem, body, b.surface) for b in problem.bounds if not _bilateral(b)]
-    works, force = _works(problem, forces, body)
+    held = [normals(problem, body, b.surface) for b in problem.bounds if _bilateral(b)]
+    loads, force = _works(problem, forces, body)
     return RigidProblem(
         body=body,
-        loads=works,
-        fixed=(prescribed_directions(problem, body), *held),
-        contact=tuple(ContactCone(cone.points, cone.directions) for cone in cones),
+        loads=loads,
+        fixed=(prescribed(problem, body), *held),
+        contact=tuple(normals(problem, body, b.surface) for b in problem.bounds if not _bilateral(b)),
         resistances=tuple(_resistance(problem, body, term) for term in problem.terms if acts_on(problem, body, term)),
         force=force,
     )
@@ -202,7 +197,7 @@ def _bilateral(bounds: Bounds) -> bool:
     return bool(np.all(np.isfinite(bounds.lower) & np.isfinite(bounds.upper)))
 
 
-def inside(problem: Problem, body: Movable, blocks: Entities) -> Mask:
+def inside(problem: Problem, body: AnyBody, blocks: Entities) -> Mask:
     """Which vertices belong to a body, (n,).
 
     Args:
@@ -213,14 +208,21 @@ def inside(problem: Problem, body: Movable, blocks: Entities) -> Mask:
     return np.asarray(problem.bodies.labels[blocks] == body.index)
 
 
-def _normals(problem: Problem, body: AnyBody, surface: Surface) -> FixedDirections:
-    """The normals of a surface at the body's vertices."""
-    mine = inside(problem, body, surface.blocks)
-    return FixedDirections(MotionFields(problem.motions_at(surface.blocks[mine], body)), surface.normals[mine])
+def normals(problem: Problem, body: AnyBody, surface: Surface, closed: Mask | None = None) -> Array:
+    """The work of a surface's normals at the body's vertices in its rigid motions, (m, motions).
+
+    Args:
+        problem: the problem.
+        body: the body.
+        surface: where.
+        closed: at which of its vertices; None: at all.
+    """
+    mine = inside(problem, body, surface.blocks) & (True if closed is None else closed)
+    return works(surface.normals[mine], problem.motions_at(surface.blocks[mine], body))
 
 
-def prescribed_directions(problem: Problem, body: AnyBody) -> FixedDirections:
-    """The prescribed components at the body's vertices.
+def prescribed(problem: Problem, body: AnyBody) -> Array:
+    """The prescribed components of the body's rigid motions, (m, motions).
 
     Args:
         problem: the problem.
@@ -228,21 +230,21 @@ def prescribed_directions(problem: Problem, body: AnyBody) -> FixedDirections:
     """
     d, dofs = problem.scales.dimension, problem.fixed_here
     dofs = dofs[inside(problem, body, dofs // d)]
-    return FixedDirections(MotionFields(problem.motions_at(dofs // d, body)), np.asarray(np.eye(d)[dofs % d]))
+    return works(np.eye(d)[dofs % d], problem.motions_at(dofs // d, body))
 
 
 def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBody) -> tuple[dict[str, Array], float]:
     """<g, y> of each load on the rigid basis, and the sum of the absolute nodal forces. Collective."""
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
     points = problem.points
-    works, size = {}, 0.0
+    found, size = {}, 0.0
     for name, force in forces.items():
         nodal = force.array_r.reshape(-1, d)
         loaded = np.flatnonzero(nodal.any(axis=1) & (problem.bodies.labels[: len(nodal)] == body.index))
         fields = problem.bodies.fields(np.asarray(points[loaded] / problem.scales.length), loaded, body)
-        works[name] = comm.allreduce(np.einsum("vd,vnd->n", nodal[loaded], fields))
+        found[name] = comm.allreduce(np.einsum("vd,vnd->n", nodal[loaded], fields))
         size += comm.allreduce(float(np.abs(nodal[loaded]).sum()))
-    return works, size
+    return found, size
 
 
 def acts_on(problem: Problem, body: AnyBody, term: LawTerm) -> bool:
@@ -262,7 +264,7 @@ def _resistance(problem: Problem, body: AnyBody, term: LawTerm) -> Resistance:
     least, greatest = (1.0, 1.0) if mixity is None else (mixity.least, mixity.greatest)
     mine = inside(problem, body, surface.blocks)
     return Resistance(
-        points=MotionFields(problem.motions_at(surface.blocks[mine], body)),
+        fields=problem.motions_at(surface.blocks[mine], body),
         weights=term.weights[mine],
         directions=term.directions[mine],
         growth=law.growth.times(least),

@@ -26,7 +26,7 @@ from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..problem.vectors import NodalForces, null_space
-from ..rigid import AnyBody, FixedDirections, Mode, MotionFields, kernel
+from ..rigid import AnyBody, Mode, kernel
 from ..runtime import forms
 from ..runtime.mpi import total
 from ..typing import Array, Entities, Mask
@@ -159,8 +159,8 @@ class SupportedBody:
             closed: surfaces, and at which of their vertices contact is closed.
         """
         count, comm = len(self.fields), self.problem.domain.mesh.comm
-        fixed = existence.prescribed_directions(self.problem, self.body)
-        rows = [_normals(self.problem, self.body, surface, mask) for surface, mask in closed]
+        fixed = existence.prescribed(self.problem, self.body)
+        rows = [existence.normals(self.problem, self.body, surface, mask) for surface, mask in closed]
         unseen = kernel(comm, self.body, [fixed, *rows]) if count else np.empty((len(self.coefficients), 0))
         if unseen.shape[1] == count:
             return Motions(self, np.eye(count))
@@ -196,17 +196,12 @@ class Motions:
 
 def _supported(problem: Problem, body: AnyBody) -> tuple[Array, Array]:
     """The motions that the supports of a body leave, as coefficients, and at this rank's vertices. Collective."""
-    free = kernel(problem.domain.mesh.comm, body, [existence.prescribed_directions(problem, body)])
+    free = kernel(problem.domain.mesh.comm, body, [existence.prescribed(problem, body)])
     here = problem.space.dofmap.index_map.size_local
     mine = np.flatnonzero(problem.bodies.labels[:here] == body.index).astype(np.int32)
     fields = np.zeros((free.shape[1], here, problem.scales.dimension))
     fields[:, mine] = np.moveaxis(np.tensordot(problem.motions_at(mine, body), free, (1, 0)), 2, 0)
     return free, fields
-
-
-def _normals(problem: Problem, body: AnyBody, surface: Surface, closed: Mask) -> FixedDirections:
-    mine = closed & existence.inside(problem, body, surface.blocks)
-    return FixedDirections(MotionFields(problem.motions_at(surface.blocks[mine], body)), surface.normals[mine])
 
 
 NOTHING = 1e-10

@@ -14,15 +14,14 @@ from scenes import block
 from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.console import existence
 from hvi_fenicsx.rigid import (
-    ContactCone,
     Directional,
     Resistance,
     RigidBody,
     RigidProblem,
     Solvability,
     analyse,
-    fields_at,
     rigid_fields,
+    works,
 )
 
 Array = NDArray[np.float64]
@@ -33,7 +32,7 @@ def growth(problem: RigidProblem, motions: Array) -> Array:
     """∫ j^∞(y) of motions (t, n), (t,)."""
     total = np.zeros(len(motions))
     for part in problem.resistances:
-        slips = np.einsum("mrd,mnd,tn->tmr", part.directions, fields_at(part.points, problem.body), motions)
+        slips = np.einsum("mrn,tn->tmr", part.slips, motions)
         size = np.linalg.norm(slips, axis=2)
         ahead = slips[:, :, 0] >= 0 if slips.shape[2] == 1 else np.ones_like(size, dtype=bool)
         total += (size * np.where(ahead, part.growth.plus, part.growth.minus)) @ part.weights
@@ -43,7 +42,7 @@ def growth(problem: RigidProblem, motions: Array) -> Array:
 def lowest(problem: RigidProblem, function: Callable[[Array], Array], seed: int = 0) -> float:
     """Minimum of a function of unit motions over the cone: random motions, the best of them varied less and less."""
     rng, n = np.random.default_rng(seed), problem.body.motions
-    rows = np.vstack([np.einsum("md,mnd->mn", c.normals, fields_at(c.points, problem.body)) for c in problem.contact])
+    rows = np.vstack(problem.contact)
     known = np.zeros((0, n))
     for spread in [np.inf, *np.geomspace(1.0, 1e-7, 40)]:
         trials = rng.normal(size=(20_000 if spread == np.inf else 4_000, n))
@@ -70,7 +69,7 @@ def random_problem(seed: int, d: int) -> RigidProblem:
         law = Directional(plus, plus) if radial else Directional(minus, plus)
         parts.append(
             Resistance(
-                points=points,
+                fields=rigid_fields(points, body),
                 weights=rng.uniform(0.1, 0.3, 8),
                 directions=directions,
                 growth=law,
@@ -79,7 +78,7 @@ def random_problem(seed: int, d: int) -> RigidProblem:
             )
         )
     points = np.hstack([rng.uniform(-1, 1, size=(4, d)), np.zeros((4, 3 - d))])
-    contact = ContactCone(points, -np.abs(rng.normal(size=(4, d))))
+    contact = works(-np.abs(rng.normal(size=(4, d))), rigid_fields(points, body))
     load = rng.normal(size=body.motions) * rng.choice([0.02, 0.2, 1.0])
     return RigidProblem(body=body, loads={"g": load}, contact=(contact,), resistances=tuple(parts))
 
@@ -115,7 +114,7 @@ def literal(seed: int) -> RigidProblem:
     body, drive = RigidBody(2, np.zeros(3)), rng.uniform(0.2, 0.6)
     points, at = (np.hstack([rng.uniform(-1, 1, (m, 2)), np.zeros((m, 1))]) for m in (8, 5))
     part = Resistance(
-        points=points,
+        fields=rigid_fields(points, body),
         weights=rng.uniform(0.1, 0.3, 8),
         directions=np.linalg.qr(rng.normal(size=(8, 2, 2)))[0][:, :1],
         growth=Directional(-drive, drive),
@@ -124,8 +123,9 @@ def literal(seed: int) -> RigidProblem:
     )
     normals = rng.normal(size=(5, 2))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    load = np.einsum("md,mnd,m->n", normals, rigid_fields(at, body), rng.uniform(0.3, 3.0, 5))
-    return RigidProblem(body=body, loads={"g": load}, contact=(ContactCone(at, normals),), resistances=(part,))
+    cone = works(normals, rigid_fields(at, body))
+    load = rng.uniform(0.3, 3.0, 5) @ cone
+    return RigidProblem(body=body, loads={"g": load}, contact=(cone,), resistances=(part,))
 
 
 def loaded(problem: RigidProblem, factor: float) -> RigidProblem:
@@ -141,7 +141,7 @@ def test_the_papers_condition_holds_the_body_wherever_it_is_satisfied(seed: int)
     paper = analyse(ALONE, problem).paper
     assert paper.margin is not None
     trials = np.random.default_rng(1).choice([-1.0, 0.0, 1.0], size=(500, 3))
-    fields = np.einsum("tn,mnd->tmd", trials, fields_at(part.points, problem.body))
+    fields = np.einsum("tn,mnd->tmd", trials, part.fields)
     trace = np.sqrt(np.max(np.sum(fields**2, axis=2) @ part.weights))
     assert paper.c == pytest.approx(part.c4 * np.sqrt(part.weights.sum()) * trace, rel=1e-12)
     just = analyse(ALONE, loaded(problem, 1.0001 * paper.c / paper.margin))

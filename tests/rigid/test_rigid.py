@@ -16,9 +16,7 @@ from runs import LONG_RANKS, on_ranks
 from scipy.optimize import linprog
 
 from hvi_fenicsx.rigid import (
-    ContactCone,
     Directional,
-    FixedDirections,
     Resistance,
     RigidBody,
     RigidProblem,
@@ -30,11 +28,13 @@ from hvi_fenicsx.rigid import (
     load_factors,
     modes,
     rigid_fields,
+    works,
 )
 
 Array = NDArray[np.float64]
 ALONE = MPI.COMM_SELF
 FREE = Directional(0.0, 0.0)
+SQUARE = RigidBody(2, np.array([0.5, 0.5, 0.0]))
 
 
 def even(strength: float) -> Directional:
@@ -56,32 +56,37 @@ def edge(start: tuple[float, float], end: tuple[float, float], cells: int) -> tu
 
 
 def floor_2d(
+    body: RigidBody,
     cells: int,
     growth: Directional,
     peak: Directional,
     length: float = 1.0,
     angle: float = 0.0,
     c4: float = 0.0,
-) -> tuple[ContactCone, Resistance]:
+) -> tuple[Array, Resistance]:
     """A straight floor from the origin, with a tangential law; `angle` turns it counterclockwise."""
     t = np.array([np.cos(angle), np.sin(angle)])
     points, weights = edge((0.0, 0.0), (length * t[0], length * t[1]), cells)
     normals = np.tile([t[1], -t[0]], (cells + 1, 1))
     tangents = np.tile(t, (cells + 1, 1, 1))
-    return ContactCone(points, normals), Resistance(
-        points=points, weights=weights, directions=tangents, growth=growth, peak=peak, c4=c4
+    fields = rigid_fields(points, body)
+    return works(normals, fields), Resistance(
+        fields=fields, weights=weights, directions=tangents, growth=growth, peak=peak, c4=c4
     )
 
 
-def floor_3d(cells: int, growth: float, peak: float, a: float = 1.0, b: float = 1.0) -> tuple[ContactCone, Resistance]:
+def floor_3d(
+    body: RigidBody, cells: int, growth: float, peak: float, a: float = 1.0, b: float = 1.0
+) -> tuple[Array, Resistance]:
     """The floor [0, a] × [0, b] at z = 0 with a law of the length of the slip."""
     x, wx = edge((0.0, 0.0), (a, 0.0), cells)
     y, wy = edge((0.0, 0.0), (0.0, b), cells)
     points = np.array([p + q for p in x for q in y])
+    fields = rigid_fields(points, body)
     normals = np.tile([0.0, 0.0, -1.0], (len(points), 1))
     tangents = np.tile([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], (len(points), 1, 1))
-    return ContactCone(points, normals), Resistance(
-        points=points, weights=np.outer(wx, wy).ravel(), directions=tangents, growth=even(growth), peak=even(peak)
+    return works(normals, fields), Resistance(
+        fields=fields, weights=np.outer(wx, wy).ravel(), directions=tangents, growth=even(growth), peak=even(peak)
     )
 
 
@@ -89,8 +94,8 @@ def block(
     push: float, growth: float = 0.5, peak: float = 1.0, weight: float = 1.0, height: float = 0.0
 ) -> RigidProblem:
     """A 1 × 1 block, pushed to the right at the given height."""
-    body = RigidBody(2, np.array([0.5, 0.5, 0.0]))
-    contact, friction = floor_2d(16, even(growth), even(peak))
+    body = SQUARE
+    contact, friction = floor_2d(body, 16, even(growth), even(peak))
     loads = {
         "push": force(body, (0.0, height, 0.0), (push, 0.0)),
         "weight": force(body, (0.5, 0.5, 0.0), (0.0, -weight)),
@@ -103,7 +108,7 @@ def slab(
 ) -> RigidProblem:
     """A heavy 2 × 1 × 1 block in space, pushed and turned at the level of the floor."""
     body = RigidBody(3, np.array([1.0, 0.5, 0.5]))
-    contact, friction = floor_3d(cells, growth, 2.0 * growth, 2.0, 1.0)
+    contact, friction = floor_3d(body, cells, growth, 2.0 * growth, 2.0, 1.0)
     loads = {
         "push": force(body, (1.0, 0.5, 0.0), (*push, 0.0)) + torque * np.eye(6)[5],
         "weight": force(body, (1.0, 0.5, 0.5), (0.0, 0.0, -weight)),
@@ -113,9 +118,9 @@ def slab(
 
 def wall(q: float, resistances: tuple[Resistance, ...] = (), lift: float = 0.0) -> RigidProblem:
     """The paper's model problem: u1 = 0 on the left side, floor below, load 1 to the right and q down."""
-    body = RigidBody(2, np.array([0.5, 0.5, 0.0]))
+    body = SQUARE
     side, _ = edge((0.0, 0.0), (0.0, 1.0), 4)
-    contact, _ = floor_2d(4, FREE, FREE)
+    contact, _ = floor_2d(body, 4, FREE, FREE)
     loads = {
         "pull": force(body, (1.0, 0.5, 0.0), (1.0, 0.0)),
         "press": force(body, (0.5, 1.0, 0.0), (0.0, -q)),
@@ -124,7 +129,7 @@ def wall(q: float, resistances: tuple[Resistance, ...] = (), lift: float = 0.0) 
     return RigidProblem(
         body=body,
         loads=loads,
-        fixed=(FixedDirections(side, np.tile([1.0, 0.0], (5, 1))),),
+        fixed=(works(np.tile([1.0, 0.0], (5, 1)), rigid_fields(side, body)),),
         contact=(contact,),
         resistances=resistances,
     )
@@ -185,7 +190,7 @@ def test_weight_is_a_load_of_which_there_must_be_enough() -> None:
 
 def test_the_papers_condition_is_the_conservative_one() -> None:
     """With the literal law c = γ2 meas(Γc)^½: condition (iii) fails for a load that still holds the body."""
-    _, friction = floor_2d(4, even(1.5), even(3.0), c4=1.5)
+    _, friction = floor_2d(SQUARE, 4, even(1.5), even(3.0), c4=1.5)
     verdict = analyse(ALONE, wall(1.0, (friction,)))
     assert verdict.state == "held"
     assert verdict.paper.c == pytest.approx(1.5, abs=1e-12)
@@ -197,7 +202,11 @@ def test_lift_off_begins_where_the_lift_exceeds_weight_and_adhesion() -> None:
     points, weights = edge((0.0, 0.0), (1.0, 0.0), 4)
     opening = np.tile([[0.0, 1.0]], (5, 1, 1))
     glue = Resistance(
-        points=points, weights=weights, directions=opening, growth=Directional(0.0, 0.25), peak=Directional(0.0, 0.75)
+        fields=rigid_fields(points, SQUARE),
+        weights=weights,
+        directions=opening,
+        growth=Directional(0.0, 0.25),
+        peak=Directional(0.0, 0.75),
     )
     bare = load_factors(ALONE, wall(1.0, lift=4.0), "lift")
     assert (bare.held, bare.peak) == (pytest.approx(0.25, abs=1e-12), pytest.approx(0.25, abs=1e-12))
@@ -217,7 +226,7 @@ def test_a_plate_on_a_slanted_floor_slides_when_its_weight_along_the_slope_excee
     t = np.array([np.cos(angle), np.sin(angle)])
     middle = 1.5 * t
     body = RigidBody(2, np.array([*middle, 0.0]))
-    contact, friction = floor_2d(12, even(0.25), even(0.4), 3.0, angle)
+    contact, friction = floor_2d(body, 12, even(0.25), even(0.4), 3.0, angle)
     loads = {"weight": force(body, (*middle, 0.0), (0.0, -2.0))}
     verdict = analyse(ALONE, RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,)))
     slope = 2.0 * abs(np.sin(angle))
@@ -229,8 +238,8 @@ def test_a_plate_on_a_slanted_floor_slides_when_its_weight_along_the_slope_excee
 
 
 def test_a_one_sided_law_holds_one_way_only() -> None:
-    body = RigidBody(2, np.array([0.5, 0.5, 0.0]))
-    contact, friction = floor_2d(6, Directional(0.0, 0.5), Directional(0.0, 1.0))
+    body = SQUARE
+    contact, friction = floor_2d(body, 6, Directional(0.0, 0.5), Directional(0.0, 1.0))
     for push, held, state in ((0.3, 0.5 / 0.3, "held"), (-0.3, 0.0, "escapes")):
         loads = {
             "push": force(body, (0.5, 0.0, 0.0), (push, 0.0)),
@@ -245,8 +254,8 @@ def test_a_one_sided_law_holds_one_way_only() -> None:
 
 def test_springs_take_motions_out_of_the_kernel_and_one_sided_springs_out_of_the_cone() -> None:
     infinite = Directional(np.inf, np.inf)
-    contact, spring = floor_2d(6, infinite, infinite)
-    body = RigidBody(2, np.array([0.5, 0.5, 0.0]))
+    body = SQUARE
+    contact, spring = floor_2d(body, 6, infinite, infinite)
     loads = {
         "push": force(body, (0.5, 0.0, 0.0), (7.0, 0.0)),
         "weight": force(body, (0.5, 0.5, 0.0), (0.0, -1.0)),
@@ -256,7 +265,7 @@ def test_springs_take_motions_out_of_the_kernel_and_one_sided_springs_out_of_the
     assert verdict.state == "held"
     points, weights = edge((0.0, 0.0), (1.0, 0.0), 6)
     support = Resistance(
-        points=points,
+        fields=rigid_fields(points, body),
         weights=weights,
         directions=np.tile([[0.0, -1.0]], (7, 1, 1)),
         growth=Directional(0.0, np.inf),
@@ -277,7 +286,7 @@ def test_a_body_in_a_tight_corner_has_motions_but_none_that_is_admitted() -> Non
         ([0.0, 1.0, 0.0], [0.0, 1.0]),
         ([0.0, -1.0, 0.0], [0.0, -1.0]),
     ]
-    contact = ContactCone(np.array([p for p, _ in sides]), np.array([n for _, n in sides]))
+    contact = works(np.array([n for _, n in sides]), rigid_fields(np.array([p for p, _ in sides]), body))
     verdict = analyse(ALONE, RigidProblem(body=body, loads={"g": np.array([1.0, 2.0, 3.0])}, contact=(contact,)))
     assert (verdict.state, verdict.margin, verdict.lambda_held) == ("held", None, np.inf)
     assert len(verdict.kernel) == 3
@@ -318,7 +327,7 @@ def test_a_torque_about_the_vertical_meets_growth_times_distance() -> None:
     """The law turned about the middle resists by γ Σ w r."""
     problem = slab((0.0, 0.0), torque=0.5)
     part = problem.resistances[0]
-    arms = np.hypot(part.points[:, 0] - 1.0, part.points[:, 1] - 0.5)
+    arms = np.linalg.norm(part.slips[:, :, 5], axis=1)
     verdict = analyse(ALONE, problem)
     assert verdict.lambda_held == pytest.approx(0.3 * float(part.weights @ arms) / 0.5, abs=1e-8)
     assert verdict.critical is not None
@@ -336,7 +345,7 @@ def test_an_eccentric_push_in_space_agrees_with_a_fine_search() -> None:
 
     def ratio(t: Array) -> float:
         y = np.array([t[0], t[1], 0.0, 0.0, 0.0, t[2]])
-        slip = np.einsum("n,mnd->md", y, rigid_fields(part.points, body))[:, :2]
+        slip = part.slips @ y
         return 0.3 * float(part.weights @ np.linalg.norm(slip, axis=1)) / float(loads["push"] @ y)
 
     best, spread = np.array([0.0, 1.0, 0.5]), 1.0
@@ -356,26 +365,26 @@ def test_random_plane_problems_agree_with_one_large_linear_programme(seed: int) 
     body = RigidBody(2, rng.normal(size=3) * [1.0, 1.0, 0.0])
     points = np.hstack([rng.normal(size=(30, 2)), np.zeros((30, 1))])
     angles = rng.uniform(0.0, 2.0 if seed % 3 else 4.0, 30)
-    contact = ContactCone(points[:8], -np.column_stack([np.cos(angles), np.sin(angles)])[:8])
+    fields = rigid_fields(points, body)
+    contact = works(-np.column_stack([np.cos(angles), np.sin(angles)])[:8], fields[:8])
     tangents = rng.normal(size=(30, 1, 2))
     laws = [Directional(*sorted(rng.uniform(0.1, 1.0, 2))) for _ in range(2)]
     parts = tuple(
         Resistance(
-            points=points[s], weights=rng.uniform(0.1, 1.0, 15), directions=tangents[s], growth=law, peak=even(2.0)
+            fields=fields[s], weights=rng.uniform(0.1, 1.0, 15), directions=tangents[s], growth=law, peak=even(2.0)
         )
         for s, law in zip((slice(15), slice(15, 30)), laws, strict=True)
     )
     g = rng.normal(size=3)
     found = load_factors(ALONE, RigidProblem(body=body, loads={"g": g}, contact=(contact,), resistances=parts))
-    rows = np.vstack([np.einsum("mrd,mnd->mn", p.directions, rigid_fields(p.points, body)) for p in parts])
+    rows = np.vstack([p.slips[:, 0] for p in parts])
     weights = np.concatenate([p.weights for p in parts])
     plus, minus = np.repeat([law.plus for law in laws], 15), np.repeat([law.minus for law in laws], 15)
-    cone = np.einsum("md,mnd->mn", contact.normals, rigid_fields(contact.points, body))
     upper = np.vstack(
         [
             np.hstack([plus[:, None] * rows, -np.eye(30)]),
             np.hstack([-minus[:, None] * rows, -np.eye(30)]),
-            np.hstack([cone, np.zeros((8, 30))]),
+            np.hstack([contact, np.zeros((8, 30))]),
         ]
     )
     reference = linprog(
@@ -399,18 +408,17 @@ def test_no_sampled_motion_is_worse_than_the_margin(seed: int) -> None:
     points = np.hstack([rng.uniform(-1, 1, size=(40, d)), np.zeros((40, 3 - d))])
     normals = -np.abs(rng.normal(size=(6, d)))
     slips = np.linalg.qr(rng.normal(size=(40, d, d - 1)))[0].transpose(0, 2, 1)
+    fields = rigid_fields(points, body)
     part = Resistance(
-        points=points, weights=rng.uniform(0.01, 0.05, 40), directions=slips, growth=even(0.8), peak=even(1.1)
+        fields=fields, weights=rng.uniform(0.01, 0.05, 40), directions=slips, growth=even(0.8), peak=even(1.1)
     )
     g = rng.normal(size=body.motions) * rng.choice([0.1, 0.5, 2.0])
-    verdict = analyse(
-        ALONE, RigidProblem(body=body, loads={"g": g}, contact=(ContactCone(points[:6], normals),), resistances=(part,))
-    )
-    cone = np.einsum("md,mnd->mn", normals, rigid_fields(points[:6], body))
+    cone = works(normals, fields[:6])
+    verdict = analyse(ALONE, RigidProblem(body=body, loads={"g": g}, contact=(cone,), resistances=(part,)))
     trials = rng.normal(size=(4000, body.motions))
     trials = trials[(trials @ cone.T <= 0.0).all(axis=1)]
     trials /= np.abs(trials).max(axis=1, keepdims=True)
-    slip = np.einsum("mrd,mnd,tn->tmr", slips, rigid_fields(points, body), trials)
+    slip = np.einsum("mrn,tn->tmr", part.slips, trials)
     values = 0.8 * np.linalg.norm(slip, axis=2) @ part.weights - trials @ g
     assert verdict.margin is not None
     assert values.min() >= verdict.margin - 1e-9
@@ -435,12 +443,12 @@ def test_no_sampled_motion_is_worse_than_the_margin(seed: int) -> None:
 def test_kernels_in_the_plane_are_told_in_words(
     points: list[list[float]], directions: list[list[float]], expected: list[str]
 ) -> None:
-    body = RigidBody(2, np.array([0.5, 0.5, 0.0]))
-    fixed = FixedDirections(np.array(points, float), np.array(directions, float))
-    basis = kernel(ALONE, body, [fixed])
+    body = SQUARE
+    fields, ways = rigid_fields(np.array(points, float), body), np.array(directions, float)
+    basis = kernel(ALONE, body, [works(ways, fields)])
     found = [mode.name for mode in modes(basis, body)]
-    work = [np.einsum("n,mnd->md", column, rigid_fields(fixed.points, body)) for column in basis.T]
-    assert all(np.abs((field * fixed.directions).sum(axis=1)).max() < 1e-12 for field in work)
+    work = [np.einsum("n,mnd->md", column, fields) for column in basis.T]
+    assert all(np.abs((field * ways).sum(axis=1)).max() < 1e-12 for field in work)
     assert found == expected
 
 
@@ -468,8 +476,8 @@ def test_kernels_in_the_plane_are_told_in_words(
 def test_kernels_in_space_are_told_in_words(axes: list[int], expected: list[str]) -> None:
     """Components fixed on the whole base of a cube."""
     body = RigidBody(3, np.array([0.5, 0.5, 0.5]))
-    points = floor_3d(3, 0.0, 0.0)[0].points
-    fixed = [FixedDirections(points, np.tile(np.eye(3)[axis], (len(points), 1))) for axis in axes]
+    fields = floor_3d(body, 3, 0.0, 0.0)[1].fields
+    fixed = [fields[:, :, axis] for axis in axes]
     found = [mode.name for mode in modes(kernel(ALONE, body, fixed), body)]
     assert found == expected
 
@@ -507,11 +515,11 @@ def share(problem: RigidProblem, rank: int, size: int) -> RigidProblem:
     return RigidProblem(
         body=problem.body,
         loads=problem.loads,
-        fixed=tuple(FixedDirections(p.points[mine], p.directions[mine]) for p in problem.fixed),
-        contact=tuple(ContactCone(p.points[mine], p.normals[mine]) for p in problem.contact),
+        fixed=tuple(rows[mine] for rows in problem.fixed),
+        contact=tuple(rows[mine] for rows in problem.contact),
         resistances=tuple(
             Resistance(
-                points=p.points[mine],
+                fields=p.fields[mine],
                 weights=p.weights[mine],
                 directions=p.directions[mine],
                 growth=p.growth,
