@@ -15,7 +15,6 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, PlainSerializer, ValidationInfo, model_validator
-from typing_extensions import override
 
 from ..class_registry import enter
 from ..errors import InputError
@@ -181,31 +180,31 @@ class Obstacle(Table):
 class Plane(Obstacle):
     """A plane, behind which the obstacle is."""
 
-    shape: ClassVar[str] = "plane"
+    shape = "plane"
     point: Vector
     """a point of its surface, m"""
     normal: NonzeroVector
     """its normal, towards the body; of any length"""
 
-    @override
     def nearest(self, points: Array) -> tuple[Array, Array]:
+        """Along its normal."""
         normal = unit(self.normal)
         distance = (points - np.asarray(self.point)) @ normal
         return distance, np.asarray(np.broadcast_to(0.0 - normal, points.shape), np.float64)
 
-    @override
     def ahead(self, points: Array, direction: Array) -> Array:
+        """NaN where the direction leads away from it."""
         steep = float(-unit(self.normal) @ direction)
         return np.asarray(self.nearest(points)[0] / (steep if steep > 0.0 else math.nan), np.float64)
 
     @property
-    @override
     def moves_straight(self) -> bool:
+        """A plane does."""
         return True
 
     @property
-    @override
     def constant(self) -> tuple[float, ...] | None:
+        """Against its normal, unless a direction is given."""
         return super().constant or tuple(map(float, 0.0 - unit(self.normal)))
 
 
@@ -223,14 +222,12 @@ class _Round(Obstacle):
     def across(self, vectors: Array) -> Array:
         """The components of vectors (m, d) that count for the distance from the centre."""
 
-    @override
     def nearest(self, points: Array) -> tuple[Array, Array]:
         away = self.across(points - np.asarray(self.center))
         length = np.linalg.norm(away, axis=1)
         out = np.divide(away, length[:, None], out=np.full_like(away, np.nan), where=length[:, None] > 0.0)
         return (self.radius - length, out) if self.hollow else (length - self.radius, -out)
 
-    @override
     def ahead(self, points: Array, direction: Array) -> Array:
         away, along = self.across(points - np.asarray(self.center)), self.across(direction[None])[0]
         square, middle = float(along @ along), away @ along
@@ -243,23 +240,23 @@ class _Round(Obstacle):
 class Sphere(_Round):
     """A ball; in the plane a cylinder across it."""
 
-    shape: ClassVar[str] = "sphere"
+    shape = "sphere"
 
-    @override
     def across(self, vectors: Array) -> Array:
+        """All of them."""
         return vectors
 
 
 class Cylinder(_Round):
     """A cylinder without ends, in space."""
 
-    shape: ClassVar[str] = "cylinder"
-    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    shape = "cylinder"
+    dimensions = (3,)
     axis: NonzeroVector
     """along it; of any length"""
 
-    @override
     def across(self, vectors: Array) -> Array:
+        """Those across the axis."""
         axis = unit(self.axis)
         return np.asarray(vectors - (vectors @ axis)[:, None] * axis)
 
@@ -267,8 +264,8 @@ class Cylinder(_Round):
 class TriangulatedSurface(Obstacle):
     """A surface of triangles from a file, in space; the gap is measured along `direction`, which it needs."""
 
-    shape: ClassVar[str] = "surface"
-    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    shape = "surface"
+    dimensions = (3,)
     file: ExistingFile
     """an STL file, relative to the scene file; its triangles face the body"""
     scale: Positive = 1.0
@@ -280,12 +277,12 @@ class TriangulatedSurface(Obstacle):
             raise refusal('shape = "surface" needs a direction, from the body towards it: direction = [0, 0, -1]')
         return self
 
-    @override
     def nearest(self, points: Array) -> tuple[Array, Array]:
-        raise NotImplementedError("it has a direction")
+        """Never asked: it has a direction."""
+        raise NotImplementedError
 
-    @override
     def ahead(self, points: Array, direction: Array) -> Array:
+        """By its triangles that face the body."""
         return self.scale * _distances_along(self.file, np.asarray(points / self.scale, np.float64), direction)
 
 
@@ -374,13 +371,13 @@ class Contact(Effect):
     With an obstacle n is the direction towards it, and the gap the distance to it.
     """
 
-    key: ClassVar[str] = "contact"
-    place: ClassVar[Place] = Place.BOUNDARY
-    exclusive: ClassVar[bool] = True
-    bounds_normal: ClassVar[bool] = True
-    on_interfaces: ClassVar[bool] = True
-    drive: ClassVar[Drive] = Drive.KINEMATIC
-    term: ClassVar[str] = "K: gap - u·n ≥ 0 on Γc, or lower ≤ -u·n ≤ upper"
+    key = "contact"
+    place = Place.BOUNDARY
+    exclusive = True
+    bounds_normal = True
+    on_interfaces = True
+    drive = Drive.KINEMATIC
+    term = "K: gap - u·n ≥ 0 on Γc, or lower ≤ -u·n ≤ upper"
 
     gap: Gap | None = None
     """unilateral contact: how far the body may move outward, m, a number or a formula in x, y, z; between two bodies
@@ -424,7 +421,6 @@ class Contact(Effect):
             raise refusal(f"lower = {ends[0]:g} is above upper = {ends[1]:g}; swap them")
         return self
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The stress of an obstacle's force, or of the largest displacement that is demanded, over the length."""
         bounds = self._bounds()
@@ -435,18 +431,16 @@ class Contact(Effect):
         pressed = 0.0 if force is None else math.hypot(*force) / sizes.length ** (len(force) - 1)
         return max(strained, pressed)
 
-    @override
     def displaces_obstacle(self) -> bool:
+        """Whether its obstacle has a displacement."""
         return self.obstacle is not None and self.obstacle.displacement is not None
 
-    @override
     def obstacle_moved(self, way: float) -> Contact:
         """With the obstacle, if a force presses it, moved by so much, m."""
         if self.obstacle is None or self.obstacle.force is None:
             return self
         return self.model_copy(update={"obstacle": self.obstacle.moved(way)})
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bounds on the normal displacement."""
         return Contribution(bounds=(self._bounds(),))
@@ -460,7 +454,6 @@ class Contact(Effect):
         lower = self.lower if self.gap is None else self.gap.negative()
         return NormalBounds(lower=lower, upper=self.upper, towards=towards)
 
-    @override
     def check(self, dimension: int) -> None:
         """Vectors have as many components as the scene has dimensions."""
         if self.obstacle is not None:

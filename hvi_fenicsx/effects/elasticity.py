@@ -6,11 +6,10 @@ Isotropic, orthotropic by engineering constants along the axes, or by the whole 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
-from typing_extensions import override
 
 from ..errors import InputError
 from ..geometry import ROUNDING
@@ -49,7 +48,7 @@ class Elasticity(Effect):
     Stresses and strains are in Voigt's order 11, 22, 12 or 11, 22, 33, 23, 13, 12, shear strains doubled.
     """
 
-    place: ClassVar[Place] = Place.MATERIAL
+    place = Place.MATERIAL
 
     region: Annotated[Names | None, Field(exclude=True)] = None
     """a physical group of cells, or a list of them; required if there are several materials"""
@@ -66,12 +65,11 @@ class Elasticity(Effect):
         """Its place is its region."""
         self._where = self.region
 
-    @override
     def at(self, where: Sides | None, name: str = "") -> Self:
+        """In another region."""
         placed = super().at(where, name)
         return placed.model_copy(update={"region": placed.where})
 
-    @override
     def fitted(self, dimension: int) -> Self:
         """With plane stress in the plane where nothing was said of it."""
         if self.model is not None:
@@ -110,19 +108,16 @@ class Elasticity(Effect):
         sigma = sum(context.number(c) * deformation[i, i] for i, c in found)
         return (sigma * context.scalar_test * cells,) if found else ()
 
-    @override
     def expansion_scale(self) -> float:
         """|α|."""
         return abs(self.thermal_expansion)
 
-    @override
     def dimension(self) -> int | None:
         """2 for the plane models."""
         if self.model is None:
             return None
         return 3 if self.model == "three_dimensional" else 2
 
-    @override
     def check(self, dimension: int) -> None:
         """Plane models are for 2D, the other for 3D."""
         if self.dimension() != dimension:
@@ -133,8 +128,8 @@ class Elasticity(Effect):
 class Isotropic(Elasticity):
     """Isotropic linear elasticity. Plane stress is the Hooke law of the paper (equation (tau))."""
 
-    key: ClassVar[str] = "isotropic"
-    term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
+    key = "isotropic"
+    term = "a(u, v) = ∫ σ(u):ε(v) dx, isotropic"
 
     youngs_modulus: Positive
     """Young's modulus E, N/m²"""
@@ -165,7 +160,6 @@ class Isotropic(Elasticity):
         """Whether P1 cells would lock: nearly incompressible, and not free to change thickness."""
         return self.model != "plane_stress" and self.poisson_ratio > _LOCKING
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L: nondimensional. Where P1 locks, div u is averaged by vertex."""
         import ufl
@@ -182,14 +176,12 @@ class Isotropic(Elasticity):
             bilinear=(shear,), averaged=(Averaged(lam, two_mu, divergence, context.scalar_test * cells),)
         )
 
-    @override
     def held(self) -> Array:
         """λ + 2μ on the diagonal, λ beside it."""
         trace, twice_shear = self.lame()
         size = 2 if self.model == "plane_stress" else 3
         return trace * np.ones((size, size)) + twice_shear * np.eye(size)
 
-    @override
     def modulus_scale(self) -> float:
         """E."""
         return self.youngs_modulus
@@ -211,7 +203,6 @@ class _ByMatrix(Elasticity):
     def stiffness(self) -> Array:
         """C with σ = C ε in Voigt's order, N/m²; shape (3, 3) or (6, 6)."""
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The bilinear form, strains multiplied by L. The pattern of zeros of C is compiled, its values are not."""
         length, cells = context.number(context.length), context.cells(where)
@@ -220,7 +211,6 @@ class _ByMatrix(Elasticity):
         density = sum(context.number(c[i, j]) * given[j] * virtual[i] for i, j in np.argwhere(c != 0.0))
         return Contribution(bilinear=(density * cells,), across=self.across(context, cells))
 
-    @override
     def modulus_scale(self) -> float:
         """The largest diagonal entry of C."""
         return float(np.max(np.diag(self.stiffness())))
@@ -238,8 +228,8 @@ def _definite(matrix: Array, hint: str) -> None:
 class Orthotropic(_ByMatrix):
     """Orthotropic linear elasticity with the axes x, y, z. For rotated axes use `elasticity = "tensor"`."""
 
-    key: ClassVar[str] = "orthotropic"
-    term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, orthotropic"
+    key = "orthotropic"
+    term = "a(u, v) = ∫ σ(u):ε(v) dx, orthotropic"
 
     youngs_moduli: Numbers
     """Young's moduli E1, E2, E3 along x, y, z, N/m²; plane stress has no E3"""
@@ -270,7 +260,6 @@ class Orthotropic(_ByMatrix):
             s[i, j] = s[j, i] = -ratio / e[i]
         return s
 
-    @override
     def held(self) -> Array:
         """Normal stresses from normal strains."""
         return np.asarray(np.linalg.inv(self._compliance()), dtype=np.float64)
@@ -290,8 +279,8 @@ class Anisotropic(_ByMatrix):
     tell, is written as zero.
     """
 
-    key: ClassVar[str] = "tensor"
-    term: ClassVar[str] = "a(u, v) = ∫ σ(u):ε(v) dx, C given"
+    key = "tensor"
+    term = "a(u, v) = ∫ σ(u):ε(v) dx, C given"
 
     matrix: Rows
     """C in N/m², a list of rows: 3 rows in 2D (order 11, 22, 12), 6 rows in 3D (order 11, 22, 33, 23, 13, 12)"""
@@ -314,18 +303,15 @@ class Anisotropic(_ByMatrix):
         """As it was given."""
         return np.array(self.matrix)
 
-    @override
     def held(self) -> Array:
         """The block of normal stresses and strains."""
         normal = self.dimension() or 2
         return self.stiffness()[:normal, :normal]
 
-    @override
     def thermal_stress(self) -> Array:
         """C : αI."""
         return np.asarray(self.thermal_expansion * self.stiffness()[:, : self.dimension() or 2].sum(axis=1))
 
-    @override
     def out_of_plane(self) -> Array:
         """Zero: the matrix does not tell it."""
         return np.zeros(3)

@@ -20,7 +20,6 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
-from typing_extensions import override
 
 from .. import laws
 from ..errors import InputError
@@ -191,9 +190,9 @@ class LawEffect(Effect):
         direction: the displacement it acts on.
     """
 
-    place: ClassVar[Place] = Place.BOUNDARY
-    exclusive: ClassVar[bool] = True
-    on_interfaces: ClassVar[bool] = True
+    place = Place.BOUNDARY
+    exclusive = True
+    on_interfaces = True
     direction: ClassVar[Direction]
 
     law: LawField
@@ -234,7 +233,6 @@ class LawEffect(Effect):
         unit = [key for key in ("multiplier", "length_multiplier") if getattr(self, key) == ONE]
         return {**table.pop("law"), **{key: value for key, value in table.items() if key not in unit}}
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on its displacement."""
         return Contribution(laws=(self._brought(),))
@@ -245,7 +243,6 @@ class LawEffect(Effect):
             self.direction, self.law, self.multiplier, self.length_multiplier, slip, contradictions=check
         )
 
-    @override
     def implausible(self, largest: Evaluate, sizes: BodySizes) -> tuple[str, ...]:
         """A traction that is negative somewhere: it pushes the body on."""
         if self.law.c4 <= 1e-9 * self.law.traction_scale:
@@ -253,7 +250,6 @@ class LawEffect(Effect):
         text = f"the law's traction falls to {-self.law.c4:.3g} N/m² at a displacement, where it does not resist but"
         return (f"{text} pushes the body on; is a sign wrong?",)
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The law's own, times its multiplier."""
         return self.law.traction_scale * largest(self.multiplier)
@@ -262,11 +258,10 @@ class LawEffect(Effect):
 class Friction(LawEffect):
     """A law of the tangential displacement: -σ_t ∈ ∂j(u_t). It also acts on lifted vertices, as in the paper."""
 
-    key: ClassVar[str] = "friction"
-    term: ClassVar[str] = "∫ j⁰(u_t; v_t - u_t) ds on Γc, vertex quadrature"
-    direction: ClassVar[Direction] = Direction.SLIP
+    key = "friction"
+    term = "∫ j⁰(u_t; v_t - u_t) ds on Γc, vertex quadrature"
+    direction = Direction.SLIP
 
-    @override
     def check(self, dimension: int) -> None:
         """In 3D the law acts on |u_t| and must be even."""
         if dimension == 3 and not self.law.even:
@@ -277,25 +272,25 @@ class Friction(LawEffect):
 class Adhesion(LawEffect):
     """A law of the opening: σ_n ∈ ∂j(-u·n). It pulls the body back; it may act with or without unilateral contact."""
 
-    key: ClassVar[str] = "adhesion"
-    term: ClassVar[str] = "∫ j⁰(-u_n; -(v_n - u_n)) ds on Γc, vertex quadrature"
-    direction: ClassVar[Direction] = Direction.OPENING
+    key = "adhesion"
+    term = "∫ j⁰(-u_n; -(v_n - u_n)) ds on Γc, vertex quadrature"
+    direction = Direction.OPENING
 
 
 class Support(LawEffect):
     """A law of the penetration (normal compliance): -σ_n ∈ ∂j(u·n). It pushes the body back."""
 
-    key: ClassVar[str] = "support"
-    term: ClassVar[str] = "∫ j⁰(u_n; v_n - u_n) ds on Γc, vertex quadrature"
-    direction: ClassVar[Direction] = Direction.PENETRATION
+    key = "support"
+    term = "∫ j⁰(u_n; v_n - u_n) ds on Γc, vertex quadrature"
+    direction = Direction.PENETRATION
 
 
 class Cohesion(LawEffect):
     """A law j = g(δ) of both modes, δ = sqrt(⟨opening⟩₊² + beta² |slip|²). Compression is contact's matter."""
 
-    key: ClassVar[str] = "cohesion"
-    term: ClassVar[str] = "∫ j⁰(u; v - u) ds on Γc, j = g(δ), δ² = ⟨-u_n⟩₊² + β² |u_t|², vertex quadrature"
-    direction: ClassVar[Direction] = Direction.SEPARATION
+    key = "cohesion"
+    term = "∫ j⁰(u; v - u) ds on Γc, j = g(δ), δ² = ⟨-u_n⟩₊² + β² |u_t|², vertex quadrature"
+    direction = Direction.SEPARATION
 
     beta: Annotated[float, Field(ge=1e-9, le=1e9)] = 1.0
     """what a slip is multiplied by beside an opening: the strength in shear is beta times that in tension, and both
@@ -335,12 +330,10 @@ class Cohesion(LawEffect):
             return None
         return mixities()[self.mixity](energy_ratio=self.energy_ratio, exponent=self.exponent)
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The law, acting on the effective displacement."""
         return Contribution(laws=(replace(self._brought(self.beta), mixity=self._criterion),))
 
-    @override
     def check(self, dimension: int) -> None:
         """The law is known for δ ≥ 0 alone, and bonds do not push apart."""
         if not self.law.even:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, SerializerFunctionWrapHandler, model_serializer
 from pydantic_core import PydanticCustomError
-from typing_extensions import override
 
 from ..errors import InputError
 from ..formula import SpatialValue
@@ -24,8 +23,8 @@ from .values import FormulaField, Listed, OneValue, Value, Vector, as_value
 class Load(Effect):
     """What acts on a boundary part by a traction; a subclass gives it."""
 
-    place: ClassVar[Place] = Place.BOUNDARY
-    drive: ClassVar[Drive] = Drive.LOAD
+    place = Place.BOUNDARY
+    drive = Drive.LOAD
 
     @abstractmethod
     def traction(self, context: FormContext, part: str) -> Any:
@@ -36,7 +35,6 @@ class Load(Effect):
             part: where it acts.
         """
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its part."""
         import ufl  # here and below: a scene is read without it
@@ -49,24 +47,21 @@ class Load(Effect):
 class Traction(Load, Listed):
     """A surface traction t (N/m²): a list of formulas, one for each component."""
 
-    key: ClassVar[str] = "traction"
-    term: ClassVar[str] = "<g, v> += ∫ t·v ds"
+    key = "traction"
+    term = "<g, v> += ∫ t·v ds"
 
     values: tuple[FormulaField, ...]
 
-    @override
     def traction(self, context: FormContext, part: str) -> Any:
         """By its components."""
         import ufl
 
         return ufl.as_vector([context.render(f) for f in self.values]) / context.number(context.stress)
 
-    @override
     def surface_load(self) -> SurfaceLoad:
         """Its components."""
         return SurfaceLoad(self.values)
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component."""
         return max(largest(f) for f in self.values)
@@ -75,11 +70,11 @@ class Traction(Load, Listed):
 class BodyForce(Listed):
     """A force per volume f (N/m³): a list of formulas, one for each component."""
 
-    key: ClassVar[str] = "force"
-    label: ClassVar[str] = "a force on the body itself"
-    place: ClassVar[Place] = Place.BODY
-    drive: ClassVar[Drive] = Drive.LOAD
-    term: ClassVar[str] = "<g, v> += ∫ f·v dx"
+    key = "force"
+    label = "a force on the body itself"
+    place = Place.BODY
+    drive = Drive.LOAD
+    term = "<g, v> += ∫ f·v dx"
 
     values: tuple[FormulaField, ...]
 
@@ -87,7 +82,6 @@ class BodyForce(Listed):
     def __init__(self, values: Vector, region: Sides | None = None) -> None:
         self._make(region, values=values)
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear form over its region."""
         import ufl
@@ -96,7 +90,6 @@ class BodyForce(Listed):
         vector = factor * ufl.as_vector([context.render(f) for f in self.values])
         return Contribution(linear=(ufl.inner(vector, context.test) * context.cells(where),))
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component times the body's length."""
         return max(largest(f) for f in self.values) * sizes.length
@@ -122,24 +115,21 @@ Component = Annotated[
 class Displacement(Listed):
     """A prescribed displacement (m): a list of formulas, one for each component. ``"free"`` prescribes nothing."""
 
-    key: ClassVar[str] = "displacement"
-    place: ClassVar[Place] = Place.BOUNDARY
-    drive: ClassVar[Drive] = Drive.KINEMATIC
-    term: ClassVar[str] = "u_i = value, by component"
+    key = "displacement"
+    place = Place.BOUNDARY
+    drive = Drive.KINEMATIC
+    term = "u_i = value, by component"
 
     values: tuple[Component, ...]
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The conditions of its components that are not free."""
         return Contribution(conditions=tuple(Condition(i, self.values[i]) for i in self.prescribed()))
 
-    @override
     def prescribed(self) -> tuple[int, ...]:
         """Indices of the components that are not free."""
         return tuple(i for i, f in enumerate(self.values) if f != "free")
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The stress of the largest component, as a strain over the body's length."""
         return max((largest(f) for f in self.values if f != "free"), default=0.0) * sizes.modulus / sizes.length
@@ -148,20 +138,17 @@ class Displacement(Listed):
 class Pressure(Load, OneValue):
     """A pressure p (N/m²) against the boundary: a number or a formula; negative: suction."""
 
-    key: ClassVar[str] = "pressure"
-    term: ClassVar[str] = "<g, v> += -∫ p v·n ds"
+    key = "pressure"
+    term = "<g, v> += -∫ p v·n ds"
 
-    @override
     def traction(self, context: FormContext, part: str) -> Any:
         """Against the normal."""
         return -context.render(self.value) / context.number(context.stress) * context.normal
 
-    @override
     def surface_load(self) -> SurfaceLoad:
         """The pressure."""
         return SurfaceLoad(pressure=self.value)
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest pressure."""
         return largest(self.value)
@@ -170,11 +157,10 @@ class Pressure(Load, OneValue):
 class _Total(Load, Listed):
     """A load that is stated as a sum over its part; one of a single number is written without brackets."""
 
-    is_sum: ClassVar[bool] = True
+    is_sum = True
 
     values: tuple[Finite, ...]
 
-    @override
     @classmethod
     def _read(cls, data: Any) -> Any:
         numbers = data if isinstance(data, list | tuple) else (data,)
@@ -191,11 +177,10 @@ class _Total(Load, Listed):
 class Force(_Total):
     """A force (N; N/m in 2D) on a part, one number for each component, spread evenly over it."""
 
-    key: ClassVar[str] = "force"
-    label: ClassVar[str] = "a force on the whole part"
-    term: ClassVar[str] = "<g, v> += ∫ F/|part| · v ds"
+    key = "force"
+    label = "a force on the whole part"
+    term = "<g, v> += ∫ F/|part| · v ds"
 
-    @override
     def traction(self, context: FormContext, part: str) -> Any:
         """The force over the area."""
         import ufl
@@ -203,12 +188,10 @@ class Force(_Total):
         scale = context.side_moments(part).area * context.stress
         return ufl.as_vector([context.number(force / scale) for force in self.values])
 
-    @override
     def spread_at(self, moments: SideMoments, points: Array) -> Array:
         """The force over the area."""
         return np.tile(np.array(self.values) / moments.area, (len(points), 1))
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component over the body's length, squared in 3D."""
         return max(map(abs, self.values)) / sizes.length ** (len(self.values) - 1)
@@ -221,22 +204,20 @@ class Moment(_Total):
     zero.
     """
 
-    key: ClassVar[str] = "moment"
-    label: ClassVar[str] = "a moment on the whole part"
-    term: ClassVar[str] = "<g, v> += ∫ (A x r)·v ds, the moment of A x r being M"
+    key = "moment"
+    label = "a moment on the whole part"
+    term = "<g, v> += ∫ (A x r)·v ds, the moment of A x r being M"
 
     @from_python
     def __init__(self, side: Sides, value: float | Sequence[float]) -> None:
         self._make(side, values=value)
 
-    @override
     def check(self, dimension: int) -> None:
         """One component in 2D, three in 3D."""
         if len(self.values) != (1 if dimension == 2 else 3):
             wanted = "one number (about z)" if dimension == 2 else "three numbers"
             raise InputError(f"moment has {len(self.values)} components; in {dimension}D it is {wanted}")
 
-    @override
     def traction(self, context: FormContext, part: str) -> Any:
         """A x r.
 
@@ -257,14 +238,12 @@ class Moment(_Total):
             return ufl.as_vector([-a[2] * r[1], a[2] * r[0]])
         return ufl.cross(ufl.as_vector(a), ufl.as_vector(r))
 
-    @override
     def spread_at(self, moments: SideMoments, points: Array) -> Array:
         """A x r."""
         d = len(moments.centroid)
         r = np.pad(points[:, :d] - moments.centroid, ((0, 0), (0, 3 - d)))
         return np.asarray(np.cross(_rotation(moments.second, self.values)[0], r)[:, :d], dtype=np.float64)
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component over the body's length squared, cubed in 3D."""
         return max(map(abs, self.values)) / sizes.length ** (2 if len(self.values) == 1 else 3)
@@ -288,17 +267,16 @@ class Temperature(OneValue):
     Strains α ΔT by the material's `thermal_expansion`; the stress is C : (ε(u) - α ΔT I).
     """
 
-    key: ClassVar[str] = "temperature"
-    label: ClassVar[str] = "a change of temperature"
-    place: ClassVar[Place] = Place.BODY
-    drive: ClassVar[Drive] = Drive.KINEMATIC
-    term: ClassVar[str] = "<g, v> += ∫ C:(α ΔT I):ε(v) dx"
+    key = "temperature"
+    label = "a change of temperature"
+    place = Place.BODY
+    drive = Drive.KINEMATIC
+    term = "<g, v> += ∫ C:(α ΔT I):ε(v) dx"
 
     @from_python
     def __init__(self, value: Value, region: Sides | None = None) -> None:
         self._make(region, value=value)
 
-    @override
     def contribute(self, context: FormContext, where: str | None) -> Contribution:
         """The linear forms over the materials of its region."""
         pairs = [(m, cells) for m, cells in _heated(context, where) if m.thermal_expansion]
@@ -320,7 +298,6 @@ class Temperature(OneValue):
         pairs = zip(material.thermal_stress() / context.stress, voigt(virtual, context.dimension), strict=True)
         return context.render(self.value) * sum(context.number(float(s)) * e for s, e in pairs if s)
 
-    @override
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """E α ΔT."""
         return sizes.modulus * sizes.expansion * largest(self.value)

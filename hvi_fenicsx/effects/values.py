@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, SerializerFunctionWrapHandler, model_serializer, model_validator
-from typing_extensions import override
 
 from ..errors import InputError
 from ..formula import Formula, SpatialValue
@@ -45,16 +44,16 @@ class PythonFunction(SpatialValue):
         self._function = function
         self.source = f"Python function {getattr(function, '__name__', type(function).__name__)}"
 
-    @override
     def at(self, points: Array) -> Array:
+        """What it returns, checked."""
         values = np.asarray(self._function(np.ascontiguousarray(points.T)))
         if values.dtype.kind not in "iuf" or values.shape not in ((), (len(points),)):
             text = f"returns {values.dtype} values {values.shape} at {len(points)} points; return real numbers, (n,)"
             raise InputError(f"{self.source}: {text}")
         return np.broadcast_to(values, (len(points),)).astype(np.float64)
 
-    @override
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        """Its interpolation."""
         from dolfinx import fem
 
         found = fem.Function(fem.functionspace(mesh, ("Lagrange", 2)))
@@ -80,8 +79,8 @@ class Expression(SpatialValue):
         self.source = f"UFL expression {textwrap.shorten(str(expression), 40, placeholder='...')}"
 
     @property
-    @override
     def everywhere(self) -> bool:
+        """Only on its own mesh."""
         return False
 
     def check_mesh(self, mesh: dmesh.Mesh) -> None:
@@ -98,8 +97,8 @@ class Expression(SpatialValue):
         if not compat.same_topology(self._mesh, mesh):
             raise InputError(_OTHER_MESH)
 
-    @override
     def at(self, points: Array) -> Array:
+        """Sampled at the nearest node."""
         from dolfinx import fem
         from scipy.spatial import cKDTree
 
@@ -113,8 +112,8 @@ class Expression(SpatialValue):
             return np.zeros(len(points))
         return np.asarray(sampled.x.array[cKDTree(known).query(points)[1]], dtype=np.float64)
 
-    @override
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
+        """Itself, or what it is at the nodes of another mesh."""
         from dolfinx import fem
 
         from .. import compat
@@ -289,7 +288,6 @@ class Listed(Bare):
     def __init__(self, side: Sides, values: Vector) -> None:
         self._make(side, values=values)
 
-    @override
     @classmethod
     def _read(cls, data: Any) -> Any:
         if isinstance(data, list | tuple):
@@ -298,14 +296,12 @@ class Listed(Bare):
             return components(data)
         raise refusal("must be a list, one entry for each component, like [1e6, 0.0]")
 
-    @override
     def fitted(self, dimension: int) -> Self:
         """With the components of a function that gives them all."""
         given = self.values[0] if len(self.values) == 1 else None
         parts = getattr(given, "components", None)
         return self if parts is None else self.model_copy(update={"values": parts(dimension)})
 
-    @override
     def check(self, dimension: int) -> None:
         """As many components as the scene has dimensions."""
         require_components(self.values, dimension, self.key)

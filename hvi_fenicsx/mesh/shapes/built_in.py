@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
@@ -100,8 +100,8 @@ class Block(DomainShape):
 class Rectangle(Block):
     """A rectangle from the origin to `size`, divided into right-diagonal triangles; sides left, right, bottom, top."""
 
-    dimension: ClassVar[int] = 2
-    normals: ClassVar[Mapping[str, int | None]] = {"left": 0, "right": 0, "bottom": 1, "top": 1}
+    dimension = 2
+    normals: ClassVar = {"left": 0, "right": 0, "bottom": 1, "top": 1}
 
     shape: Literal["rectangle"] = "rectangle"
     """the lower left corner is the origin"""
@@ -114,8 +114,8 @@ class Rectangle(Block):
 class Box(Block):
     """A box from the origin to `size`, in tetrahedra; sides left, right (x), front, back (y), bottom, top (z)."""
 
-    dimension: ClassVar[int] = 3
-    normals: ClassVar[Mapping[str, int | None]] = {
+    dimension = 3
+    normals: ClassVar = {
         **{"left": 0, "right": 0},
         **{"front": 1, "back": 1},
         **{"bottom": 2, "top": 2},
@@ -142,7 +142,7 @@ class PlaneShape(DomainShape):
         mesh_sizes: the fields that are mesh sizes.
     """
 
-    dimension: ClassVar[int] = 2
+    dimension = 2
     mesh_sizes: ClassVar[tuple[str, ...]] = ("mesh_size",)
 
     if TYPE_CHECKING:  # each shape says where it stands among its keys
@@ -202,7 +202,7 @@ class PlaneShape(DomainShape):
 class Round(PlaneShape):
     """A disk or a part of it that touches y = 0 at the origin, where its mesh may be finer."""
 
-    mesh_sizes: ClassVar[tuple[str, ...]] = ("mesh_size", "mesh_size_below")
+    mesh_sizes = ("mesh_size", "mesh_size_below")
 
     if TYPE_CHECKING:
         radius: float
@@ -227,7 +227,7 @@ class Round(PlaneShape):
 class Disk(Round):
     """A disk whose lowest point is the origin."""
 
-    normals: ClassVar[Mapping[str, int | None]] = {"lower_arc": None, "upper_arc": None}
+    normals: ClassVar = {"lower_arc": None, "upper_arc": None}
 
     shape: Literal["disk"] = "disk"
     """the centre is (0, radius); sides lower_arc, upper_arc"""
@@ -248,7 +248,7 @@ class Disk(Round):
 class HalfDisk(Round):
     """The lower half of a disk whose lowest point is the origin."""
 
-    normals: ClassVar[Mapping[str, int | None]] = {"arc": None, "top": 1}
+    normals: ClassVar = {"arc": None, "top": 1}
 
     shape: Literal["half_disk"] = "half_disk"
     """the centre is (0, radius); sides arc, top (the flat side)"""
@@ -274,7 +274,7 @@ def _check_smaller(name: str, part: tuple[float, float], size: tuple[float, floa
 class LShape(PlaneShape):
     """An L: a rectangle without a smaller rectangle at its upper right corner."""
 
-    normals: ClassVar[Mapping[str, int | None]] = {
+    normals: ClassVar = {
         **{"left": 0, "right": 0, "bottom": 1, "top": 1},
         **{"inner_right": 0, "inner_top": 1},
     }
@@ -303,7 +303,7 @@ class LShape(PlaneShape):
 class NotchedStrip(PlaneShape):
     """A rectangle with a V-shaped notch in the middle of its top side."""
 
-    normals: ClassVar[Mapping[str, int | None]] = {"left": 0, "right": 0, "bottom": 1, "top": 1, "notch": None}
+    normals: ClassVar = {"left": 0, "right": 0, "bottom": 1, "top": 1, "notch": None}
 
     shape: Literal["notched_strip"] = "notched_strip"
     """sides left, right, bottom, top (both pieces), notch (both flanks)"""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field
 
@@ -73,9 +73,9 @@ class MeshFile(FixedMesh):
     It may hold a mesh or describe one, and do nothing else: see docs/tutorial.md.
     """
 
-    dimension: ClassVar[None] = None
-    normals: ClassVar[None] = None
-    regions: ClassVar[None] = None
+    dimension = None
+    normals = None
+    regions = None
 
     shape: Literal["file"] = "file"
     """the mesh comes from a gmsh file"""
@@ -107,9 +107,9 @@ class GivenMesh(FixedMesh):
     """A mesh that exists already. It is not registered: ``shape`` is "given mesh"."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
-    dimension: ClassVar[None] = None
-    normals: ClassVar[None] = None
-    regions: ClassVar[None] = None
+    dimension = None
+    normals = None
+    regions = None
 
     given: Any = Field(exclude=True)
     """the domain, unrefined"""

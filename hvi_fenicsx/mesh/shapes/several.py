@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import (
     Field,
@@ -105,7 +105,7 @@ class PlacedShape(Table):
 class SeveralBodies(DomainShape):
     """Several bodies, ``[domain.NAME]`` each. It is not registered: ``shape`` is "set of bodies"."""
 
-    dimension: ClassVar[None] = None
+    dimension = None
     bodies: dict[str, PlacedShape]
     """by name"""
 
