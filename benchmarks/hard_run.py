@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from hvi_fenicsx.certify.certificate import Examination
 from hvi_fenicsx.errors import HviError
-from hvi_fenicsx.load_paths.following import Control, PathRun
+from hvi_fenicsx.load_paths.following import PathRun
 from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.solvers import SolveContext, SolveResult, method, quadratic
 from hvi_fenicsx.workflow import Preparation, finish
@@ -66,7 +66,7 @@ def _attempt(case: Case, data: Mapping[str, Any], method: str, late: Callable[[]
 def _followed(case: Case, data: Mapping[str, Any], prepared: Preparation, late: Callable[[], bool]) -> Record:
     """The path to the whole load: each row certified, and its end as existence says, where that is decided."""
     state = prepared.solvability.state
-    path = PathRun(prepared, PathTable()).follow(Control(interrupted=late))
+    path = PathRun(prepared, PathTable()).follow(interrupted=late)
     wanted = {"held": ("reached",), "escapes": ("escapes",)}.get(state, ("reached", "escapes"))
     about = {"rows": len(path.rows), "end": path.end, "uncertified": path.uncertified}
     if path.end not in wanted:

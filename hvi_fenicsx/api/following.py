@@ -17,7 +17,7 @@ from mpi4py import MPI
 from .. import console
 from ..errors import InputError
 from ..load_paths import path_files
-from ..load_paths.following import Control, PathRun
+from ..load_paths.following import PathRun
 from ..model import Model, PathTable, SolverTable
 from ..paths.load_path import LoadPath
 from ..report.reader import PathResult
@@ -177,7 +177,7 @@ def follow(
     prepared = check(model, comm, **solver)
     table = (prepared.scene.path or PathTable()).changed(**(path if to is None else {**path, "to": to}))
     run = PathRun(replace(prepared, scene=prepared.scene.changed(path=table)), table)
-    return ModelPath(**fields_of(run.follow(Control())), run=run)
+    return ModelPath(**fields_of(run.follow()), run=run)
 
 
 def _by_table(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

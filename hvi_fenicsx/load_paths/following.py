@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -21,25 +21,11 @@ from ..reduced import loading
 from ..reduced.condensation import Condensation
 from ..runtime.writing import Record
 from ..solvers import obstacle_force
+from ..solvers.method import never
 from ..system import existence
 from ..workflow import Preparation
 from .certifying import Certifier, StateVerdict
 from .measures import Measures
-
-
-@dataclass(frozen=True, kw_only=True)
-class Control:
-    """What a path is followed with.
-
-    Attributes:
-        keep: is given the record of each new state, on all ranks.
-        progress: is told each new row.
-        interrupted: whether to stop (collective); asked at each state, and at each step of a jump.
-    """
-
-    keep: Callable[[Record], None] = lambda record: None
-    progress: Callable[[int, PathRow], None] = lambda number, row: None
-    interrupted: Callable[[], bool] = lambda: False
 
 
 class PathRun:
@@ -61,9 +47,7 @@ class PathRun:
         states: those found so far.
     """
 
-    def __init__(
-        self, prepared: Preparation, wanted: PathTable, interrupted: Callable[[], bool] = lambda: False
-    ) -> None:
+    def __init__(self, prepared: Preparation, wanted: PathTable, interrupted: Callable[[], bool] = never) -> None:
         self.prepared, self.wanted = prepared, wanted
         system = prepared.system
         obstacle_force.refuse(system.problem, "no path is followed")
@@ -95,12 +79,18 @@ class PathRun:
         """The number of unknowns of Γc that are followed."""
         return self._condensation.problem.size
 
-    def follow(self, control: Control, known: Sequence[Record] = ()) -> LoadPath:
+    def follow(
+        self,
+        known: Iterable[Record] = (),
+        keep: Callable[[Record], None] = lambda record: None,
+        interrupted: Callable[[], bool] = never,
+    ) -> LoadPath:
         """Follow the path to its end. Collective.
 
         Args:
-            control: what it is followed with.
             known: the records of its first states, from which to go on.
+            keep: is given the record of each new state, on all ranks.
+            interrupted: whether to stop (collective); asked at each state, and at each step of a jump.
 
         Raises:
             InputError: on all ranks alike: the path cannot be followed.
@@ -108,26 +98,6 @@ class PathRun:
         # why it ends is found again
         for one in itertools.takewhile(lambda record: record["event"] != Event.END, known):
             self._take(*_state_of(one))
-        follower = self._follower(control)
-        with self.prepared.timer("solve"):
-            for state in _finite(follower.states()):
-                if follower.end is End.INTERRUPTED:
-                    break  # the last state is no event: the path goes on from the one before
-                with self.prepared.timer("certificate"):
-                    verdict = self._certifier.verdict(state, len(self.states))
-                self._take(state, verdict)
-                control.keep(_record_of(state, verdict))
-                control.progress(len(self._rows) - 1, self._rows[-1])
-        return LoadPath(
-            dimension=self.prepared.problem.scales.dimension,
-            scaled=self.scaled,
-            rows=tuple(self._rows),
-            end=str(follower.end or End.LOST),
-            reason=follower.reason,
-            examined=sum(verdict.whole for verdict in self._verdicts),
-        )
-
-    def _follower(self, control: Control) -> Follower:
         wanted = self.wanted
         options = PathOptions(
             programme=wanted.to,
@@ -137,7 +107,23 @@ class PathRun:
             **self._limits(),
         )
         resume = self.states[-1] if self.states else None
-        return Follower(self._condensation.problem, options, resume, control.interrupted)
+        follower = Follower(self._condensation.problem, options, resume, interrupted)
+        with self.prepared.timer("solve"):
+            for state in follower.states():
+                if follower.end is End.INTERRUPTED or not np.isfinite([state.factor, *state.x]).all():
+                    break  # a last state that is no event: the path goes on from the one before
+                with self.prepared.timer("certificate"):
+                    verdict = self._certifier.verdict(state, len(self.states))
+                self._take(state, verdict)
+                keep({**asdict(state), "verdict": asdict(verdict)})
+        return LoadPath(
+            dimension=self.prepared.problem.scales.dimension,
+            scaled=self.scaled,
+            rows=tuple(self._rows),
+            end=str(follower.end or End.LOST),
+            reason=follower.reason,
+            examined=sum(verdict.whole for verdict in self._verdicts),
+        )
 
     def _limits(self) -> dict[str, Any]:
         """With which factors there is an equilibrium, and with which none, where rigid motions tell. Collective.
@@ -218,29 +204,9 @@ class PathRun:
         self._condensation.free()
 
 
-def _finite(states: Iterator[PathState]) -> Iterator[PathState]:
-    """The states up to the first that is no number."""
-    return itertools.takewhile(lambda state: np.isfinite(state.factor) and bool(np.all(np.isfinite(state.x))), states)
-
-
-def _record_of(state: PathState, verdict: StateVerdict) -> Record:
-    """What the journal keeps of a state."""
-    found: dict[str, Any] = {field.name: getattr(state, field.name) for field in fields(state)}
-    found["event"] = str(state.event)
-    for name in ("place", "position", "verdict"):
-        part = verdict if name == "verdict" else found[name]
-        found[name] = None if part is None else {field.name: getattr(part, field.name) for field in fields(part)}
-    return found
-
-
 def _state_of(kept: Record) -> tuple[PathState, StateVerdict]:
     """A state and what was found of it, from its record."""
-    values = dict(kept)
-    verdict = StateVerdict(**values.pop("verdict"))
-    place, position = values.pop("place"), dict(values.pop("position"))
-    numbers = np.asarray(position.pop("numbers")).astype(np.int64)
-    return PathState(
-        **{**values, "event": Event(values["event"])},
-        place=None if place is None else EventPlace(**place),
-        position=Position(numbers=numbers, **position),
-    ), verdict
+    values = {name: value for name, value in kept.items() if name != "verdict"}
+    values |= {"event": Event(kept["event"]), "position": Position(**kept["position"])}
+    values["place"] = kept["place"] and EventPlace(**kept["place"])
+    return PathState(**values), StateVerdict(**kept["verdict"])

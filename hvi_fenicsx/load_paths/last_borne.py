@@ -52,16 +52,13 @@ def in_place_of(prepared: Preparation, failed: Solution, interrupted: Callable[[
 
 def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable[[], bool]) -> Solution:
     """The state of the largest factor below that of the whole load; else what was found. Collective."""
-    from .following import (
-        Control,
-        PathRun,  # two hundred modules, which few runs want
-    )
+    from .following import PathRun  # two hundred modules, which few runs want
 
     run = PathRun(prepared, PathTable(memory=False))
     if not run.is_straight and 2 * run.size > prepared.system.thresholds.curve_unknowns:
         run.free()
         return failed
-    path = run.follow(Control(interrupted=interrupted))
+    path = run.follow(interrupted=interrupted)
     peak = path.peak if path.rows and 0.0 < path.rows[path.peak].factor < 1.0 else None
     found = None if peak is None or path.end == End.INTERRUPTED else run.state(peak)
     run.free()

@@ -18,7 +18,7 @@ from runs import ROOT, command, hvi
 from hvi_fenicsx import prepare, read_scene
 from hvi_fenicsx.errors import Interrupted
 from hvi_fenicsx.load_paths import path_files
-from hvi_fenicsx.load_paths.following import Control, PathRun
+from hvi_fenicsx.load_paths.following import PathRun
 from hvi_fenicsx.model import PathTable
 from hvi_fenicsx.paths.load_path import LoadPath
 from hvi_fenicsx.runtime.writing import Record
@@ -64,8 +64,7 @@ def test_the_strength_of_a_short_glued_bar_and_what_the_folder_holds(tmp_path: P
 
 def follow(run: PathRun, stop: int | None = None, known: list[Record] | None = None) -> tuple[LoadPath, list[Record]]:
     kept: list[Record] = list(known or [])
-    control = Control(keep=kept.append, interrupted=lambda: stop is not None and len(kept) >= stop)
-    return run.follow(control, known or []), kept
+    return run.follow(known or [], kept.append, lambda: stop is not None and len(kept) >= stop), kept
 
 
 def test_a_path_that_is_interrupted_while_its_body_is_condensed_ends_there() -> None:

@@ -9,7 +9,6 @@ from runs import LONG_RANKS, on_ranks
 from scenes import STEEL, Table
 from unformed import difference, figures, path_run, words
 
-from hvi_fenicsx.load_paths.following import Control
 from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
 from hvi_fenicsx.reduced.factorised_stiffness import FactorisedStiffness
 
@@ -107,7 +106,7 @@ def test_rows_are_those_with_an_array(name: str) -> None:
     runs = [path_run(SCENES[name], formed=formed) for formed in (True, False)]
     kinds = [type(run._condensation.problem.elastic) for run in runs]
     assert kinds == [DenseStiffness, FactorisedStiffness]
-    one, other = (run.follow(Control()) for run in runs)
+    one, other = (run.follow() for run in runs)
     assert (other.end, other.reason) == (one.end, one.reason)
     assert words(other) == words(one)
     assert other.uncertified == 0

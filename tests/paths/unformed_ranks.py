@@ -8,13 +8,11 @@ from mpi4py import MPI
 from test_unformed_paths import QUICK, SCENES
 from unformed import figures, path_run, words
 
-from hvi_fenicsx.load_paths.following import Control
-
 
 def main() -> None:
     """Loaded, unloaded and loaded again."""
     comm = MPI.COMM_WORLD
-    path = path_run(SCENES[QUICK], formed=False, comm=comm).follow(Control())
+    path = path_run(SCENES[QUICK], formed=False, comm=comm).follow()
     found = {"end": path.end, "words": words(path), "figures": figures(path)}
     everywhere = comm.gather(found)
     if comm.rank == 0:

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from hvi_fenicsx.certify import certificate
 from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
-from hvi_fenicsx.load_paths.following import Control, PathRun
+from hvi_fenicsx.load_paths.following import PathRun
 from hvi_fenicsx.model import PathTable
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
@@ -191,7 +191,7 @@ def test_a_slender_body_that_slides_under_its_limit_load_meets_nothing_far_off()
     wide = Table.read(BENCHMARKS / "hard_wide.toml")
     (case,) = (case for case in cases(wide) if case.key == "f90687491c")
     prepared = hard_scenes.prepare(case, wide.data, "auto", MPI.COMM_SELF)
-    path = PathRun(prepared, PathTable()).follow(Control())
+    path = PathRun(prepared, PathTable()).follow()
     assert path.end == "escapes"
     assert path.uncertified == 0
     assert path.rows[-1].factor == pytest.approx(prepared.solvability.lambda_held, rel=1e-9)
@@ -223,7 +223,7 @@ def test_the_rows_of_a_tall_body_are_certified_as_they_are_written(name: str) ->
     case = Case(number=1, values=PLAIN | sharp | TALL[name], fixed=wide.data["fixed"])
     prepared = hard_scenes.prepare(case, wide.data, "auto", MPI.COMM_SELF)
     run = PathRun(prepared, PathTable())
-    path = run.follow(Control())
+    path = run.follow()
     assert len(path.rows) > 5
     assert path.uncertified == 0
     plain = [n for n, state in enumerate(run.states) if not np.any(state.memory)]
