@@ -79,7 +79,9 @@ class Certifier:
         self._system, self._condensation, self._factored = system, condensation, factored
         self._tolerance, self._remember = tolerance, remember
         self._distance = Distances(condensation.problem, remember)
-        self._whole_load, self._whole_drive = self._load(largest), self._drive(largest)
+        self._whole_drive, load = self._drive(largest), condensation.load(largest)
+        self._whole_load = max(float(np.linalg.norm(condensation.problem.load(largest))), float(load.norm()))
+        load.destroy()
 
     def verdict(self, state: PathState, number: int) -> StateVerdict:
         """What a state is found to be. Collective.
@@ -113,7 +115,8 @@ class Certifier:
 
     def _examination(self, state: PathState, u: fem.Function) -> Examination | None:
         """What the certificate of a single run says of a displacement; None: it cannot judge the state. Collective."""
-        if not _plain(state) or self._is_unloaded(state):
+        turned_back = state.memory is not None and np.any(state.memory)  # then bonds are not as the laws say
+        if turned_back or self._is_unloaded(state):
             return None
         problem = self._factored.at(state.factor)
         frozen_mixity.freeze(problem, u)
@@ -135,15 +138,13 @@ class Certifier:
             return None
         problem, factor = self._factored.at(state.factor), state.factor
         try:
-            other = refined(self._system, self._condensation, problem, self._graphs(state), factor)
+            graphs = StateOnGraphs(self._condensation.problem, self._remember, state)
+            other = refined(self._system, self._condensation, problem, graphs, factor)
         except np.linalg.LinAlgError:
             return None
-        return other.u if self._is_near(state, other) and self._is_certified(state, other) else None
-
-    def _is_near(self, state: PathState, found: Refined) -> bool:
-        """Whether the steps took out no more than rounding."""
-        change, size = (float(np.max(np.abs(x), initial=0.0)) for x in (found.x - state.x, state.x))
-        return change <= THRESHOLDS.largest_rounding * size
+        change, size = (float(np.max(np.abs(x), initial=0.0)) for x in (other.x - state.x, state.x))
+        near = change <= THRESHOLDS.largest_rounding * size  # the steps took out no more than rounding
+        return other.u if near and self._is_certified(state, other) else None
 
     def _is_certified(self, state: PathState, found: Refined) -> bool:
         """Whether forces by cell balance, and those on Γc are on the graphs. Collective."""
@@ -153,17 +154,6 @@ class Certifier:
         if judged is None:
             return self._in_balance(state, found.u, found.forces, -found.force)
         return judged.certificate.passed
-
-    def _graphs(self, state: PathState) -> StateOnGraphs:
-        return StateOnGraphs(self._condensation.problem, self._remember, state)
-
-    def _load(self, factor: float) -> float:
-        """The Euclidean norm of loads, of what prescribed displacements pull and obstacles push. Collective."""
-        felt = float(np.linalg.norm(self._condensation.problem.load(factor)))
-        load = self._condensation.load(factor)
-        found = max(felt, float(load.norm()))
-        load.destroy()
-        return found
 
     def _is_unloaded(self, state: PathState) -> bool:
         """Whether what drives the body is less than the tolerance of that in the whole programme. Collective."""
@@ -222,11 +212,6 @@ def is_examined(number: int) -> bool:
         number: of the row, from 0.
     """
     return number % (1 << (number // FIRST).bit_length()) == 0
-
-
-def _plain(state: PathState) -> bool:
-    """Whether the bonds are as the laws say: none has turned back so far."""
-    return state.memory is None or not np.any(state.memory)
 
 
 _STEPS = 3

@@ -6,7 +6,7 @@ Both are affine in them, so that no state needs the displacement of the whole bo
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
@@ -60,7 +60,7 @@ class Measures:
         self._affine = [(constants[i::2], np.ascontiguousarray(rows[i::2])) for i in range(2)]
         numbers = {dof: number for number, part in enumerate(self.parts) for dof in map(int, held[part])}
         prescribed = loading.loading_of(system, scaled).prescribed
-        self._held = [law.remembering() if remember else law for law in find(system.problem, numbers, prescribed)]
+        self._held = find(system.problem, numbers, prescribed, remember=remember)
 
     def forces(self, x: Array, factor: float, reached: tuple[float, float] = (0.0, 0.0)) -> dict[str, Array]:
         """The resultants by part, N/m or N, (d,) each.
@@ -174,7 +174,7 @@ def _arrays(found: dict[str, list[int]]) -> dict[str, Integers]:
     return {part: np.array(dofs, dtype=np.int64) for part, dofs in found.items()}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class HeldLaw:
     """One law at m such vertices, of all ranks.
 
@@ -189,10 +189,6 @@ class HeldLaw:
     parts: Integers
     forces: Array
     arguments: Array
-
-    def remembering(self) -> HeldLaw:
-        """The same of bonds that remember."""
-        return replace(self, laws=self.laws.with_memory)
 
     def on_supports(self, factor: float, reached: tuple[float, float]) -> Array:
         """The forces on the supports of the vertices, (m, d).
@@ -212,13 +208,14 @@ class HeldLaw:
         return x, 0.5 * (laws.traction(x, "left") + laws.traction(x, "right"))
 
 
-def find(problem: Problem, parts: Mapping[int, int], prescribed: Array) -> tuple[HeldLaw, ...]:
+def find(problem: Problem, parts: Mapping[int, int], prescribed: Array, *, remember: bool) -> list[HeldLaw]:
     """The laws of a problem whose argument is prescribed. Collective.
 
     Args:
         problem: the problem; laws on |u_t| in space are left out.
         parts: the number of the part whose support counts, by scalar unknown of this rank.
         prescribed: displacements, constant and scaled, zero where nothing is prescribed, (local unknowns, 2).
+        remember: whether bonds do.
     """
     found = []
     for term in problem.terms:
@@ -237,13 +234,7 @@ def find(problem: Problem, parts: Mapping[int, int], prescribed: Array) -> tuple
         numbers, forces, arguments = (np.concatenate(agree(problem.domain.mesh.comm, e)) for e in entries)
         known = numbers >= 0
         ones = np.ones(np.count_nonzero(known))
+        laws, of_known = VertexLaws(law=term.law, factors=ones, weights=ones), (numbers[known], forces[known])
         if np.any(known):
-            found.append(
-                HeldLaw(
-                    laws=VertexLaws(law=term.law, factors=ones, weights=ones),
-                    parts=numbers[known],
-                    forces=forces[known],
-                    arguments=arguments[known].T,
-                )
-            )
-    return tuple(found)
+            found.append(HeldLaw(laws.with_memory if remember else laws, *of_known, arguments[known].T))
+    return found

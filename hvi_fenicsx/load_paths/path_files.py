@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from dolfinx import fem
 
 from ..certify import certificate
 from ..model import dump_scene
@@ -73,20 +72,22 @@ def write(
     """
     comm, timer, work = folder.comm, run.prepared.timer, folder.work
     with timer("output"):
-        frames = _frames(run, path, shown_rows(path, run.wanted.states))
+        # time is the row: the factor may fall
+        shown = shown_rows(path, run.wanted.states)
+        frames = ((float(row), path.rows[row].factor, run.displacement(row)) for row in shown)
         vtk_fields.write_series(work / "displacement.pvd", run.prepared.problem, frames)
         rows = list(_contact_rows(run))
-        record = {**summary(unsolved(run.prepared)), **_outcome(path), **given}
+        outcome = {"converged": path.converged, "reason": path.headline, "exit_code": int(path.exit_code)}
+        outcome |= {"method": "path", "path": plain(path.summary())}
+        record = {**summary(unsolved(run.prepared)), **outcome, **given}
         on_root(comm, lambda: _write_on_root(folder, run, path, record, rows))
-        on_root(comm, lambda: _write_from_files(folder, path, tell, draw=draw))
+        if path.rows and draw:
+            on_root(comm, lambda: made("picture", tell, lambda: draw_pictures(work)))
+        if path.rows:
+            on_root(comm, lambda: made("report", tell, lambda: page.write_path(work)))
     record["time"] = timer.report()
     on_root(comm, lambda: write_record(work, record))
     return record
-
-
-def _frames(run: PathRun, path: LoadPath, rows: Sequence[int]) -> Iterator[tuple[float, float, fem.Function]]:
-    """Time is the row: the factor may fall."""
-    return ((float(row), path.rows[row].factor, run.displacement(row)) for row in rows)
 
 
 def _contact_rows(run: PathRun) -> Iterator[tuple[Any, ...]]:
@@ -111,22 +112,3 @@ def _write_on_root(
     if path.end == End.INTERRUPTED and (folder.target / JOURNAL).exists():
         with writing.told(work / JOURNAL):
             shutil.copyfile(folder.target / JOURNAL, work / JOURNAL)
-
-
-def _write_from_files(folder: ResultFolder, path: LoadPath, tell: Callable[[str], None], *, draw: bool) -> None:
-    """Picture and page; that one cannot be made costs a line. Rank 0 only."""
-    if path.rows and draw:
-        made("picture", tell, lambda: draw_pictures(folder.work))
-    if path.rows:
-        made("report", tell, lambda: page.write_path(folder.work))
-
-
-def _outcome(path: LoadPath) -> dict[str, Any]:
-    """What the summary of a path says in the place of a solution's."""
-    return {
-        "converged": path.converged,
-        "reason": path.headline,
-        "exit_code": int(path.exit_code),
-        "method": "path",
-        "path": plain(path.summary()),
-    }
