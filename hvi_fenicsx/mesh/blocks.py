@@ -18,13 +18,12 @@ import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from .. import compat
 from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
 from .domain import DEFAULT, Domain
-from .transfer import Numbers, Rows, Transfer, mean_rows, renumbered, weighted_rows
+from .transfer import Numbers, Rows, Transfer, renumbered, weighted_rows
 
 _AXIS_OF_SIDE = {"left": (0, 0), "right": (0, 1), "bottom": (-1, 0), "top": (-1, 1), "front": (1, 0), "back": (1, 1)}
 """Axis (-1: the last, the vertical one) and end of each named side."""
@@ -45,9 +44,7 @@ def block(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Domain
 
     def coarsening() -> tuple[Domain, Transfer]:
         assert coarser is not None
-        nested = all(2 * few == n for few, n in zip(coarser, cells, strict=True))
-        transfer = NestedGridTransfer if nested else GridTransfer
-        return block(comm, size, coarser), transfer(size, coarser)
+        return block(comm, size, coarser), GridTransfer(size, cells, coarser)
 
     return Domain(
         mesh=grid,
@@ -277,57 +274,41 @@ def _numbers_of_owner(parts: Sequence[Box], rank: int, places: Integers) -> Inte
 
 
 @dataclass(frozen=True)
-class NestedGridTransfer(Transfer):
-    """From a block of half the cells each way to a block.
+class GridTransfer(Transfer):
+    """From a block to the same block in finer cells: linear interpolation.
 
     Attributes:
         size: lengths of the block's edges, m, (d,).
-        coarser_cells: cells each way of the coarser block, (d,).
+        cells: each way of the finer block, (d,).
+        coarser_cells: each way of the coarser block, (d,).
     """
 
     size: Sequence[float]
+    cells: Sequence[int]
     coarser_cells: Sequence[int]
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """Each fine vertex is the mean of the two ends of a coarse edge. Collective.
-
-        Odd coordinates run along a coarse edge from its lower to its upper end: an axis, or the diagonal of a face or
-        of a cell.
-        """
-        near, far = points
-        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
-        place = np.rint(_grid_places(near, self.size, 2 * cells)).astype(PETSc.IntType)
-        parents = np.stack([_flat(end, cells) for end in (place // 2, (place + 1) // 2)], axis=1)
-        pairs = _numbered(parents, coarse, far, self.size, cells)
-        return mean_rows(pairs, fine.dofmap.index_map_bs)
-
-
-@dataclass(frozen=True)
-class GridTransfer(NestedGridTransfer):
-    """From a block to one of any other numbers of cells: linear interpolation."""
-
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
-        near, far = points
-        cells = np.array(self.coarser_cells, dtype=PETSc.IntType)
-        place = _grid_places(near, self.size, cells)
-        corner = np.clip(np.floor(place), 0, cells - 1).astype(PETSc.IntType)
-        within = np.clip(place - corner, 0.0, 1.0)
-        order = np.argsort(-within, axis=1)  # the path to the highest corner takes the largest coordinate first
-        falling = np.pad(np.take_along_axis(within, order, axis=1), ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
-        ways = np.pad(np.cumsum(np.eye(len(cells), dtype=PETSc.IntType)[order], axis=1), ((0, 0), (1, 0), (0, 0)))
-        at = _flat((corner[:, None] + ways).reshape(-1, len(cells)), cells).reshape(falling[:, 1:].shape)
-        numbers = _numbered(at, coarse, far, self.size, cells)
-        return weighted_rows(numbers, -np.diff(falling, axis=1), fine.dofmap.index_map_bs)
+        cells = np.array(self.coarser_cells)
+        near, far = (_grid_places(p, self.size, n) for p, n in zip(points, (self.cells, cells), strict=True))
+        if np.array_equal(2 * cells, self.cells):  # the mean of the ends of an edge, of whatever direction
+            ends, weights = np.stack([near // 2, (near + 1) // 2], axis=1), np.full((len(near), 2), 0.5)
+        else:
+            ends, weights = _in_simplices(near * cells / np.array(self.cells), cells)
+        own = _flat(far[: coarse.dofmap.index_map.size_local], cells)
+        return weighted_rows(renumbered(coarse, own, _flat(ends, cells)), weights, fine.dofmap.index_map_bs)
 
 
-def _grid_places(points: Array, size: Sequence[float], cells: Numbers) -> Array:
-    """Grid coordinates of points, (n, d)."""
-    return np.asarray(points[:, : len(size)] * (cells / np.array(size)))
+def _in_simplices(places: Array, cells: Integers) -> tuple[Integers, Array]:
+    """The corners (n, d+1, d) of the grid's simplices that hold places, and the weights of these, (n, d+1)."""
+    corner = np.minimum(places.astype(np.int64), cells - 1)
+    within = places - corner
+    order = np.argsort(-within, axis=1)  # the path to the highest corner takes the largest coordinate first
+    falling = np.pad(np.take_along_axis(within, order, axis=1), ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
+    ways = np.pad(np.cumsum(np.eye(len(cells), dtype=np.int64)[order], axis=1), ((0, 0), (1, 0), (0, 0)))
+    return corner[:, None] + ways, -np.diff(falling, axis=1)
 
 
-def _numbered(flat: Numbers, space: fem.FunctionSpace, points: Array, size: Sequence[float], cells: Numbers) -> Numbers:
-    """PETSc's (block) numbers of grid vertices, which any rank may have. Collective."""
-    start, end = space.dofmap.index_map.local_range
-    own = np.rint(_grid_places(points[: end - start], size, cells)).astype(PETSc.IntType)
-    return renumbered(space, _flat(own, np.asarray(cells, dtype=np.int64)), flat)
+def _grid_places(points: Array, size: Sequence[float], cells: Sequence[int] | Numbers) -> Integers:
+    """Grid coordinates of vertices of a grid, (n, d)."""
+    return np.rint(points[:, : len(size)] * (np.array(cells) / np.array(size))).astype(np.int64)

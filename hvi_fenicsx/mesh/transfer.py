@@ -16,6 +16,7 @@ import numpy.typing as npt
 from dolfinx import fem, geometry
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy import sparse
 
 from .. import compat
 from ..geometry import ROUNDING
@@ -57,9 +58,7 @@ class Transfer(ABC):
         """
         near, far = points or (nodes.points(fine), nodes.points(coarse))
         rows = self.rows(fine, coarse, (near[: fine.dofmap.index_map.size_local], far))
-        # The rows are used in place: PETSc would insert them one by one.
-        used = rows if fine.mesh.comm.size == 1 else _split(*rows, coarse)
-        matrix = PETSc.Mat().createAIJWithArrays((_sizes(fine), _sizes(coarse)), used, comm=fine.mesh.comm)
+        matrix = PETSc.Mat().createAIJ((_sizes(fine), _sizes(coarse)), csr=rows, comm=fine.mesh.comm)
         matrix.assemble()
         return matrix
 
@@ -78,55 +77,32 @@ class ParentCellTransfer(Transfer):
     halves: Halves
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """Each fine vertex is the mean of two vertices of its parent cell; at degree 2, its function there. Local."""
-        if nodes.degree(coarse) == 1:
-            return mean_rows(self._parent_vertices(fine, coarse), fine.dofmap.index_map_bs)
-        return self._function_rows(fine, coarse)
-
-    def _function_rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
-        """The rows of the functions of the parent cells, in the bases of the two spaces."""
-        kinds, kind = np.unique(self.halves, axis=0, return_inverse=True)
+        """The functions of the parent cells, in the bases of the two spaces. Local."""
+        code = self.halves.reshape(len(self.halves), -1) @ 3 ** np.arange(self.halves[:1].size)
+        _, first, kind = np.unique(code, return_index=True, return_inverse=True)
         near, far = (space.ufl_element().sub_elements[0] for space in (fine, coarse))
         places = nodes.reference_points(fine)
-        inside = 0.5 * np.einsum("nv,kvc->knc", places, kinds)[:, :, 1:]
+        inside = 0.5 * np.einsum("nv,kvc->knc", places, self.halves[first])[:, :, 1:]
         values = far.tabulate(0, inside.reshape(-1, inside.shape[2]))[0].reshape(*inside.shape[:2], -1)
         weights = np.linalg.solve(near.tabulate(0, places[:, 1:])[0], values)
         weights[np.abs(weights) < ROUNDING] = 0.0
-        own, owned = fine.dofmap.list[: len(self.parents)], fine.dofmap.index_map.size_local
+        owned = fine.dofmap.index_map.size_local
         cell, number = np.empty(owned, dtype=np.int64), np.empty(owned, dtype=np.int64)
-        for k, column in enumerate(own.T):
+        for k, column in enumerate(fine.dofmap.list[: len(self.parents)].T):
             here = np.flatnonzero(column < owned)
             cell[column[here]], number[column[here]] = here, k
         numbers = coarse.dofmap.index_map.local_to_global(coarse.dofmap.list[self.parents[cell]].ravel())
-        shape = (owned, values.shape[2])
-        return weighted_rows(numbers.reshape(shape), weights[kind.ravel()[cell], number], fine.dofmap.index_map_bs)
-
-    def _parent_vertices(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Numbers:
-        """The two coarse vertices (global) whose mean each owned fine vertex is; one twice for a coarse one."""
-        corners = self.halves.shape[1]
-        halves = self.halves.reshape(-1, corners)
-        ends = np.argmax(halves > 0, axis=1), corners - 1 - np.argmax(halves[:, ::-1] > 0, axis=1)
-        parent_dofs = coarse.dofmap.list[self.parents].repeat(corners, axis=0)
-        row = np.arange(len(parent_dofs))
-        found = np.column_stack([parent_dofs[row, end] for end in ends]).astype(np.int32)
-        vertices, owned = fine.dofmap.list[: len(self.parents)].ravel(), fine.dofmap.index_map.size_local
-        local = np.empty((owned, 2), dtype=np.int32)
-        local[vertices[vertices < owned]] = found[vertices < owned]
-        numbers = coarse.dofmap.index_map.local_to_global(local.ravel())
-        return np.asarray(numbers, dtype=PETSc.IntType).reshape(-1, 2)
+        return weighted_rows(numbers.reshape(owned, -1), weights[kind[cell], number], fine.dofmap.index_map_bs)
 
 
 class DegreeTransfer(Transfer):
-    """From degree 1 to degree 2 on one mesh: exact, and the same for all bases whose linear functions are nodal."""
+    """From degree 1 to degree 2 on one mesh: exact."""
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """Each node is the mean of the ends of its edge; a vertex is itself. Local."""
-        corners = coarse.dofmap.list.shape[1]
-        vertex = np.zeros(len(nodes.points(fine)), dtype=np.int32)
-        vertex[fine.dofmap.list[:, :corners]] = coarse.dofmap.list
-        ends = vertex[nodes.edge_ends(fine)[: fine.dofmap.index_map.size_local]]
-        numbers = coarse.dofmap.index_map.local_to_global(ends.ravel())
-        return mean_rows(np.asarray(numbers, dtype=PETSc.IntType).reshape(-1, 2), fine.dofmap.index_map_bs)
+        """The functions of degree 1, in the basis of degree 2. Local."""
+        count, corners = coarse.dofmap.list.shape
+        itself = np.broadcast_to(2 * np.eye(corners, dtype=np.int8), (count, corners, corners))
+        return ParentCellTransfer(np.arange(count, dtype=np.int32), itself).rows(fine, coarse, points)
 
 
 @dataclass(frozen=True)
@@ -157,38 +133,15 @@ def weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
 
     Args:
         numbers: block columns, (n, k).
-        weights: of these, (n, k).
+        weights: of these, (n, k); zeros are left out.
         d: components.
     """
-    order = np.argsort(numbers, axis=1)
-    columns = np.take_along_axis(numbers, order, axis=1)[:, None, :] * d + np.arange(d)[None, :, None]
-    start = np.arange(0, columns.size + 1, numbers.shape[1])
-    values = np.broadcast_to(np.take_along_axis(weights, order, axis=1)[:, None, :], columns.shape).ravel()
-    return start.astype(PETSc.IntType), columns.ravel().astype(PETSc.IntType), values
-
-
-def mean_rows(pairs: Numbers, d: int) -> Rows:
-    """Compressed rows of the matrix that takes the mean of each pair of block columns, component by component.
-
-    Args:
-        pairs: block columns, (n, 2); one twice for itself.
-        d: components.
-    """
-    low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])
-    entries = np.repeat(1 + (low < high).astype(np.int8), d)
-    start = np.concatenate([[0], np.cumsum(entries)]).astype(PETSc.IntType)
-    columns, component = np.empty(start[-1], PETSc.IntType), np.arange(d, dtype=PETSc.IntType)
-    columns[start[:-1]] = (low[:, None] * d + component).ravel()
-    columns[start[1:] - 1] = (high[:, None] * d + component).ravel()
-    return start, columns, np.repeat(1.0 / entries, entries)
-
-
-def _split(start: Numbers, columns: Numbers, values: Array, coarse: fem.FunctionSpace) -> tuple[Rows, Rows]:
-    """Compressed rows as PETSc stores them on several ranks: this rank's columns, from its first on, and all others."""
-    first, last = (end * coarse.dofmap.index_map_bs for end in coarse.dofmap.index_map.local_range)
-    own = (columns >= first) & (columns < last)
-    before = np.concatenate([[0], np.cumsum(own)])[start].astype(PETSc.IntType)
-    return (before, columns[own] - PETSc.IntType(first), values[own]), (start - before, columns[~own], values[~own])
+    n, k = numbers.shape
+    sums = sparse.csr_array((weights.ravel(), numbers.ravel(), np.arange(0, n * k + 1, k, dtype=numbers.dtype)))
+    sums.sum_duplicates()
+    sums.eliminate_zeros()
+    whole = sparse.kron(sums, sparse.identity(d), format="csr")
+    return whole.indptr.astype(PETSc.IntType), whole.indices.astype(PETSc.IntType), whole.data
 
 
 def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:

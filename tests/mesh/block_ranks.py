@@ -10,14 +10,14 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from hvi_fenicsx.mesh import blocks
-from hvi_fenicsx.mesh.blocks import NestedGridTransfer
+from hvi_fenicsx.mesh.blocks import GridTransfer
 
 
 def main() -> None:
     """By rank: its cells, and of its vertices with values from another rank how many cells they lie from a cut."""
     coarser = [n // 2 for n in CELLS]
     fine, coarse = (fem.functionspace(blocks.mesh(COMM, SIZE, n), ("Lagrange", 1, (2,))) for n in (CELLS, coarser))
-    columns = NestedGridTransfer(SIZE, coarser).prolongation(fine, coarse)
+    columns = GridTransfer(SIZE, CELLS, coarser).prolongation(fine, coarse)
     indptr, found, _ = columns.getValuesCSR()
     first, last = columns.getOwnershipRangesColumn()[COMM.rank : COMM.rank + 2]
     foreign = np.add.reduceat((found < first) | (found >= last), indptr[:-1]) > 0
