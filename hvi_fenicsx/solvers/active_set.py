@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from ..compat import NOT_A_NUMBER
 from ..runtime.cost import Timer
-from ..system.equations import LawModel
+from ..system.equations import VertexModel
 from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.multigrid import Levels
 from ..system.petsc_options import default_options, prefix, raise_python_error
@@ -58,7 +58,7 @@ class Attempt:
         foundation: as in :meth:`.Equations.tangents`; the residual has none, so the solution is the same.
     """
 
-    models: Sequence[LawModel]
+    models: Sequence[VertexModel]
     line_search: str = FULL_STEPS
     start: PETSc.Vec | None = None
     steady: bool = False
@@ -133,7 +133,7 @@ class ActiveSetSolver:
         """
         return self.convergence.sizes(x, residual, lower, upper).worst
 
-    def newton_step(self, x: PETSc.Vec, held: Entities, models: Sequence[LawModel], rtol: float) -> Outcome:
+    def newton_step(self, x: PETSc.Vec, held: Entities, models: Sequence[VertexModel], rtol: float) -> Outcome:
         """One Newton step that leaves some unknowns as they are. Collective.
 
         Args:
@@ -220,7 +220,7 @@ class ActiveSetSolver:
             return found
 
     def judged(
-        self, found: Outcome, x: PETSc.Vec, models: Sequence[LawModel], tolerance: float, bounds: Bounds
+        self, found: Outcome, x: PETSc.Vec, models: Sequence[VertexModel], tolerance: float, bounds: Bounds
     ) -> Outcome:
         """The outcome of a solve: converged if the residual at x is small, or as small as rounding allows. Collective.
 
@@ -235,7 +235,7 @@ class ActiveSetSolver:
         return self.convergence.accept_rounding(found, sizes, x, tolerance)
 
     def _measured(
-        self, found: Outcome, x: PETSc.Vec, models: Sequence[LawModel], tolerance: float, bounds: Bounds
+        self, found: Outcome, x: PETSc.Vec, models: Sequence[VertexModel], tolerance: float, bounds: Bounds
     ) -> tuple[Outcome, Sizes]:
         self.system.evaluate_by_cells(x)
         self.system.equations.residual(x, self._residual, models)

@@ -27,7 +27,6 @@ from ..paths.vertex_laws import is_straight
 from ..reduced.condensation import Condensation
 from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking
-from ..system.equations import VertexModel
 from ..system.system import System
 from . import continuation
 from .branch import BranchIteration
@@ -195,16 +194,13 @@ class Auto(BranchIteration):
 
         The bonds are as they are at rest, then unbroken.
         """
-        rested = at_rest(self.context, self._laws, self._majorants, self.thresholds.coarse_tolerance)
+        rested = at_rest(self.solver, self._laws)
         if rested is None:
             return
         unbroken = rested[0].duplicate()
         unbroken.set(0.0)
         for bonds in (rested[0], unbroken):
             yield from self._attempt(self._iteration().solve, rested[0], bonds)
-
-    def _majorants(self, x: PETSc.Vec) -> list[VertexModel]:
-        return self._convex.majorants(self._convex.cells(x), self._convex.subgradients(x))
 
     def _iteration(self) -> BranchIteration:
         """A branch iteration in the same context, on the same laws."""

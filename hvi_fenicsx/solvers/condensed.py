@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 
 from ..errors import InputError
-from ..system.equations import LawModel, VertexModel
+from ..system.equations import VertexModel
 from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
 from ..system.system import System
@@ -195,7 +195,7 @@ def _kept(system: System) -> Integers:
 class _Complementarity:
     """lower ≤ x ≤ upper ⟂ F(x) = S x - q + law, as Φ(x) = 0."""
 
-    def __init__(self, schur: _Schur, models: Sequence[LawModel]) -> None:
+    def __init__(self, schur: _Schur, models: Sequence[VertexModel]) -> None:
         self.schur, self.models, self.system = schur, models, schur.system
         self._residual = self.system.load.duplicate()
 

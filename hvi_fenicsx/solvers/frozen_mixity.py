@@ -52,9 +52,8 @@ def settled(task: SolveTask, found: LevelSolution) -> LevelSolution:
             break
         for term, energies in zip(found.system.terms, anew, strict=True):
             term.freeze(energies)
-        start = fem.Function(found.result.u.function_space)
-        start.x.array[:] = found.result.u.x.array * found.system.problem.scales.displacement
-        found = nested_iteration.solve_from_displacement(task, found.system, start)
+        first = found.system.unknowns(found.result.u)
+        found = nested_iteration.solve_from(task, found.system, first, found.levels)
         counts.add(found.result.counts)
     return replace(found, result=replace(found.result, counts=counts))
 

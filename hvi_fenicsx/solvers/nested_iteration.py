@@ -169,25 +169,26 @@ def solve_from_displacement(task: SolveTask, system: System, u: fem.Function) ->
     Raises:
         SolverError: a convex step raised the energy.
     """
-    if not choose(task.options, system).takes_start:
-        return solve(task, system)
     first = system.unknowns(u)
     first.scale(1.0 / system.problem.scales.displacement)
-    return solve_from(task, system, coarser_levels(task, system), first)
+    return solve_from(task, system, first)
 
 
-def solve_from(task: SolveTask, system: System, levels: Levels, first: PETSc.Vec) -> LevelSolution:
+def solve_from(task: SolveTask, system: System, first: PETSc.Vec, levels: Levels | None = None) -> LevelSolution:
     """Solve a system from unknowns near its solution, and where that fails from the coarse meshes. Collective.
 
     Args:
-        task: what is solved, by a method that takes a start.
+        task: what is solved.
         system: assembled.
-        levels: its coarser levels.
-        first: the unknowns, changed in place.
+        first: the unknowns, changed in place; not used by a method that takes no start.
+        levels: its coarser levels; None where they are not known.
     """
-    make_admissible(first, system)
-    found = _solved(task, system, levels, first)
-    return found if found.result.converged or found.result.interrupted else solve(task, system)
+    if choose(task.options, system).takes_start:
+        make_admissible(first, system)
+        found = _solved(task, system, coarser_levels(task, system) if levels is None else levels, first)
+        if found.result.converged or found.result.interrupted:
+            return found
+    return solve(task, system)
 
 
 def coarser_levels(task: SolveTask, system: System) -> Levels:

@@ -25,7 +25,6 @@ from . import nested_iteration
 from .convergence import Counts
 from .method import SolveTask
 from .nested_iteration import CoarseStart, LevelSolution
-from .quadratic import choose
 
 _LOG = logger("solvers")
 _MOST = 60
@@ -192,8 +191,8 @@ class ObstacleForceSolve:
             return nested_iteration.solve_from_coarser(self._task, system, start)
         effects = [(where, effect.obstacle_moved(metres)) for where, effect in self._task.model.effects]
         task = replace(self._task, model=replace(self._task.model, effects=effects))
-        if isinstance(start, LevelSolution) and choose(task.options, system).takes_start:
-            return nested_iteration.solve_from(task, system, start.levels, system.unknowns(start.result.u))
+        if isinstance(start, LevelSolution):
+            return nested_iteration.solve_from(task, system, system.unknowns(start.result.u), start.levels)
         if isinstance(start, fem.Function):
             return nested_iteration.solve_from_displacement(task, system, start)
         return nested_iteration.solve(task, system)

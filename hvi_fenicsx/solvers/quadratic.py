@@ -6,17 +6,17 @@ With contact it is a convex quadratic programme with bounds on u·n: one SNES VI
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..system.equations import VertexModel
 from ..system.system import System
-from .active_set import ENERGY, EXACT, Attempt
+from .branch import BranchIteration
 from .convergence import Counts, Outcome
 from .method import Method, SolveResult, SolverTable, find
-from .resting_start import at_rest, resting_start
+from .resting_start import at_rest
 
 
 def is_equation(system: System) -> bool:
@@ -59,55 +59,28 @@ class LinearSolve(Method):
         return self.solver.judged(step, x, models, self.options.tolerance, bounds)
 
 
-class ConvexProgramme(Method):
-    """The quadratic programme on one system; call :meth:`solve` once."""
+class ConvexProgramme(BranchIteration):
+    """The quadratic programme on one system, one convex step; call :meth:`solve` once."""
 
     name = "convex"
     description = "one convex quadratic programme by SNES VI (reduced space)"
-    takes_start = True
     in_scenes = False
 
-    def solve(self, start: PETSc.Vec | None = None) -> SolveResult:
+    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> SolveResult:
         """The minimiser, or what was reached. Collective.
 
         Args:
-            start: where to begin; by default with contact closed.
+            start: where to begin; by default with contact closed, then with bodies at rest on their supports.
+            branches: as of :meth:`.BranchIteration.solve`.
         """
-        counts = Counts()
-        if start is None:
-            x, counts.linear = resting_start(self.solver, [term.law for term in self.system.terms])
-        else:
-            x = start.copy()
-        with self.solver.reporting(self._progress):
-            outcome = self._minimise(x, counts)
-        return self.result(x, outcome, counts, steady=counts.newton <= 1)
+        found = super().solve(start)
+        if found.converged or found.interrupted:
+            return found
+        rested = at_rest(self.solver, self._laws)
+        return found if rested is None else super().solve(rested[0])
 
-    def _progress(self, iteration: int, residual: float, contact: int) -> None:
-        self.context.tell(self.name, None, iteration, residual, contact)
-
-    def _minimise(self, x: PETSc.Vec, counts: Counts) -> Outcome:
-        """Attempts until one converges, from and into x; the outcome of the best one. Collective."""
-        bounds = self.system.lower, self.system.upper
-        tolerance, most = self.options.tolerance, self.options.max_iterations
-        return self.solver.first_success(x, self._attempts(counts), tolerance, bounds, counts, most)
-
-    def _attempts(self, counts: Counts) -> Iterator[Attempt]:
-        """From the start, then from bodies at rest on their supports."""
-        models = [VertexModel(term.law) for term in self.system.terms]
-        yield Attempt(models=models, steady=self.context.steady)
-        yield Attempt(models=models, start=self._from_rest(models, counts))
-        yield Attempt(models=models, line_search=EXACT, foundation=self.system.thresholds.foundation)
-        yield Attempt(models=models, line_search=ENERGY)
-
-    def _from_rest(self, models: list[VertexModel], counts: Counts) -> PETSc.Vec | None:
-        """The displacement of bodies at rest on their supports; None where there is none."""
-        rtol = min(self.system.thresholds.coarse_tolerance, self.options.tolerance)
-        laws = [term.law for term in self.system.terms]
-        rested = at_rest(self.context, laws, lambda _: models, rtol)
-        if rested is None:
-            return None
-        counts.linear += rested[1]
-        return rested[0]
+    def _tolerances(self) -> list[float]:
+        return [self.options.tolerance]
 
 
 def choose(options: SolverTable, system: System) -> type[Method]:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..laws import Superpotential
-from ..problem.law_term import LawTerm
 from ..rigid import OneSidedSupports, RestingPosition, least_energy
 from ..rigid.motions import DEFAULT as RIGID
 from ..runtime.mpi import agree
 from ..system import existence, rigid_motions
-from ..system.equations import Cells, LawModel, TangentAtRest, VertexModel
+from ..system.equations import Cells, VertexModel
 from ..system.system import System
-from ..typing import Array, Integers
+from ..typing import Array, Entities, Integers
 from .active_set import ActiveSetSolver
-from .method import SolveContext
 
 
 def contact_dofs(system: System) -> Integers:
@@ -46,49 +43,34 @@ def resting_start(
     Returns:
         The displacement, and iterations of the linear solver.
     """
-    rtol = solver.system.thresholds.loose if rtol is None else rtol
     system = solver.system
+    rtol = system.thresholds.loose if rtol is None else rtol
     contact = contact_dofs(system)
     bodies = system.problem.bodies.labels[contact // system.problem.scales.dimension]
     closing = contact[system.references.driven[bodies]]
-    x = _closed_contact(system, closing)
-    models, kinks = _held_by_laws(solver, laws, x)
-    held = np.setdiff1d(np.union1d(contact, kinks), system.problem.fixed).astype(np.int32)
+    x = system.undisplaced()
+    x.array[closing] = closed(system.lower.array_r[closing], system.upper.array_r[closing])
+    if moves := motions(system, contact_closed=True):
+        settle(system, laws, x, moves)
+        held, models = _held(system, laws, x, contact), unbroken(system, laws, x)
+    else:
+        held = np.setdiff1d(contact, system.problem.fixed).astype(np.int32)
+        models = [
+            VertexModel(law, xi=law.concave.left(np.zeros_like(term.weights)))
+            for term, law in zip(system.terms, laws, strict=True)
+        ]
     linear = solver.newton_step(x, held, models, rtol).linear
     if _push_onto_bounds(solver, x, closing, models):
         linear += solver.newton_step(x, held, models, rtol).linear
     return x, linear
 
 
-def _held_by_laws(
-    solver: ActiveSetSolver, laws: Sequence[Superpotential], x: PETSc.Vec
-) -> tuple[Sequence[LawModel], Integers]:
-    """Move x to where the laws hold what closed contact leaves free. Collective.
-
-    Returns:
-        What takes the place of the laws in the elastic step from there, by term, and the scalar dofs (local, owned) of
-        slips at convex kinks.
-    """
-    system, at_rest = solver.system, [TangentAtRest(law) for law in laws]
-    moves = motions(system, contact_closed=True)
-    if not moves:
-        return at_rest, np.empty(0, np.int64)
-    settled = settle(system, laws, x, moves) is not None
-    kinks = at_kinks(system, laws, x, RIGID.touching)
-    return models(solver, laws, x) if settled else at_rest, kinks
+def _held(system: System, laws: Sequence[Superpotential], x: PETSc.Vec, bearing: Integers) -> Entities:
+    """The unknowns that a linear solve holds: those that bear the load, and those at kinks, where x is put exactly."""
+    return np.setdiff1d(np.union1d(bearing, at_kinks(system, laws, x)), system.problem.fixed).astype(np.int32)
 
 
-def _closed_contact(system: System, contact: Integers) -> PETSc.Vec:
-    """A new x: some contact closed, the prescribed values, and zero elsewhere. Collective."""
-    x = system.load.duplicate()
-    x.set(0.0)
-    low, high = system.lower.array_r, system.upper.array_r
-    x.array[contact] = closed(low[contact], high[contact])
-    system.prescribe(x)
-    return x
-
-
-def _push_onto_bounds(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, models: Sequence[LawModel]) -> bool:
+def _push_onto_bounds(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, models: Sequence[VertexModel]) -> bool:
     """Bilateral contact: move vertices between two bounds onto the one that the reaction points to. Collective.
 
     Nothing holds a vertex between its bounds, and the body could slide. Returns whether a vertex was moved.
@@ -116,34 +98,24 @@ def closed(lower: Array, upper: Array) -> Array:
     return np.where(both, np.clip(0.0, lower, upper), one)
 
 
-def at_rest(
-    context: SolveContext,
-    laws: Sequence[Superpotential],
-    models: Callable[[PETSc.Vec], Sequence[LawModel]],
-    rtol: float,
-) -> tuple[PETSc.Vec, int] | None:
+def at_rest(solver: ActiveSetSolver, laws: Sequence[Superpotential]) -> tuple[PETSc.Vec, int] | None:
     """The displacement of bodies at rest on their supports, and iterations of the linear solver. Collective.
 
     Args:
-        context: the system and its solver.
+        solver: of the linear solve.
         laws: what is solved, by term.
-        models: what takes the place of the laws in the elastic step from a displacement, by term.
-        rtol: relative tolerance of the linear solve.
 
     Returns:
         None where nothing holds the bodies, or no rigid motion is left.
     """
-    system = context.system
-    moves = motions(system, contact_closed=False)
-    x = system.undisplaced()
-    if not moves:
-        return None
-    bearing = _rest(system, laws, x, moves)
+    system = solver.system
+    x, moves = system.undisplaced(), motions(system, contact_closed=False)
+    bearing = _rest(system, laws, x, moves) if moves else None
     if bearing is None:
         return None
-    kinks = at_kinks(system, laws, x, RIGID.touching)
-    held = np.setdiff1d(np.union1d(bearing, kinks), system.problem.fixed).astype(np.int32)
-    return x, context.solver.newton_step(x, held, models(x), rtol).linear
+    held = _held(system, laws, x, bearing)
+    models = unbroken(system, laws, x)
+    return x, solver.newton_step(x, held, models, system.thresholds.coarse_tolerance).linear
 
 
 def _rest(system: System, laws: Sequence[Superpotential], x: PETSc.Vec, moves: Sequence[PETSc.Vec]) -> Integers | None:
@@ -177,66 +149,41 @@ def motions(system: System, *, contact_closed: bool) -> list[PETSc.Vec]:
     return [system.unknowns(field) for field in rigid_motions.fields(system.problem, modes)]
 
 
-def models(solver: ActiveSetSolver, laws: Sequence[Superpotential], x: PETSc.Vec) -> list[LawModel]:
-    """What takes the place of the laws in the elastic step from a rigid position: their secants, unbroken, by term.
-
-    Args:
-        solver: of that step.
-        laws: what is solved, by term.
-        x: the rigid position.
-    """
-    return [replace(m, secant_from=m.law.length_scale) for m in unbroken(solver.system, laws, x)]
-
-
 def unbroken(system: System, laws: Sequence[Superpotential], x: PETSc.Vec) -> list[VertexModel]:
-    """H - ξ with unbroken bonds, by term, each vertex in the cell that holds it.
+    """What takes the place of the laws in the elastic step from a rigid position: their secants, unbroken, by term.
 
     Args:
         system: the assembled problem.
         laws: what is solved, by term.
-        x: the displacement.
+        x: the rigid position; each vertex is in the cell that holds it.
     """
     found = []
     for term, law in zip(system.terms, laws, strict=True):
         a = term.argument(x.array_r)
         cells = Cells.around(law.convex, a, radial=term.radial)
-        found.append(VertexModel(law, cells, law.concave.left(np.zeros_like(a))))
+        found.append(VertexModel(law, cells, law.concave.left(np.zeros_like(a)), law.length_scale))
     return found
 
 
-class _LawEnergy:
-    """The energies of unbroken laws over rigid motions of a displacement.
+def _law_energy(
+    system: System, laws: Sequence[Superpotential], x: PETSc.Vec, moves: Sequence[PETSc.Vec]
+) -> Callable[[Array], tuple[Array, Array]]:
+    """The energies of unbroken laws over rigid motions of a displacement, and subgradients, for least_energy."""
+    slips = [(t.slip(x.array_r), np.stack([t.slip(m.array_r) for m in moves], axis=-1)) for t in system.terms]
 
-    Args:
-        system: the assembled problem.
-        laws: what is solved, by term.
-        x: the displacement.
-        moves: the motions.
-    """
+    def energy(amplitudes: Array) -> tuple[Array, Array]:
+        found = np.zeros((len(slips), 1 + len(moves)))
+        for row, term, law, (still, moved) in zip(found, system.terms, laws, slips, strict=True):
+            slip = still + moved @ amplitudes
+            argument = term.argument_of(slip)
+            xi = law.concave.left(np.zeros_like(argument))
+            force = (term.weights * (law.convex.right(argument) - xi))[:, None] * term.gradient(slip)
+            row[0] = term.energy_weights @ (law.convex.value(argument) - xi * argument)
+            row[1:] = np.einsum("mr,mrk->k", force, moved)
+        system.comm.Allreduce(MPI.IN_PLACE, found)
+        return found[:, 0], found[:, 1:]
 
-    def __init__(
-        self, system: System, laws: Sequence[Superpotential], x: PETSc.Vec, moves: Sequence[PETSc.Vec]
-    ) -> None:
-        self._comm, self._laws, self._terms, self._count = system.comm, laws, system.terms, len(moves)
-        self._slips = [t.slip(x.array_r) for t in system.terms]
-        self._moves = [np.stack([t.slip(m.array_r) for m in moves], axis=-1) for t in system.terms]
-
-    def __call__(self, amplitudes: Array) -> tuple[Array, Array]:
-        """Values (p,) and subgradients (p, k) at amplitudes (k,). Collective."""
-        values, slopes = np.zeros(len(self._terms)), np.zeros((len(self._terms), self._count))
-        for p, (term, law) in enumerate(zip(self._terms, self._laws, strict=True)):
-            values[p], slopes[p] = self._of_term(term, law, p, amplitudes)
-        self._comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
-        self._comm.Allreduce(MPI.IN_PLACE, slopes, op=MPI.SUM)
-        return values, slopes
-
-    def _of_term(self, term: LawTerm, law: Superpotential, p: int, amplitudes: Array) -> tuple[float, Array]:
-        slip = self._slips[p] + self._moves[p] @ amplitudes
-        argument = term.argument_of(slip)
-        xi, weights = law.concave.left(np.zeros_like(argument)), term.weights
-        force = (weights * (law.convex.right(argument) - xi))[:, None] * term.gradient(slip)
-        energy = term.energy_weights @ (law.convex.value(argument) - xi * argument)
-        return float(energy), np.einsum("mr,mrk->k", force, self._moves[p])
+    return energy
 
 
 def settle(
@@ -260,23 +207,22 @@ def settle(
     """
     work = np.array([-float(system.load.dot(move)) for move in moves])
     sides = OneSidedSupports(np.zeros((0, len(moves))), np.zeros(0)) if sides is None else sides
-    found = least_energy(system.comm, work, _LawEnergy(system, laws, x, moves), sides)
+    found = least_energy(system.comm, work, _law_energy(system, laws, x, moves), sides)
     if found is not None:
         for amplitude, move in zip(found.amplitudes, moves, strict=True):
             x.axpy(float(amplitude), move)
     return found
 
 
-def at_kinks(system: System, laws: Sequence[Superpotential], x: PETSc.Vec, near: float) -> Integers:
+def at_kinks(system: System, laws: Sequence[Superpotential], x: PETSc.Vec) -> Integers:
     """Scalar dofs (local, owned) of slips at a convex kink of their law, and x put exactly there.
 
     Args:
         system: the assembled problem.
         laws: what is solved, by term.
         x: the displacement, changed in place.
-        near: distance (of u0) from a kink that counts as being on it.
     """
-    found = [np.empty(0, np.int64)]
+    found, near = [np.empty(0, np.int64)], RIGID.touching
     for term, law in zip(system.terms, laws, strict=True):
         argument, kinks = term.argument(x.array_r), law.convex.kinks
         if not len(kinks):

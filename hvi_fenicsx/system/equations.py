@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from petsc4py import PETSc
@@ -76,7 +76,7 @@ class Equations:
         self._change.array[:] = x.array_r - self.base.x.array_r
         return self._change
 
-    def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[LawModel]) -> None:
+    def residual(self, x: PETSc.Vec, out: PETSc.Vec, models: Sequence[VertexModel]) -> None:
         """The residual A u - b + W τ(u). Collective.
 
         Args:
@@ -100,7 +100,7 @@ class Equations:
         rows = self._jacobian.rows
         return self.base.residual[rows.dofs] + rows.elastic(self.from_base(x))
 
-    def tangents(self, x: PETSc.Vec, models: Sequence[LawModel], foundation: float = 0.0) -> list[Array]:
+    def tangents(self, x: PETSc.Vec, models: Sequence[VertexModel], foundation: float = 0.0) -> list[Array]:
         """The tangent stiffness K of the laws, (m, d, d) by term.
 
         Args:
@@ -116,7 +116,7 @@ class Equations:
             for term, model, a in zip(self._terms, models, arguments, strict=True)
         ]
 
-    def energy(self, x: PETSc.Vec, models: Sequence[LawModel]) -> float:
+    def energy(self, x: PETSc.Vec, models: Sequence[VertexModel]) -> float:
         """The energy ½ a(u, u) - <g, u> + Σ w j(u), up to a constant of the prescribed displacements. Collective.
 
         Args:
@@ -125,7 +125,7 @@ class Equations:
         """
         return self.base.energy + self.energy_from_base(x, models)
 
-    def energy_from_base(self, x: PETSc.Vec, models: Sequence[LawModel]) -> float:
+    def energy_from_base(self, x: PETSc.Vec, models: Sequence[VertexModel]) -> float:
         """The same less what elasticity and loads make of it at the base: small changes keep their digits. Collective.
 
         Args:
@@ -171,19 +171,6 @@ class Equations:
         """Free the PETSc objects. Collective."""
         for vector in (self.base.x, self._change, self._work):
             vector.destroy()
-
-
-class LawModel(Protocol):
-    """What takes the place of a law in one nonlinear solve: a function of its argument (m,) with two derivatives."""
-
-    def value(self, x: Array) -> Array:
-        """Energy per area."""
-
-    def derivative(self, x: Array) -> Array:
-        """Traction."""
-
-    def second(self, x: Array) -> Array:
-        """Tangent stiffness."""
 
 
 @dataclass(frozen=True)
@@ -296,28 +283,3 @@ class VertexModel:
             steep = part.right(np.array([ramp])) / ramp
             return np.where(x < ramp, steep, part.second(np.maximum(x, ramp)))
         return part.second(x)
-
-
-@dataclass(frozen=True)
-class TangentAtRest:
-    """The law's tangent at zero slip, x ↦ H'(0)x + ½ H''(0) x²: it holds a body at the start.
-
-    Attributes:
-        law: j.
-    """
-
-    law: Superpotential
-
-    def value(self, x: Array) -> Array:
-        """Energy per area."""
-        return self.derivative(np.zeros_like(x)) * x + self.second(x) * x**2 / 2
-
-    def derivative(self, x: Array) -> Array:
-        """The middle of ∂j(0) plus H''(0) x."""
-        zero = np.zeros_like(x)
-        lo, hi = self.law.interval(zero)
-        return (lo + hi) / 2 + self.second(x) * x
-
-    def second(self, x: Array) -> Array:
-        """H''(0)."""
-        return self.law.convex.second(np.zeros_like(x))
