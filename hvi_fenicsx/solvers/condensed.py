@@ -9,19 +9,18 @@ f(a, b) = √(a² + b²) - (a + b), and ½‖Φ‖² is minimised by a trust-reg
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.linalg import block_diag
 from scipy.optimize import least_squares
-from scipy.sparse import csr_matrix
 
 from ..errors import InputError
 from ..system.equations import VertexModel
 from ..system.factorisation import form_of
 from ..system.interior import PREFIX, Interior
 from ..system.system import System
-from ..typing import Array, Integers
+from ..typing import Array
 from .convergence import Counts
 from .method import Method, SolveContext, SolveResult
 
@@ -84,11 +83,10 @@ class Condensation(Method):
             SolverError: the stiffness without its contact displacements is singular.
         """
         with self.context.timer("setup"):
-            schur = _Schur(self.system)
+            mixed = _Complementarity(self.system, self.models)
         with self.context.timer("solve"):
-            mixed = _Complementarity(schur, self.models)
             values, reason, counts = self._minimise(mixed)
-            found, measure = self._judge(schur.expand(values))
+            found, measure = self._judge(mixed.expand(values))
         converged = measure <= self.options.tolerance
         failure = f"least squares stopped: {reason}, residual {measure:.1e}"
         return SolveResult(
@@ -102,10 +100,10 @@ class Condensation(Method):
         )
 
     def _minimise(self, mixed: _Complementarity) -> tuple[Array, str, Counts]:
-        """Contact displacements, why it ended there, and evaluations."""
-        counts = Counts()
-        if not mixed.schur.kept.size:
-            return np.empty(0), "there is nothing to minimise over", counts
+        """Contact displacements, why it ended there, and evaluations; not by the gradient, small wherever Φ is."""
+        counts, start = Counts(), np.zeros(len(mixed.kept))
+        if not start.size:
+            return start, "there is nothing to minimise over", counts
         points: list[Array] = []
 
         def function(x: Array) -> Array:
@@ -116,17 +114,12 @@ class Condensation(Method):
             self._record(mixed, x, points)
             return mixed.jacobian(x)
 
+        most, least = self.options.max_iterations, self.system.thresholds.energy_rounding
         try:
-            found = least_squares(function, np.zeros(mixed.schur.kept.size), jacobian, **self._limits())
+            found = least_squares(function, start, jacobian, max_nfev=most, ftol=least, xtol=least, gtol=None)
         except _Stop:
             return points[-1], "interrupted", counts
         return found.x, f"{_STATUS.get(found.status, found.message)}, merit {found.cost:.1e}", counts
-
-    def _limits(self) -> dict[str, Any]:
-        """When least squares end; not by the gradient, which is small wherever Φ is."""
-        thresholds = self.system.thresholds
-        most = self.options.max_iterations
-        return {"max_nfev": most, "ftol": thresholds.energy_rounding, "xtol": thresholds.energy_rounding, "gtol": None}
 
     def _record(self, mixed: _Complementarity, x: Array, points: list[Array]) -> None:
         """Keep and report an accepted point."""
@@ -150,78 +143,52 @@ class _Stop(Exception):
     """The user wants it to end."""
 
 
-class _Schur:
-    """The stiffness condensed to the contact displacements: S = A_cc - G and q = b_c - g take the place of A and b.
+class _Complementarity:
+    """lower ≤ x ≤ upper ⟂ F(x) = S x - f + law, as Φ(x) = 0, over the displacements x of Γc that are not prescribed.
 
     Attributes:
-        kept: the dofs of Γc's vertices that are not prescribed, ascending, (n,).
-        G: forces on Γc by the rest of the body, for unit contact displacements, (n, n).
-        g: forces on Γc by the loads on the rest of the body, (n,).
-        lower: lower bounds, (n,).
-        upper: upper bounds, (n,).
+        kept: their dofs, ascending, (n,).
     """
 
-    def __init__(self, system: System) -> None:
-        self.system = system
+    def __init__(self, system: System, models: Sequence[VertexModel]) -> None:
+        self._system, self._models, self._residual = system, models, system.load.duplicate()
         system.jacobian.set_rates([np.zeros_like(k) for k in system.jacobian.rates])
-        self.kept = _kept(system)
+        rows = system.jacobian.rows
+        self.kept = np.setdiff1d(rows.dofs, system.problem.fixed)
+        self._here = np.searchsorted(rows.dofs, self.kept)
         self._interior = Interior(form_of(system, PREFIX), self.kept)
-        self.G = self._interior.response()
-        self.g = self._interior.pulled(self._interior.solve(system.load.array_r[:, None]))[:, 0]
-        self.lower, self.upper = system.lower.array_r[self.kept], system.upper.array_r[self.kept]
+        self._stiffness = self._interior.stiffness()
+        self._bounds = system.lower.array_r[self.kept], system.upper.array_r[self.kept]
 
-    def spread(self, values: Array) -> PETSc.Vec:
-        """A displacement of the whole body with these values on Γc, and zero elsewhere."""
-        x = self.system.undisplaced()
-        x.array[self.kept] = values
-        return x
-
-    def expand(self, values: Array) -> PETSc.Vec:
+    def expand(self, x: Array) -> PETSc.Vec:
         """The displacement of the whole body in equilibrium with these contact displacements."""
-        x = self.system.undisplaced()
-        x.array[:] = self._interior.expand(values, self.system.load.array_r)
-        return x
-
-
-def _sparse(matrix: PETSc.Mat) -> Any:
-    return csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize())
-
-
-def _kept(system: System) -> Integers:
-    """The free dofs of Γc's vertices; prescribed ones have rows of the identity."""
-    return np.setdiff1d(system.jacobian.rows.dofs, system.problem.fixed)
-
-
-class _Complementarity:
-    """lower ≤ x ≤ upper ⟂ F(x) = S x - q + law, as Φ(x) = 0."""
-
-    def __init__(self, schur: _Schur, models: Sequence[VertexModel]) -> None:
-        self.schur, self.models, self.system = schur, models, schur.system
-        self._residual = self.system.load.duplicate()
+        found = self._system.load.duplicate()
+        found.array[:] = self._interior.expand(x, self._system.load.array_r)
+        return found
 
     def force(self, x: Array) -> Array:
-        """F, (n,): the residual on Γc of a body that is undisplaced inside, corrected by its response."""
-        self.system.equations.residual(self.schur.spread(x), self._residual, self.models)
-        return np.asarray(self._residual.array_r[self.schur.kept] - self.schur.G @ x + self.schur.g)
+        """F, (n,): the residual on Γc of a body that is in equilibrium inside."""
+        self._system.equations.residual(self.expand(x), self._residual, self._models)
+        return np.asarray(self._residual.array_r[self.kept])
 
     def tangent(self, x: Array) -> Array:
         """F', (n, n)."""
-        self.system.jacobian.set_rates(self.system.equations.tangents(self.schur.spread(x), self.models))
-        kept = self.schur.kept
-        return np.asarray(_sparse(self.system.jacobian.matrix)[kept][:, kept].toarray() - self.schur.G)
+        jacobian = self._system.jacobian
+        jacobian.set_rates(self._system.equations.tangents(self.expand(x), self._models))
+        return np.asarray(self._stiffness + block_diag(*jacobian.rows.tangent)[np.ix_(self._here, self._here)])
 
     def function(self, x: Array) -> Array:
         """Φ, (n,)."""
-        return _mixed(x, self.force(x), self.schur.lower, self.schur.upper)[0]
+        return _mixed(x, self.force(x), *self._bounds)[0]
 
     def jacobian(self, x: Array) -> Array:
         """An element of Φ's B-subdifferential, (n, n)."""
-        _, by_x, by_force = _mixed(x, self.force(x), self.schur.lower, self.schur.upper)
+        _, by_x, by_force = _mixed(x, self.force(x), *self._bounds)
         return np.asarray(np.diag(by_x) + by_force[:, None] * self.tangent(x))
 
     def in_contact(self, x: Array) -> int:
         """The number of dofs whose distance from a bound is smaller than their force."""
-        force, low, high = self.force(x), self.schur.lower, self.schur.upper
+        force, (low, high) = self.force(x), self._bounds
         return int(np.count_nonzero((x - low <= force) | (high - x <= -force)))
 
 
