@@ -9,7 +9,7 @@ which they are held by their diagonals (:meth:`.Jacobian.hold`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -196,55 +196,33 @@ class HeldPreconditioner:
         ksp.setTolerances(rtol=rtol, max_it=most)
         configure(ksp, settings.ksp(ksp.getPC()))
         if settings.kind in ("gamg", "mg"):
-            held = np.union1d(self._wanted, self.system.pins)
-            set_up(ksp, self.system.jacobian.matrix, self._preconditioner.pc, held)
+            held, whole, inner = np.union1d(self._wanted, self.system.pins), self.system.jacobian.matrix, self.pc
+            matrix = PETSc.Mat().createPython(whole.getSizes(), _Unheld(whole, whole.mult, held), comm=whole.comm)
+            matrix.setUp()
+            pc = PETSc.PC().create(whole.comm)
+            pc.setType(PETSc.PC.Type.PYTHON)
+            pc.setPythonContext(_Unheld(inner, inner.apply, held))
+            ksp.setPC(pc)
+            ksp.setOperators(matrix)
         return ksp
 
 
-class _Matrix:
-    """The context of the matrix."""
+class _Unheld:
+    """The context of a matrix or a PC: what another one gives, and zero at held unknowns."""
 
-    def __init__(self, whole: PETSc.Mat, held: Entities) -> None:
-        self._whole, self._held = whole, held
+    def __init__(self, of: PETSc.Mat | PETSc.PC, act: Callable[[PETSc.Vec, PETSc.Vec], None], held: Entities) -> None:
+        self._of, self._act, self._held = of, act, held
 
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Multiply y = J x. Collective."""
-        self._whole.mult(x, y)
+    def mult(self, _: PETSc.Mat | PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write what it gives for x to y. Collective."""
+        self._act(x, y)
         y.array[self._held] = 0.0
 
+    apply = mult
 
-class _Preconditioner:
-    """The context of the PC."""
-
-    def __init__(self, inner: PETSc.PC, held: Entities) -> None:
-        self._inner, self._held = inner, held
-
-    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Apply the inner preconditioner. Collective."""
-        self._inner.apply(x, y)
-        y.array[self._held] = 0.0
-
-    def view(self, _: PETSc.PC, viewer: PETSc.Viewer) -> None:
-        """Show the inner preconditioner."""
-        self._inner.view(viewer)
-
-
-def set_up(ksp: PETSc.KSP, whole: PETSc.Mat, inner: PETSc.PC, held: Entities) -> None:
-    """Give a method its matrix and preconditioner, for one solve from zero. Collective.
-
-    Args:
-        ksp: the method.
-        whole: J.
-        inner: a preconditioner of it; one of a J with other held unknowns and another tangent will do.
-        held: the unknowns that are held (local, owned).
-    """
-    matrix = PETSc.Mat().createPython(whole.getSizes(), _Matrix(whole, held), comm=whole.comm)
-    matrix.setUp()
-    pc = PETSc.PC().create(whole.comm)
-    pc.setType(PETSc.PC.Type.PYTHON)
-    pc.setPythonContext(_Preconditioner(inner, held))
-    ksp.setPC(pc)
-    ksp.setOperators(matrix)
+    def view(self, _: PETSc.Mat | PETSc.PC, viewer: PETSc.Viewer) -> None:
+        """Show the other one."""
+        self._of.view(viewer)
 
 
 Kind = Literal["lu", "gamg", "mg", "mixed"]

@@ -38,13 +38,11 @@ class LocalFrames:
     axes: Array
 
     def at(self, vertices: npt.NDArray[np.integer]) -> Array:
-        """R at vertices of this rank, (m, d, d)."""
+        """R at vertices of this rank, each once, (m, d, d)."""
         d = self.axes.shape[1]
         result = np.broadcast_to(np.eye(d), (len(vertices), d, d)).copy()
-        place = {int(b): i for i, b in enumerate(self.blocks)}
-        for i, block in enumerate(vertices):
-            if int(block) in place:
-                result[i] = self.axes[place[int(block)]]
+        _, there, here = np.intersect1d(vertices, self.blocks, assume_unique=True, return_indices=True)
+        result[there] = self.axes[here]
         return result
 
     def local_components(self, vectors: Array) -> Array:

@@ -250,17 +250,31 @@ class Level:
             system: on this level.
         """
         found = Level(finer, system, self.prolongation)
-        found._masked = self._masked
+        found.interpolation = self.interpolation
         return found
 
-    @property
+    @cached_property
     def interpolation(self) -> PETSc.Mat:
-        """The prolongation without the unknowns prescribed on either level. Collective when first used."""
-        return self._masked.matrix
+        """The prolongation without the unknowns prescribed on either level. Collective when first used.
+
+        Held unknowns keep their weights in it: their large diagonal leaves them as they are on every level.
+        """
+        found = self.prolongation.copy()
+        found.diagonalScale(_unprescribed(self.finer), _unprescribed(self.system))
+        return found
 
     @cached_property
-    def _masked(self) -> _MaskedProlongation:
-        return _MaskedProlongation(self)
+    def _traces(self) -> PETSc.Mat:
+        """Its rows of Γc. Collective when first used."""
+        rows = (self.finer.jacobian.rows.dofs + self.finer.load.owner_range[0]).astype(PETSc.IntType)
+        return self.interpolation.createSubMatrix(PETSc.IS().createGeneral(rows, comm=self.finer.comm), None)
+
+    def _restricted(self, values: npt.NDArray[Any]) -> Array:
+        """Values at the finer level's unknowns of Γc, restricted to the unknowns there on this one. Collective."""
+        given, found = self._traces.createVecLeft(), self.system.load.duplicate()
+        given.array[:] = values
+        self._traces.multTranspose(given, found)
+        return np.asarray(found.array_r[self.system.jacobian.rows.dofs])
 
     def update(self) -> None:
         """Take over the finer level's tangent and held unknowns. Collective.
@@ -273,26 +287,18 @@ class Level:
         from sliding.
         """
         fine, own = self.finer.jacobian, self.system.jacobian
-        at = own.rows.dofs
-        axes, own_axes = self._axes
-        forces, moved = fine.rows.tangent @ axes, np.empty_like(own.rows.tangent)
+        forces, moved = fine.rows.tangent @ _axes_on_contact(self.finer), np.empty_like(own.rows.tangent)
         for direction in range(moved.shape[2]):
-            restricted = self._masked.restricted(forces[:, :, direction].ravel())
-            moved[:, :, direction] = restricted[at].reshape(moved.shape[:2])
-        weights = np.abs(self._masked.restricted(np.isin(fine.rows.dofs, fine.held))[at])
-        held = at[weights > self.finer.thresholds.held_weight].astype(np.int32)
-        own.set_restricted(moved @ own_axes.transpose(0, 2, 1), held)
+            moved[:, :, direction] = self._restricted(forces[:, :, direction].ravel()).reshape(moved.shape[:2])
+        weights = np.abs(self._restricted(np.isin(fine.rows.dofs, fine.held)))
+        held = own.rows.dofs[weights > self.finer.thresholds.held_weight].astype(np.int32)
+        own.set_restricted(moved @ _axes_on_contact(self.system).transpose(0, 2, 1), held)
 
     def free(self) -> None:
         """Free the system and the way to it; what other problems on the mesh share stays. Collective."""
-        self.__dict__.pop("_masked", None)
-        del self.prolongation
+        for name in ("interpolation", "_traces", "prolongation"):
+            self.__dict__.pop(name, None)
         self.system.free()
-
-    @cached_property
-    def _axes(self) -> tuple[Array, Array]:
-        """The local axes at the vertices of Γc on the finer level and on this one, rows, (m, d, d)."""
-        return _axes_on_contact(self.finer), _axes_on_contact(self.system)
 
 
 def _axes_on_contact(system: System) -> Array:
@@ -346,27 +352,6 @@ def with_coarser_system(finer: System, coarser: System, levels: Levels, step: PE
     if not levels or step.size[0] >= finer.thresholds.level_growth * levels[0].prolongation.size[1]:
         return (Level(finer, coarser, step), *levels)
     return (Level(finer, levels[0].system, step.matMult(levels[0].prolongation)), *levels[1:])
-
-
-class _MaskedProlongation:
-    """A prolongation (``matrix``) that is zero for prescribed unknowns, and its rows of Γc. Creation is collective.
-
-    Held unknowns keep their weights in it: their large diagonal leaves them as they are on every level.
-    """
-
-    def __init__(self, level: Level) -> None:
-        finer = level.finer
-        self.matrix = level.prolongation.copy()
-        self.matrix.diagonalScale(_unprescribed(finer), _unprescribed(level.system))
-        rows = (finer.jacobian.rows.dofs + finer.load.owner_range[0]).astype(PETSc.IntType)
-        self._traces = self.matrix.createSubMatrix(PETSc.IS().createGeneral(rows, comm=finer.comm), None)
-        self._on, self._off = self._traces.createVecLeft(), self._traces.createVecRight()
-
-    def restricted(self, values: npt.NDArray[Any]) -> Array:
-        """Values at the finer level's unknowns of Γc, restricted to the coarse unknowns. Collective."""
-        self._on.array[:] = values
-        self._traces.multTranspose(self._on, self._off)
-        return np.asarray(self._off.array_r)
 
 
 def _unprescribed(system: System) -> PETSc.Vec:
