@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import re
 import tomllib
@@ -14,12 +13,10 @@ from typing import Any
 
 from ..errors import InputError
 from ..schema import Keys, Mistake, require_path, shown, unknown
-from .content import WHOLE
+from .content import dotted
 from .model import Mistakes, Model
 from .reader import KEYS, read_tables
 
-_LARGEST = 1_000_000
-"""Bytes of a scene file at most."""
 _KEY = re.compile(rf"((?:{'|'.join(KEYS)})\.[^:]+): ")
 """How a message begins that names a key of the scene."""
 _MOST_MISTAKES = 10
@@ -63,7 +60,7 @@ def with_place(message: str, path: str | os.PathLike[str], overrides: Sequence[s
         source = _Source.read(Path(path), overrides)
     except InputError:
         return message
-    return source.place(source.keys(key[1])) + message[key.end(1) :]
+    return source.place(key[1])[1] + message[key.end(1) :]
 
 
 @dataclass(frozen=True)
@@ -88,73 +85,45 @@ class _Source:
         tables = _toml(file, text)
         return cls(file, text, tables, [override(tables, assignment) for assignment in overrides])
 
-    @cached_property
-    def _lines(self) -> Mapping[Keys, int]:
-        return lines_of(self.text)
-
     def listed(self, mistakes: Iterable[Mistake]) -> str:
         """The mistakes in the order of the file, a line each."""
-        found = [Mistake(tuple(key for key in m.where if key != WHOLE), m.text) for m in mistakes]
-        found.sort(key=lambda m: self._lines.get(m.where[: self._known(m.where)], 0))
-        texts = [f"{self.place(m.where)}: {m.text}" for m in found]
+        found = sorted(((*self.place(dotted(m.where)), m.text) for m in mistakes), key=lambda one: one[0])
+        texts = [f"{place}: {text}" for _, place, text in found]
         rest = len(texts) - _MOST_MISTAKES
         return "\n".join(texts[:_MOST_MISTAKES] + ([f"... and {rest} more"] if rest > 0 else []))
 
-    def keys(self, dotted: str) -> Keys:
-        """The keys down to a place that a message names, joined by dots; names may have dots in them, too."""
-        known = {".".join(map(str, place)): place for place in (*self._lines, *self.overridden)}
-        known |= {f"boundary{text[9:]}": place for text, place in known.items() if place[0] == "interface"}
-        nearest = max((text for text in known if f"{dotted}.".startswith(f"{text}.")), key=len, default="")
-        rest = dotted[len(nearest) :].strip(".")
-        return (*known.get(nearest, ()), *(rest.split(".") if rest else ()))
+    def place(self, key: str) -> tuple[int, str]:
+        """The line of the nearest place that is known, and what messages name: file and line, or ``--set``; the key."""
+        nearest = max((known for known in self._known if f"{key}.".startswith(f"{known}.")), key=len, default="")
+        line, start = self._known.get(nearest, (0, f"{self.file}:"))
+        return line, f"{start} {key}"
 
-    def place(self, where: Keys) -> str:
-        """A place as messages name it: file and line, or ``--set``; then the key."""
-        key, known = ".".join(map(str, where)), self._known(where)
-        for place in self.overridden:  # also in a table that only an overridden value has made
-            alike = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(place, where, strict=False))
-            if len(list(alike)) > min(known, len(place) - 1):
-                return f"--set {key}"
-        return f"{self.file}:{self._lines[where[:known]]}: {key}" if known else f"{self.file}: {key}"
-
-    def _known(self, where: Keys) -> int:
-        """How many keys down to a place have a line."""
-        return max((n for n in range(1, len(where) + 1) if where[:n] in self._lines), default=0)
+    @cached_property
+    def _known(self) -> Mapping[str, tuple[int, str]]:
+        """The line of each key in the file, and how messages begin; also of tables that only overridden values make."""
+        found = {dotted(place[:n]): (0, "--set") for place in self.overridden for n in range(1, len(place) + 1)}
+        for place, line in lines_of(self.text).items():
+            if not any(place[: len(other)] == other for other in self.overridden):
+                found[dotted(place)] = line, f"{self.file}:{line}:"
+        return found
 
 
 def _text(file: Path) -> str:
     try:
         str(file.absolute()).encode("utf-8")  # the result names its scene, and files beside it
         strange = file.exists() and not file.is_file()
-        raw = b"" if strange else _first_bytes(file)
-    except UnicodeEncodeError:
-        raise InputError(f"{file.absolute()}: this name is not UTF-8; rename the file or folder") from None
+        raw = b"" if strange else file.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"{file}: does not exist{_nearby(file)}") from None
+        raise InputError(f"{file}: does not exist") from None
     except (OSError, ValueError) as error:  # the latter is about a null byte in the name
         raise InputError(f"{str(file)!r}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if strange:
         raise InputError(f"{file}: is {'a folder; give the scene file in it' if file.is_dir() else 'no ordinary file'}")
-    if len(raw) > _LARGEST:
-        raise InputError(f"{file}: has more than {_LARGEST // 1_000_000} MB; a scene file is smaller")
     try:
-        text = raw.decode("utf-8-sig")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError(f"{file}:{line}: is not UTF-8; save the scene as UTF-8") from None
-    if not text.strip():
-        raise InputError(f"{file}: is empty; a scene has at least [domain] and [material]")
-    return text
-
-
-def _first_bytes(file: Path) -> bytes:
-    with open(file, "rb") as stream:
-        return stream.read(_LARGEST + 1)
-
-
-def _nearby(file: Path) -> str:
-    scenes = sorted(f.name for f in file.parent.glob("*.toml"))[:5]
-    return f"; {file.parent} has {', '.join(scenes)}" if scenes else ""
 
 
 def _toml(file: Path, text: str) -> dict[str, Any]:
@@ -167,21 +136,13 @@ def _toml(file: Path, text: str) -> dict[str, Any]:
         raise InputError(f"{file}: {reason}") from None
 
 
-_MENDS = {
-    "Invalid value": "texts need quotes",
-    "Cannot declare": "give each table a name of its own, or join the two",
-}
-"""How to mend what tomllib says."""
-
-
 def _broken(file: Path, text: str, message: str) -> str:
     """Tomllib's message with its place in front."""
     reason = re.sub(r" \(at .*\)$", "", message, flags=re.DOTALL)
     found = re.search(r"\(at line (\d+), column (\d+)\)$", message)
     line, column = found.groups() if found else (str(text.count("\n") + 1), "1")
     content = "".join(text.splitlines()[int(line) - 1 :][:1]).strip()[:60]
-    mend = next((f"; {mend}" for start, mend in _MENDS.items() if reason.startswith(start)), "")
-    return f"{file}:{line}:{column}: not valid TOML: {reason}{mend}" + (f": {content}" if content else "")
+    return f"{file}:{line}:{column}: not valid TOML: {reason}: {content}"
 
 
 def lines_of(text: str) -> Mapping[Keys, int]:

@@ -217,7 +217,7 @@ class Measurement:
         if found is None or reference is None:
             return {}
         part = reference.errors(found, exact) if smoothed and exact is not None else None
-        return {"errors": reference.errors(found), "epsilon_part": part, "left_out": reference.left_out(found)}
+        return {"errors": reference.errors(found), "epsilon_part": part}
 
     def _fields(self, solution: Solution | None) -> Fields | None:
         """A certified solution on the reference's nodes, on rank 0; None for another. Collective."""

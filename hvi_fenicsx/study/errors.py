@@ -9,14 +9,14 @@ node outside of all cells takes its nearest cell's field, continued.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import basix
 import numpy as np
 from dolfinx import fem, geometry
 from mpi4py import MPI
-from scipy import sparse, spatial
+from scipy import sparse
 from scipy.sparse import csgraph
 
 from .. import compat
@@ -34,7 +34,6 @@ NORMS: Mapping[str, tuple[str, str]] = {
     "u_t_max": ("u_t on Γc, largest", "u_t (largest)"),
     "friction_l1": ("-σ_t on Γc, L1", "-σ_t (L1)"),
     "friction_l2": ("-σ_t on Γc, L2", "-σ_t (L2)"),
-    "friction_max": ("-σ_t on Γc, largest away from the law's jumps", "-σ_t (largest, away from jumps)"),
     "pressure_l1": ("-σ_n on Γc, L1", "-σ_n (L1)"),
     "pressure_l2": ("-σ_n on Γc, L2", "-σ_n (L2)"),
     "contact_set": ("area where one is closed and the other open, over the closed area", "the contact set"),
@@ -44,8 +43,8 @@ NORMS: Mapping[str, tuple[str, str]] = {
 """The quantities whose errors are measured, in the order of the tables: what they are, and their names in sentences."""
 Errors = Mapping[str, float | None]
 """Relative errors by the keys of :data:`NORMS`; None where there is nothing to measure."""
-JUMP_FACETS = 2
-"""So many facets of the coarser mesh about a jump of the law count as near it."""
+Transfer = Callable[[Array], Array]
+"""Vectors at other points from those at the nodes of a mesh."""
 _KINDS = {1: "interval", 2: "triangle", 3: "tetrahedron"}
 
 
@@ -59,7 +58,6 @@ class Fields:
         friction: -σ_t, N/m², likewise; zero where no law acts along the part, since the residual there is rounding.
         pressure: σ_n, N/m², (m,); zero where neither contact nor a law acts across the part.
         closed: whether contact is closed, (m,).
-        widths: the solution's own mesh width there, m, (m,).
     """
 
     u: Array
@@ -67,7 +65,6 @@ class Fields:
     friction: Array
     pressure: Array
     closed: Mask
-    widths: Array
 
 
 class ReferenceSolution:
@@ -84,13 +81,12 @@ class ReferenceSolution:
 
     def __init__(self, arrays: SolutionArrays, stiffness: sparse.csr_array, joints: Collection[str] = ()) -> None:
         self._arrays, self._stiffness, self._joints = arrays, stiffness, joints
-        self._ends, self._transfers = edge_ends(arrays), dict[bytes, tuple[BodyTransfer, dict[str, sparse.csr_array]]]()
+        self._ends, self._transfers = edge_ends(arrays), dict[bytes, tuple[Transfer, dict[str, sparse.csr_array]]]()
         self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[arrays.points.shape[1]]
         parts, d = arrays.parts.values(), arrays.points.shape[1]
         self._weights = np.concatenate([np.empty(0), *(part.weight for part in parts)])
         self._normals = np.vstack([np.empty((0, d)), *(part.normal for part in parts)])
         self._bounded = any("contact" in part.columns for part in parts)
-        self._from_jump = np.concatenate([np.empty(0), *(_from_jump(arrays, part) for part in parts)])
         self.own = self.transfer(arrays)
 
     def transfer(self, found: SolutionArrays) -> Fields:
@@ -99,38 +95,25 @@ class ReferenceSolution:
         if key not in self._transfers:
             points = {name: self._arrays.points[part.vertices] for name, part in self._arrays.parts.items()}
             along = {name: surface(found, found.parts[name], x) for name, x in points.items()}
-            self._transfers = {key: (BodyTransfer(found, self._arrays), along)}
+            self._transfers = {key: (between_bodies(found, self._arrays), along)}
         in_bodies, on_parts = self._transfers[key]
         assert found.displacement is not None
         u = in_bodies(found.displacement)
-        rows = [np.empty((0, 2 * u.shape[1] + 3))]
+        rows = [np.empty((0, 2 * u.shape[1] + 2))]
         for name, way in on_parts.items():
-            part, width = found.parts[name], np.full((way.shape[0], 1), _width(found, found.parts[name]))
-            slip = way @ part.vectors("slip") if name in self._joints else self._slip(name, u)
-            rows.append(np.hstack([slip, way @ _tractions(part), width]))
+            part, own = found.parts[name], self._arrays.parts[name]
+            here = u[own.vertices]
+            slip = here - np.sum(here * own.normal, axis=1)[:, None] * own.normal
+            slip = way @ part.vectors("slip") if name in self._joints else slip
+            rows.append(np.hstack([slip, way @ _tractions(part)]))
         slip, friction, others = np.split(np.vstack(rows), [u.shape[1], 2 * u.shape[1]], axis=1)
-        pressure, contact, widths = others.T
-        return Fields(u, slip, friction, pressure, contact > 0.5, widths)
-
-    def _slip(self, name: str, u: Array) -> Array:
-        """The tangential part of a displacement on a part, (m, d)."""
-        part = self._arrays.parts[name]
-        found = u[part.vertices]
-        return np.asarray(found - np.sum(found * part.normal, axis=1)[:, None] * part.normal)
+        return Fields(u, slip, friction, others[:, 0], others[:, 1] > 0.5)
 
     def energy(self, u: Array) -> float:
         """√a(u, u) of a displacement (n, d), up to a factor; the stiffness is that of coefficients in its basis."""
         share = np.where(self._ends[:, :1] == self._ends[:, 1:], 0.0, self._share)
         flat = ((u - share * u[self._ends].sum(axis=1)) / (1 - 2 * share)).ravel()
         return math.sqrt(max(0.0, float(flat @ (self._stiffness @ flat))))
-
-    def near_jump(self, found: Fields) -> Mask:
-        """The vertices of Γc within some facets of a solution's mesh from a jump of the law, (m,)."""
-        return np.asarray(self._from_jump <= JUMP_FACETS * found.widths)
-
-    def left_out(self, found: Fields) -> float:
-        """The part of Γc near jumps of the law, which ``friction_max`` leaves out, over all of Γc."""
-        return float(self._weights[self.near_jump(found)].sum() / (self._weights.sum() or 1.0))
 
     def errors(self, found: Fields, other: Fields | None = None) -> Errors:
         """How far a solution is from another, by quantity, relative to the reference's size.
@@ -141,14 +124,9 @@ class ReferenceSolution:
         """
         true, other, weights = self.own, other or self.own, self._weights
         friction, pressure = found.friction - other.friction, (found.pressure - other.pressure)[:, None]
-        differences = {"u_t": found.slip - other.slip, "friction": friction, "pressure": pressure}
-        fields = {"u_t": true.slip, "friction": true.friction, "pressure": true.pressure[:, None]}
-        sizes = {f"{name}_{norm}": size for name, v in fields.items() for norm, size in _norms(v, weights).items()}
-        far = {f"{name}_{norm}": size for name, v in differences.items() for norm, size in _norms(v, weights).items()}
+        far = _norms(found.slip - other.slip, friction, pressure, weights)
+        sizes = _norms(true.slip, true.friction, true.pressure[:, None], weights)
         told = {key: _ratio(far[key], size) for key, size in sizes.items()}
-        away = ~self.near_jump(found)
-        largest = _norms(friction[away], weights[away])["max"]
-        told["friction_max"] = _ratio(largest, sizes["friction_max"]) if away.any() else None
         told["energy_norm"] = _ratio(self.energy(found.u - other.u), self.energy(true.u))
         wrong, closed = weights[found.closed != other.closed].sum(), weights[true.closed].sum()
         told["contact_set"] = _ratio(wrong, closed) if self._bounded else None
@@ -166,28 +144,14 @@ def _tractions(part: ContactPart) -> Array:
     return np.column_stack([friction, pressure, columns["contact"] if bounded else np.zeros(len(pressure))])
 
 
-def _width(arrays: SolutionArrays, part: ContactPart) -> float:
-    corners = arrays.points[part.facets]
-    return float(np.max(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), initial=0.0))
-
-
-def _from_jump(arrays: SolutionArrays, part: ContactPart) -> Array:
-    """How far each vertex of a part is from a facet on which the slip passes a drop of the law, m, (m,)."""
-    facets, along = rows_of(arrays, part)[part.facets], part.tangents[:, 0]
-    turned = np.sum(along[facets[:, 0]] * along[facets[:, -1]], axis=1) < 0.0
-    signed = part.size("slip")
-    beyond = np.where(turned[:, None], np.abs(signed)[facets], signed[facets])[:, :, None] - part.drops[facets]
-    passed = np.any((beyond.min(axis=1) <= 0.0) & (beyond.max(axis=1) >= 0.0), axis=1)
-    if not passed.any():
-        return np.full(len(part), np.inf)
-    return np.asarray(spatial.KDTree(part.x[facets[passed]].mean(axis=1)).query(part.x)[0])
-
-
-def _norms(vectors: Array, weights: Array) -> dict[str, float]:
-    """L1, L2 and the largest length of vectors (m, d)."""
-    lengths = np.linalg.norm(vectors, axis=1)
-    l2, largest = math.sqrt(float(weights @ lengths**2)), float(np.max(lengths, initial=0.0))
-    return {"l1": float(weights @ lengths), "l2": l2, "max": largest}
+def _norms(slip: Array, friction: Array, pressure: Array, weights: Array) -> dict[str, float]:
+    """L1, L2 and the largest length of vectors (m, d) on Γc."""
+    found = {}
+    for name, vectors in (("u_t", slip), ("friction", friction), ("pressure", pressure)):
+        lengths = np.linalg.norm(vectors, axis=1)
+        found |= {f"{name}_l1": float(weights @ lengths), f"{name}_l2": math.sqrt(float(weights @ lengths**2))}
+        found[f"{name}_max"] = float(np.max(lengths, initial=0.0))
+    return found
 
 
 def _ratio(error: float, size: float) -> float | None:
@@ -232,30 +196,27 @@ def mesh_width(arrays: SolutionArrays) -> float:
     return float((largest * (2.0 / np.sqrt(3.0) if d == 2 else np.sqrt(2.0))) ** (1.0 / d))
 
 
-class BodyTransfer:
-    """From the nodes of a mesh to those of another one of the same bodies. On this process alone.
+def between_bodies(source: SolutionArrays, target: SolutionArrays) -> Transfer:
+    """What takes vectors at the nodes of a mesh to those of another one of the same bodies. On this process alone.
 
     Args:
         source: a solution on the mesh.
         target: one on the other mesh.
     """
+    cells, bodies, wanted = cells_of(source), _bodies(source), _bodies(target)
+    boxes, pieces = _boxes(source, bodies), list[tuple[Integers, Transfer]]()
+    for body, box in enumerate(_boxes(target, wanted)):
+        same = np.argmin(np.linalg.norm(boxes - box, axis=1))
+        rows = np.flatnonzero(wanted == body)
+        pieces.append((rows, _in_body(source.points, cells[bodies[cells[:, 0]] == same], target.points[rows])))
 
-    def __init__(self, source: SolutionArrays, target: SolutionArrays) -> None:
-        self._shape = target.points.shape
-        cells, bodies, wanted = cells_of(source), _bodies(source), _bodies(target)
-        boxes = _boxes(source, bodies)
-        self._pieces: list[tuple[Integers, _Body]] = []
-        for body, box in enumerate(_boxes(target, wanted)):
-            same = np.argmin(np.linalg.norm(boxes - box, axis=1))
-            rows = np.flatnonzero(wanted == body)
-            self._pieces.append((rows, _Body(source.points, cells[bodies[cells[:, 0]] == same], target.points[rows])))
-
-    def __call__(self, values: Array) -> Array:
-        """Vectors at the nodes of the target, from those at the nodes of the source."""
-        found = np.empty(self._shape)
-        for rows, body in self._pieces:
-            found[rows] = body(values)
+    def taken(values: Array) -> Array:
+        found = np.empty(target.points.shape)
+        for rows, piece in pieces:
+            found[rows] = piece(values)
         return found
+
+    return taken
 
 
 def _bodies(arrays: SolutionArrays) -> Integers:
@@ -272,37 +233,22 @@ def _boxes(arrays: SolutionArrays, bodies: Integers) -> Array:
     return np.array([np.concatenate([own.min(axis=0), own.max(axis=0)]) for own in points])
 
 
-class _Body:
-    """A body's mesh, on this process alone, and points in it; its functions have the degree of its cells."""
+def _in_body(vertices: Array, cells: Integers, points: Array) -> Transfer:
+    """What takes vectors (n, d) at all nodes to points of a body by its cells, whose degree its functions have."""
+    kept, local = np.unique(cells, return_inverse=True)
+    d, degree = vertices.shape[1], 1 if cells.shape[1] == vertices.shape[1] + 1 else 2
+    local = local.reshape(cells.shape)
+    mesh = compat.simplex_mesh(MPI.COMM_SELF, local, vertices[kept], _KINDS[d], degree=degree)
+    at = in_space(points)
+    containing = transfer.containing_cells(mesh, at).astype(np.int32)
+    field = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, (d,))))
+    own = kept[mesh.geometry.input_global_indices[compat.geometry_dofmap(mesh)]]
 
-    def __init__(self, vertices: Array, cells: Integers, points: Array) -> None:
-        self._kept, local = np.unique(cells, return_inverse=True)
-        d, degree = vertices.shape[1], 1 if cells.shape[1] == vertices.shape[1] + 1 else 2
-        mesh = compat.simplex_mesh(
-            MPI.COMM_SELF, local.reshape(cells.shape), vertices[self._kept], _KINDS[d], degree=degree
-        )
-        self._points = in_space(points)
-        self._cells = transfer.containing_cells(mesh, self._points).astype(np.int32)
-        self._field = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, (d,))))
-        self._nodes = self._kept[mesh.geometry.input_global_indices[compat.geometry_dofmap(mesh)]]
+    def taken(values: Array) -> Array:
+        field.x.array.reshape(-1, d)[field.function_space.dofmap.list] = values[own]
+        return np.asarray(field.eval(at, containing)).reshape(-1, d)
 
-    def __call__(self, values: Array) -> Array:
-        """Vectors (m, d) at the points, from those at all nodes of the source."""
-        d = values.shape[1]
-        self._field.x.array.reshape(-1, d)[self._field.function_space.dofmap.list] = values[self._nodes]
-        return np.asarray(self._field.eval(self._points, self._cells)).reshape(-1, d)
-
-
-def rows_of(arrays: SolutionArrays, part: ContactPart) -> Integers:
-    """The row that each node of a solution has in a part, (n,); any number where it has none.
-
-    Args:
-        arrays: the solution.
-        part: of it.
-    """
-    found = np.empty(len(arrays.points), dtype=np.int64)
-    found[part.vertices] = np.arange(len(part.vertices))
-    return found
+    return taken
 
 
 def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.csr_array:
@@ -321,7 +267,6 @@ def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.
     nearest = geometry.compute_closest_entity(tree, middles, line, in_space(points))
     corners = part.facets[line.topology.original_cell_index[nearest]]
     weights = transfer.clipped(transfer.barycentric_weights(source.points[corners], points))
-    starts = np.arange(0, corners.size + 1, d)
-    return sparse.csr_array(
-        (weights.ravel(), rows_of(source, part)[corners].ravel(), starts), (len(points), len(part.vertices))
-    )
+    starts, rows = np.arange(0, corners.size + 1, d), np.empty(len(source.points), dtype=np.int64)
+    rows[part.vertices] = np.arange(len(part.vertices))
+    return sparse.csr_array((weights.ravel(), rows[corners].ravel(), starts), (len(points), len(part.vertices)))

@@ -92,7 +92,6 @@ class Row:
         phases: median cost by phase, s.
         errors: relative, against the reference.
         epsilon_part: how far the point is from the exact law on its own mesh; None: it is exact, or that point failed.
-        left_out: part of Γc near jumps of the law, which ``friction_max`` leaves out.
         beyond_reference: quantities whose error is below the reference's own.
     """
 
@@ -118,7 +117,6 @@ class Row:
     phases: Mapping[str, float] | None
     errors: Errors | None = None
     epsilon_part: Errors | None = None
-    left_out: float | None = None
     beyond_reference: tuple[str, ...] = ()
 
     @property
