@@ -53,6 +53,8 @@ class CurveEquations(Branch):
         here: the present point.
         unit: of the factor; a power of 2, so that no factor is rounded.
         limits: what is rounding, and how many corrections are made.
+        stood: which points went to and fro at their ends when the last one passed, by rounding alone, (m,): while they
+            are slow their rates say nothing.
     """
 
     def __init__(self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float) -> None:
@@ -67,6 +69,7 @@ class CurveEquations(Branch):
         left = (points.stiffness @ values.x + values.force - constant - factor * rate) / points.forces
         self.here = CurvePoint(y=y, tangent=np.zeros_like(y), values=values, left=left)
         self._factors: Bordered | None = None
+        self.stood = np.zeros(len(points), dtype=bool)
 
     @property
     @override

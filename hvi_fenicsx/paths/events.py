@@ -110,6 +110,7 @@ class Events(CurveEquations):
         points, s0, s1 = self.points, move.before.values.s, move.after.values.s
         found, way = np.ones(len(points)), np.where(s1 != s0, s1 - s0, 1.0)
         allowed = points.allowances(move.after.values, s1 - s0, move.size)
+        allowed[self.stood & (np.abs(s1 - s0) <= self.limits.undecided * move.size)] = np.inf
         above, below = s1 > np.maximum(points.high + allowed, s0), s1 < np.minimum(points.low - allowed, s0)
         for ends, beyond in ((points.high, above), (points.low, below)):
             found[beyond] = np.clip((ends[beyond] - s0[beyond]) / way[beyond], 0.0, 1.0 - 1e-12)
@@ -260,6 +261,7 @@ class Crossing:
             rates = self._rates()
             k = self._next(rates)
             if k is None:
+                self._curve.stood = self._rests
                 return self.passages
             self._pass(k, rates)
             self._count()

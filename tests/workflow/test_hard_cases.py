@@ -173,11 +173,8 @@ PATIENCE = 200.0
 """Seconds."""
 
 
-LOST_NOW = pytest.mark.xfail(reason="its path ends lost, since rounding of what it starts from has changed")
-
-
 @pytest.mark.long
-@pytest.mark.parametrize("key", [STOOD[0], pytest.param(STOOD[1], marks=LOST_NOW)])
+@pytest.mark.parametrize("key", STOOD)
 def test_a_path_that_found_no_step_short_enough_reaches_its_end(key: str) -> None:
     """All rows are certified, and the end is not against what limit analysis proves; how long it takes is not asked."""
     wide = Table.read(BENCHMARKS / "hard_wide.toml")
