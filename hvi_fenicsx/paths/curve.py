@@ -96,7 +96,8 @@ class CurvedBranch(Events):
         largest = float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, points.high, points.low)
         there = np.abs(ends - s) <= points.allowances(self.here.values, rates, largest)
-        moves = np.abs(rates) > np.where((there & points.bent) | self.stood, self.limits.undecided, self.limits.standing) * largest
+        rests = np.where((there & points.bent) | self.stood, self.limits.undecided, self.limits.standing)
+        moves = np.abs(rates) > rests * largest
         found = np.full(len(points), np.inf)
         found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)
         return found, ends
