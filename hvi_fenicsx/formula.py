@@ -1,7 +1,7 @@
-"""Numbers at each point of space; formulas in x, y, z, parsed by Python's own ``ast`` through a whitelist, not run.
+"""Numbers at each point of space; formulas in x, y, z, parsed by Python's own ``ast`` through a whitelist.
 
-A formula is checked once, when the scene is read, and then rendered into whatever algebra is at hand
-(UFL for the forms, NumPy for values at vertices): see :class:`Algebra`.
+A formula is checked once, when the scene is read: a tree is made anew of what is allowed alone. It is then evaluated in
+whatever algebra is at hand (UFL for the forms, NumPy for values at vertices): see :data:`Algebra`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import sys
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -24,29 +24,19 @@ from .typing import Array
 
 COORDINATES = ("x", "y", "z")
 CONSTANTS = {"pi": math.pi}
-_NUMPY: Mapping[str, Callable[..., Any]] = {
-    "abs": np.abs,
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "sin": np.sin,
-    "cos": np.cos,
-    "tan": np.tan,
-    "sinh": np.sinh,
-    "cosh": np.cosh,
-    "tanh": np.tanh,
+Algebra = Mapping[str, Callable[..., Any]]
+"""What a formula needs beyond Python's operators, by name: :data:`FUNCTIONS`, ``number``, which turns a literal into a
+value of the algebra, and ``where(condition, if_true, if_false)``."""
+_OF_ONE = ("abs", "sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
+_OF_TWO = ("min", "max")
+FUNCTIONS = (*_OF_ONE, *_OF_TWO)
+NUMPY: Algebra = {
+    **{name: getattr(np, name) for name in (*_OF_ONE, "where")},
     "min": np.minimum,
     "max": np.maximum,
+    "number": np.float64,
 }
-FUNCTIONS = tuple(_NUMPY)
-_TWO_ARGUMENTS = ("min", "max")
-_BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-}
+_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
 COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -131,29 +121,13 @@ class Computed(SpatialValue):
         return self._at(points)
 
 
-class Algebra(NamedTuple):
-    """The operations a formula needs beyond Python's operators.
-
-    Attributes:
-        number: turns a literal into a value of the algebra.
-        functions: by name, those of :data:`FUNCTIONS`.
-        where: ``where(condition, if_true, if_false)``.
-    """
-
-    number: Callable[[float], Any]
-    functions: Mapping[str, Callable[..., Any]]
-    where: Callable[[Any, Any, Any], Any]
-
-
-NUMPY = Algebra(np.float64, _NUMPY, np.where)
-
-
 def ufl_algebra(number: Callable[[float], Any]) -> Algebra:
     """UFL's operations; ``number`` wraps a literal (a ``fem.Constant``, so that no value is compiled in)."""
     import ufl
 
-    others = {"abs": abs, "log": ufl.ln, "min": ufl.min_value, "max": ufl.max_value}
-    return Algebra(number, {name: others.get(name) or getattr(ufl, name) for name in FUNCTIONS}, ufl.conditional)
+    alike = {name: getattr(ufl, name) for name in _OF_ONE if name not in ("abs", "log")}
+    others = {"abs": abs, "log": ufl.ln, "min": ufl.min_value, "max": ufl.max_value, "where": ufl.conditional}
+    return {**alike, **others, "number": number}
 
 
 class Formula(SpatialValue):
@@ -200,7 +174,9 @@ class Formula(SpatialValue):
             x: the coordinates, by number; missing ones count as 0.
             algebra: its operations.
         """
-        return _render(self._tree, x, algebra)
+        missing = dict.fromkeys(COORDINATES[len(x) :], algebra["number"](0.0))
+        names = {"__builtins__": {}, **algebra, **dict(zip(COORDINATES, x, strict=False)), **missing}
+        return eval(compile(self._tree, "formula", "eval"), names)
 
     @override
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
@@ -232,7 +208,7 @@ def _finite(value: float | int) -> float:
     return float(value)
 
 
-def _parse(text: str) -> ast.expr:
+def _parse(text: str) -> ast.Expression:
     text = text.strip()
     if "#" in text:
         raise InputError(f"{text!r} has a comment in it; put it behind the formula's quotes")
@@ -244,8 +220,7 @@ def _parse(text: str) -> ast.expr:
             tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise InputError(f"{text!r} is not a formula: {getattr(error, 'msg', error)}") from None
-    _check(tree, text, 0)
-    return tree
+    return ast.fix_missing_locations(ast.Expression(_checked(tree, text)))
 
 
 def _source(node: ast.expr, text: str) -> str:
@@ -255,45 +230,51 @@ def _source(node: ast.expr, text: str) -> str:
     return repr(part if len(part) <= _LONGEST_SHOWN else part[:_LONGEST_SHOWN] + "...")
 
 
-def _check(node: ast.expr, text: str, depth: int) -> None:
+def _checked(node: ast.expr, text: str, depth: int = 0) -> ast.expr:
+    """A formula made of what is allowed alone, anew: a number is ``number(...)``, a choice ``where(...)``."""
     if depth > _DEEPEST:
         raise InputError(f"the formula is nested more than {_DEEPEST} deep")
+
+    def inner(*nodes: ast.expr) -> list[ast.expr]:
+        return [_checked(one, text, depth + 1) for one in nodes]
+
     match node:
         case ast.Constant(value=bool()) | ast.Constant(value=complex()):
             raise InputError(f"{_source(node, text)} in {text!r} is not a real number")
         case ast.Constant(value=int() | float() as value):
             if not abs(value) <= sys.float_info.max:
                 raise InputError(f"a number in {text!r} is not finite")
-            return
+            return _call("number", [ast.Constant(float(value))])
+        case ast.Name(id=name) if name in CONSTANTS:
+            return _call("number", [ast.Constant(CONSTANTS[name])])
+        case ast.Name(id=name) if name in COORDINATES:
+            return node
         case ast.Name(id=name):
-            _check_name(name, text)
-            return
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-            _check_power(op, right, text)
-            children = [left, right]
-        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
-            children = [operand]
+            hint = f"; {name} is a function: write {name}(...)" if name in FUNCTIONS else ""
+            raise InputError(f"{name!r} in {text!r} is not known; a formula may use x, y, z and pi{hint}")
+        case ast.BinOp(left=left, op=op, right=right) if isinstance(op, _OPERATORS):
+            one, other = inner(left, right)
+            return ast.BinOp(one, op, _exponent(right, other, text) if isinstance(op, ast.Pow) else other)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return ast.UnaryOp(ast.USub(), *inner(operand))
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return inner(operand)[0]
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
             _check_call(name, len(args), text)
-            children = args
+            return _call(name, inner(*args))
         case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=yes, orelse=no) if (
             type(op) in COMPARISONS
         ):
-            children = [a, b, yes, no]
-        case _:
-            raise InputError(
-                f"{_source(node, text)} in {text!r} is not allowed; a formula has numbers, x, y, z, pi, "
-                f"+ - * / **, 'a if x < 1 else b' and {', '.join(FUNCTIONS)}"
-            )
-    for child in children:
-        _check(child, text, depth + 1)
+            one, other, *choices = inner(a, b, yes, no)
+            return _call("where", [ast.Compare(one, [op], [other]), *choices])
+    raise InputError(
+        f"{_source(node, text)} in {text!r} is not allowed; a formula has numbers, x, y, z, pi, "
+        f"+ - * / **, 'a if x < 1 else b' and {', '.join(FUNCTIONS)}"
+    )
 
 
-def _check_name(name: str, text: str) -> None:
-    if name in COORDINATES or name in CONSTANTS:
-        return
-    hint = "" if name not in FUNCTIONS else f"; {name} is a function: write {name}(...)"
-    raise InputError(f"{name!r} in {text!r} is not known; a formula may use x, y, z and pi{hint}")
+def _call(name: str, arguments: list[ast.expr]) -> ast.expr:
+    return ast.Call(ast.Name(name, ast.Load()), arguments, [])
 
 
 def _check_call(name: str, count: int, text: str) -> None:
@@ -301,43 +282,18 @@ def _check_call(name: str, count: int, text: str) -> None:
         close = closest(name, FUNCTIONS)
         hint = f"did you mean {close}? " if close else ""
         raise InputError(f"function {name!r} in {text!r} is not known; {hint}allowed: {', '.join(FUNCTIONS)}")
-    wanted = 2 if name in _TWO_ARGUMENTS else 1
+    wanted = 2 if name in _OF_TWO else 1
     if count != wanted:
         raise InputError(f"{name} in {text!r} takes {wanted} {'argument' if wanted == 1 else 'arguments'}, not {count}")
 
 
-def _check_power(op: ast.operator, exponent: ast.expr, text: str) -> None:
-    while isinstance(exponent, ast.UnaryOp):  # x**-2
-        exponent = exponent.operand
-    if not isinstance(op, ast.Pow) or not isinstance(exponent, ast.Constant):
-        return
-    if isinstance(exponent.value, int | float) and abs(exponent.value) > _LARGEST_POWER:
-        power = _source(exponent, text)
-        raise InputError(f"the power {power} in {text!r} is too large; {_LARGEST_POWER} at most")
-
-
-def _render(node: ast.expr, x: Any, algebra: Algebra) -> Any:
-    match node:
-        case ast.Constant(value=value):
-            return algebra.number(float(value))
-        case ast.Name(id=name):
-            return algebra.number(CONSTANTS[name]) if name in CONSTANTS else _coordinate(name, x, algebra)
-        case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)):
-            # An integer power stays one: UFL then multiplies, and a negative base is allowed.
-            return _render(left, x, algebra) ** power
-        case ast.BinOp(left=left, op=op, right=right):
-            return _BINARY[type(op)](_render(left, x, algebra), _render(right, x, algebra))
-        case ast.UnaryOp(op=op, operand=operand):
-            value = _render(operand, x, algebra)
-            return -value if isinstance(op, ast.USub) else value
-        case ast.Call(func=ast.Name(id=name), args=args):
-            return algebra.functions[name](*(_render(a, x, algebra) for a in args))
-        case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=yes, orelse=no):
-            condition = COMPARISONS[type(op)](_render(a, x, algebra), _render(b, x, algebra))
-            return algebra.where(condition, _render(yes, x, algebra), _render(no, x, algebra))
-    raise AssertionError(f"unchecked node {ast.dump(node)}")  # _check has refused everything else
-
-
-def _coordinate(name: str, x: Any, algebra: Algebra) -> Any:
-    index = COORDINATES.index(name)
-    return x[index] if index < len(x) else algebra.number(0.0)
+def _exponent(given: ast.expr, checked: ast.expr, text: str) -> ast.expr:
+    """A whole number stays one: UFL then multiplies, and a negative base is allowed."""
+    number = given
+    while isinstance(number, ast.UnaryOp):  # x**-2
+        number = number.operand
+    if not isinstance(number, ast.Constant):
+        return checked
+    if isinstance(number.value, int | float) and abs(number.value) > _LARGEST_POWER:
+        raise InputError(f"the power {_source(number, text)} in {text!r} is too large; {_LARGEST_POWER} at most")
+    return given if number is given and isinstance(number.value, int) else checked
