@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,17 +11,19 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
-from matplotlib.path import Path
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FixedLocator, MaxNLocator
 from matplotlib.transforms import Bbox
 
 from ...typing import Array
 from ..reader import Result
-from .style import INK, VERMILION, WIDTH, figure, heading, resize
+from .shape import ARROW, DeformedBody, HeldSide, LoadedSide, Side, sparse
+from .style import BLUE, INK, VERMILION, WIDTH, figure, heading, resize
 
 LETTERS = 12
 """Points: the size of a label's letters."""
+CONTACT, SUPPORT, LOADED = ("#eea06d", "contact, friction or adhesion"), ("#9fb7c9", "support"), ("#f3cf7a", "loaded")
+"""What acts on a part: its colour in the picture of a scene, and its words."""
 _WAYS = np.array([[0, 1], [1, 0], [-1, 0], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
 """Where else a label is tried beside its point."""
 
@@ -53,6 +56,7 @@ class Canvas:
         labels: the words in it.
         keys: the lines of the legend by their words.
         tallest: the largest height of the axes, inches.
+        toward: the unit vector from the body towards the eye, (3,).
     """
 
     result: Result
@@ -61,6 +65,7 @@ class Canvas:
     labels: list[Label] = field(default_factory=list)
     keys: dict[str, Artist] = field(default_factory=dict)
     tallest: float = 6.4
+    toward: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     def __post_init__(self) -> None:
         """Make the figure; its height is known in the end."""
@@ -119,18 +124,88 @@ class Canvas:
             artist.set_in_layout(False)  # all are within the limits, and labels come after
         if self.keys:
             handles = list(self.keys.values())
-            legend = self.fig.legend(handles=handles, loc="outside lower center", ncols=columns)
-            for text, handle in zip(legend.get_texts(), handles, strict=True):
-                if isinstance(handle, Line2D) and handle.get_color() == "none":
-                    text.set_color(str(handle.get_markeredgecolor()))
+            self.fig.legend(handles=handles, loc="outside lower center", ncols=columns, labelcolor="mec")
 
     def follow(self, ways: Array) -> None:
-        """Draw arrows along ways in the picture's plane, m, (j, k, 2)."""
+        """Draw arrows from one point to another in the picture's plane, m, (j, 2, 2)."""
+        style = "-|>,head_length=9,head_width=5"
         for way in ways:
-            style = "-|>,head_length=9,head_width=5"
-            arrow = FancyArrowPatch(path=Path(way), arrowstyle=style, color=VERMILION, lw=3.2, zorder=7, shrinkB=0)
-            self.axes.add_patch(arrow)
+            self.axes.add_patch(FancyArrowPatch(*way, arrowstyle=style, color=VERMILION, lw=3.2, zorder=7, shrinkB=0))
             self.reached.append(way)
+
+    def project(self, points: Array) -> Array:
+        """Points (n, 3) in the picture's plane, (n, 2), m."""
+        return points[:, :2]
+
+    def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
+        """Name the parts, and colour them by what acts on them.
+
+        Args:
+            shape: the body as it is drawn.
+            sides: the parts.
+            contacts: the names of those with contact or a law.
+            held: the names of those with a support.
+        """
+        for side in sides:
+            kind = CONTACT if side.part in contacts else SUPPORT if side.part in held else LOADED
+            self.tint(shape, side, *kind)
+            facing = side.normals @ self.toward >= 0.0
+            seen = np.flatnonzero(facing) if facing.any() else np.arange(len(facing))
+            points = self.project(shape.at_rest[side.vertices[seen]])
+            middle = int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+            inwards = -self.project(side.normals[seen])[middle] * (shape.body.dimension == 2)
+            name = side.part if facing.any() else f"{side.part} (behind)"
+            self.labels.append(Label(name, points[middle], inwards, BLUE))
+
+    def tint(self, shape: DeformedBody, side: Side, colour: str, words: str) -> None:
+        """Colour a part.
+
+        Args:
+            shape: the body as it is drawn.
+            side: the part.
+            colour: its colour.
+            words: what acts on it, for the legend.
+        """
+        raise NotImplementedError
+
+    def supports(self, shape: DeformedBody, found: Sequence[HeldSide]) -> None:
+        """Draw the supports; in space a picture of the scene colours them, others leave them out.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides that are held.
+        """
+
+    def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
+        """Draw arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
+
+        Args:
+            shape: the body as it is drawn.
+            found: the sides with loads.
+        """
+        long = ARROW * shape.body.size
+        for load in found:
+            there = np.flatnonzero(np.linalg.norm(load.traction, axis=1) > load.largest / 8)
+            chosen = there[sparse(shape.points[load.side.vertices[there]], 1.4 * long)]
+            feet, normals = shape.points[load.side.vertices[chosen]], load.side.normals[chosen]
+            ways, beside = load.traction[chosen] * (long / load.largest), load.sheared[chosen, None]
+            pushed = np.einsum("ki,ki->k", ways, normals)[:, None] < 0.0
+            tails = feet + np.where(beside, long / 4 * normals - ways / 2, np.where(pushed, -ways, 0.0))
+            self.arrows(tails, ways)
+            ends, way = self.project(np.concatenate([tails, tails + ways])), self.project(load.side.normal[None])[0]
+            self.reached.append(ends)
+            out = way / (float(np.linalg.norm(way)) or 1.0)
+            middle = ends.mean(axis=0)
+            self.labels.append(Label(load.value, middle + float(((ends - middle) @ out).max()) * out, out))
+
+    def arrows(self, tails: Array, ways: Array) -> None:
+        """Draw the arrows of a load.
+
+        Args:
+            tails: where they begin, m, (k, 3).
+            ways: from there to their tips, m, (k, 3).
+        """
+        raise NotImplementedError
 
     def write(self) -> None:
         """Write the labels, each where it is wanted, or as near to that as it covers no other one."""

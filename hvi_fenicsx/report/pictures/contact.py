@@ -17,7 +17,7 @@ from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..solution_arrays import ContactPart
 from ..units import Unit, quantity, unit_for
-from .shape import PartGeometry, part_geometries
+from .shape import PartGeometry, part_geometries, sparse
 from .style import (
     BLUE,
     GREEN,
@@ -217,10 +217,7 @@ def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     """Vectors at the vertices nearest to the nodes of a coarse grid, whatever the mesh."""
     points = flat.points / flat.unit.size
     spacing = float(np.max(np.ptp(points, axis=0))) / ARROWS
-    places = (points - points.min(axis=0)) / spacing
-    far = np.linalg.norm(places % 1.0 - 0.5, axis=1)
-    order = np.argsort(far)
-    shown = order[np.unique(np.floor(places[order]), axis=0, return_index=True)[1]]
+    shown = sparse(points, spacing)
     ways = vectors[shown] * 0.9 * spacing / (float(np.linalg.norm(vectors, axis=1).max()) or 1.0)
     look: dict[str, Any] = {"units": "inches", "width": 0.016, "minlength": 0, "color": INK, "alpha": 0.85}
     axes.quiver(*points[shown].T, *ways.T, angles="xy", scale_units="xy", scale=1.0, pivot="mid", **look)

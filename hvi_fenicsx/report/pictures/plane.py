@@ -13,15 +13,16 @@ from matplotlib.patches import Patch, PathPatch, Polygon
 from matplotlib.path import Path as DrawnPath
 from matplotlib.patheffects import Normal, TickedStroke, withStroke
 from matplotlib.tri import Triangulation
+from typing_extensions import override
 
 from ...geometry import chains
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..solution_arrays import NOTHING
 from ..units import quantity
-from .canvas import Canvas, Label
-from .shape import ARROW, DeformedBody, HeldSide, LoadedSide, PartGeometry, Region, Side
-from .style import BLUE, GREY, INK, ORANGE, PURPLE, VERMILION
+from .canvas import CONTACT, Canvas
+from .shape import ARROW, DeformedBody, HeldSide, PartGeometry, Region, Side, sparse
+from .style import GREY, INK, ORANGE, PURPLE, VERMILION
 
 LEGIBLE = 5000
 """Cells up to which their edges are drawn, in a square body."""
@@ -83,74 +84,36 @@ class PlaneCanvas(Canvas):
         self.axes.add_patch(PathPatch(path, fc=fc, joinstyle="round", **look))
         self.reached.append(points[np.concatenate(loops), :2])
 
-    def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
-        """Name the parts, and show what acts on them.
+    @override
+    def tint(self, shape: DeformedBody, side: Side, colour: str, words: str) -> None:
+        if (colour, words) == CONTACT:
+            self._line(shape.at_rest[side.vertices, :2], words, color=VERMILION, lw=5, zorder=2)
 
-        Args:
-            shape: the body as it is drawn.
-            sides: the parts.
-            contacts: the names of those with contact or a law.
-            held: the names of those with a support.
-        """
-        for side in sides:
-            line = shape.at_rest[side.vertices, :2]
-            middle = _at(line, np.hstack([line, side.normals[:, :2]]), np.array([_lengths(line)[-1] / 2]))[0]
-            self.labels.append(Label(side.part, middle[:2], -middle[2:], BLUE))
-            if side.part in contacts:
-                self._line(line, "contact, friction or adhesion", color=VERMILION, lw=5, zorder=2)
-
+    @override
     def supports(self, shape: DeformedBody, found: Sequence[HeldSide]) -> None:
-        """Draw the supports.
-
-        Args:
-            shape: the body as it is drawn.
-            found: the sides that are held.
-        """
-        size = shape.body.size
+        off = ARROW / 6 * shape.body.size
         for support in found:
             line, outward = shape.points[support.side.vertices, :2], support.side.normals[:, :2]
-            width = ARROW / 6 * size if support.rolling else 0.0
-            wall = line + width * outward
+            wall = line + support.rolling * off * outward
             strokes = TickedStroke(angle=-135, spacing=8, length=1.0, linewidth=0.9, foreground=GREY)
             self.axes.plot(*wall.T, color=INK, lw=2.2, zorder=3, path_effects=[strokes, Normal()], **_ALONG)
-            self.reached.append(wall + ARROW / 5 * size * outward)
+            self.reached.append(wall + off * outward)
             if not support.rolling:
                 self.key(Patch(fc="white", ec=GREY, hatch="/////", lw=0.0, label="support"))
                 continue
-            places = _at(line, line + width / 2 * outward, _spread(line, np.ones(len(line)), size, apart=width))
             rollers: dict[str, Any] = {"color": INK, "marker": "o", "mfc": "white"}
+            places = ((line + wall) / 2)[sparse(line, 6 * off)]
             self.axes.plot(*places.T, ls="", ms=10, mew=1.2, clip_on=False, zorder=5, **rollers)
             self.key(Line2D([], [], lw=2.2, ms=7, label="support, free to slide", **rollers))
 
-    def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
-        """Draw arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
-
-        Args:
-            shape: the body as it is drawn.
-            found: the sides with loads.
-        """
-        size = shape.body.size
-        for load in found:
-            line, amount = shape.points[load.side.vertices, :2], np.linalg.norm(load.traction, axis=1)
-            beside = bool(load.sheared.all())
-            at = _spread(line, amount, size, apart=ARROW * size * (1.4 if beside else 0.25), long=ARROW * size * beside)
-            arrows = _at(line, load.traction[:, :2], at) * float(ARROW * size / load.largest)
-            feet, outward = _at(line, line, at), _at(line, load.side.normals[:, :2], at)
-            pushed = np.einsum("ki,ki->k", arrows, outward) < -NOTHING * size
-            off = ARROW / 4 * size * outward - arrows / 2 if beside else np.where(pushed[:, None], -arrows, 0.0)
-            self._arrows(feet + off, arrows, INK)
-            ends, middle = np.concatenate([feet + off, feet + off + arrows]), len(at) // 2
-            far = float(((ends - feet[middle]) @ outward[middle]).max(initial=0.0))
-            self.labels.append(Label(load.value, feet[middle] + far * outward[middle], outward[middle]))
-            self.key(Line2D([0, 1], [0, 0], color=INK, marker=">", ms=7, markevery=(1, 1), lw=1.6, label="load"))
-
-    def _arrows(self, tails: Array, arrows: Array, colour: str) -> None:
+    @override
+    def arrows(self, tails: Array, ways: Array) -> None:
         self.axes.quiver(
-            *tails.T, *arrows.T, color=colour, angles="xy", scale_units="xy", scale=1.0, units="inches", width=0.03,
-            headwidth=4.2, headlength=4.6, headaxislength=4.4, minlength=0.1, clip_on=False, zorder=6,
+            *tails[:, :2].T, *ways[:, :2].T, color=INK, angles="xy", scale_units="xy", scale=1.0, units="inches",
+            width=0.03, headwidth=4.2, headlength=4.6, headaxislength=4.4, minlength=0.1, clip_on=False, zorder=6,
             path_effects=_HALO,
         )  # fmt: skip
-        self.reached += [tails, tails + arrows]
+        self.key(Line2D([0, 1], [0, 0], color=INK, marker=">", ms=7, markevery=(1, 1), lw=1.6, label="load"))
 
     def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry]) -> None:
         """Draw the pressure on the parts, and the obstacles where there is room.
@@ -182,24 +145,21 @@ class PlaneCanvas(Canvas):
         for sign, colour, words in kinds:
             values = np.maximum(sign * np.nan_to_num(part.pressure[rows]), 0.0) / (float(np.abs(stress).max()) or 1.0)
             if values.max() > NOTHING:
-                self._profile(base, outward, values, shape.body.size, sign, colour)
+                self._profile(base, outward, values, shape.body.size, colour)
                 most = quantity(float((sign * stress).max()), "Pa")
-                self.key(Patch(fc=colour, alpha=0.5, ec=colour, label=f"{words}, up to {most}"))
+                self.key(Patch(fc=(colour, 0.5), ec=colour, label=f"{words}, up to {most}"))
 
     def _line(self, points: Array, words: str, **look: Any) -> None:
         """A line along a part, with its words in the legend."""
         self.axes.plot(*points.T, **_ALONG, **look)
         self.key(Line2D([], [], label=words, **look))
 
-    def _profile(self, base: Array, outward: Array, values: Array, size: float, sign: int, colour: str) -> None:
-        """Values along a line as an area beside it, with arrows onto the line; from it where the sign is negative."""
+    def _profile(self, base: Array, outward: Array, values: Array, size: float, colour: str) -> None:
+        """Values along a line as an area beside it."""
         tips = base + ARROW * size * values[:, None] * outward
-        self.axes.add_patch(Polygon(np.concatenate([base, tips[::-1]]), color=colour, alpha=0.16, lw=0, clip_on=False))
+        self.axes.add_patch(Polygon(np.concatenate([base, tips[::-1]]), color=colour, alpha=0.3, lw=0, clip_on=False))
         shown = np.where(np.convolve(values > NOTHING, [1, 1, 1])[1:-1, None] > 0, tips, np.nan)
         self.axes.plot(*shown.T, color=colour, lw=1.8, zorder=5, path_effects=_HALO, clip_on=False)
-        at = _spread(base, values, size, fewest=5)
-        feet, ends = _at(base, base, at), _at(base, tips, at)
-        self._arrows(ends if sign > 0 else feet, sign * (feet - ends), colour)
         self.reached.append(tips)
 
     def ghost(self, body: BodyMesh, points: Array, ways: Array) -> None:
@@ -208,7 +168,7 @@ class PlaneCanvas(Canvas):
         Args:
             body: the body.
             points: its points there, m, (n, 3).
-            ways: m, (j, k, 3).
+            ways: from and to, m, (j, 2, 3).
         """
         self._outline(points, body.outline, ec=VERMILION, lw=2, ls=(0, (5, 3)), zorder=4)
         self._outline(points, body.outline, fc=VERMILION, alpha=0.12, zorder=3)
@@ -219,37 +179,3 @@ class PlaneCanvas(Canvas):
         self.lay_out()
         self.write()
         return self.fig
-
-
-def _lengths(line: Array) -> Array:
-    """The way along a line to each of its points."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-
-
-def _at(line: Array, values: Array, at: Array) -> Array:
-    """Values (m, k) at points on a line, interpolated at lengths along it."""
-    s = _lengths(line)
-    return np.column_stack([np.interp(at, s, column) for column in values.T])
-
-
-def _spread(
-    line: Array, amount: Array, size: float, *, apart: float = 0.0, long: float = 0.0, fewest: int = 2
-) -> Array:
-    """Where to put arrows on a line, as lengths along it, where there is something to show: nine on the body's size.
-
-    Args:
-        line: its points, m, (m, 2).
-        amount: how much there is at them, (m,).
-        size: of the body, m.
-        apart: the least way between two, m; one alone stands in the middle.
-        long: how far each reaches along the line, m.
-        fewest: where they may stand as near as they like.
-    """
-    s = _lengths(line)
-    there = (amount > 0.02 * amount.max()).astype(np.float64)
-    start, end = s[there > 0.0][0] + long / 2, s[there > 0.0][-1] - long / 2
-    count = max(fewest, round(9 * (end - start) / size))
-    count = min(count, 1 + int(max(end - start, 0.0) / apart)) if apart else count
-    places = np.linspace(start, end, count, dtype=np.float64) if count > 1 else np.array([(start + end) / 2])
-    shown = places[np.interp(places, s, there) == 1.0]
-    return shown if len(shown) else places

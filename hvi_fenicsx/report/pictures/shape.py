@@ -149,26 +149,35 @@ def _stretch(body: BodyMesh) -> Array:
 
 
 def escaping(body: BodyMesh) -> tuple[Array, Array]:
-    """Where a finite motion along the escape mode brings the vertices, (n, 3): unlike that, it keeps the body's shape.
+    """Where the escape mode brings the vertices, drawn large, (n, 3).
 
     Returns:
-        These, and the ways there of vertices that move, one far out in each diagonal direction, (j, 25, 3).
+        These, and the ways there of vertices that move, one far out in each diagonal direction, (j, 2, 3).
     """
-    from scipy.linalg import expm
-
-    assert body.escape_mode is not None
-    used = np.unique(body.cells)
-    points, mode = np.column_stack([body.points[used], np.ones(len(used))]), body.escape_mode[used]
-    reach = 3 * VISIBLE * body.size / (float(np.linalg.norm(mode, axis=1).max()) or 1.0)
-    velocity = np.zeros((4, 4))  # of x in homogeneous coordinates
-    velocity[:3] = reach * np.linalg.lstsq(points, mode)[0].T
-    ways = [expm(part * velocity)[:3] for part in np.linspace(0.0, 1.0, 25)]
+    mode = body.escape_mode
+    assert mode is not None
+    moved = body.points + 3 * VISIBLE * body.size / (float(np.linalg.norm(mode, axis=1).max()) or 1.0) * mode
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * body.dimension)).reshape(body.dimension, -1).T
-    outer = body.points[body.outermost]
-    far = outer[np.unique(np.argmax((outer - outer.mean(axis=0))[:, : body.dimension] @ signs.T, axis=0))]
-    followed = np.stack([far @ way[:, :3].T + way[:, 3] for way in ways], axis=1)
-    lengths = np.linalg.norm(followed[:, -1] - far, axis=1)  # not the one that the body turns about
-    return body.points @ ways[-1][:, :3].T + ways[-1][:, 3], followed[lengths > VISIBLE * lengths.max()]
+    outer = body.points[body.outermost, : body.dimension]
+    far = body.outermost[np.unique(np.argmax((outer - outer.mean(axis=0)) @ signs.T, axis=0))]
+    ways = np.stack([body.points[far], moved[far]], axis=1)
+    lengths = np.linalg.norm(mode[far], axis=1)  # not the one that the body turns about
+    return moved, ways[lengths > VISIBLE * lengths.max()]
+
+
+def sparse(points: Array, spacing: float) -> Integers:
+    """One point near each node of a coarse grid over all, by their numbers.
+
+    Args:
+        points: m, (m, d).
+        spacing: of the grid, m, about.
+    """
+    low, extent = points.min(axis=0), np.ptp(points, axis=0)
+    count = np.maximum(np.round(extent / spacing), 1.0)
+    place = (points - low) * count / np.where(extent > 0.0, extent, 1.0)
+    node = np.round(place)
+    order = np.argsort(np.round(np.linalg.norm(place - node, axis=1), 6), kind="stable")
+    return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,15 @@ import pyvista
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from typing_extensions import override
 
 from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..units import quantity, unit_for
-from .canvas import Canvas, Label
-from .shape import ARROW, DeformedBody, HeldSide, LoadedSide, PartGeometry, Region, Side
-from .style import BLUE, GREY, INK, PALE, VERMILION, pressure_scale
+from .canvas import Canvas
+from .shape import DeformedBody, PartGeometry, Region, Side
+from .style import GREY, INK, PALE, VERMILION, pressure_scale
 
 ELEVATIONS, AZIMUTHS = (22, -22), (-58, -122, 122, 58)
 """Degrees: from the front, the right and above, unless contact parts are seen better from elsewhere."""
@@ -31,7 +32,6 @@ SHARP = 35
 """Degrees: facets that turn by more have an edge between them."""
 LEGIBLE = 5000
 """Facets up to which their edges are drawn."""
-CONTACT, SUPPORT, LOADED = "#eea06d", "#9fb7c9", "#f3cf7a"
 
 
 class SpaceCanvas(Canvas):
@@ -50,22 +50,22 @@ class SpaceCanvas(Canvas):
         views = [_view(azimuth, elevation) for elevation, azimuth in itertools.product(ELEVATIONS, AZIMUTHS)]
         seen = [sum(max(float(n @ toward), 0.0) for n in normals) for *_, toward in views]
         self.right, self.up, self.toward = views[int(np.argmax(np.round(seen, 6)))]
+        self.nearer = 1e-3 * result.body.size * self.toward  # of two that share a face, this one is seen
 
+    @override
     def project(self, points: Array) -> Array:
-        """Points (n, 3) in the picture's plane, (n, 2), m."""
         return np.asarray(points @ np.column_stack([self.right, self.up]))
 
-    def _reach(self, points: Array) -> None:
-        """Have the picture show points, m, (n, 3)."""
-        self.reached.append(self.project(points))
-
-    def _skin(self, points: Array, facets: Integers, **look: Any) -> None:
-        """Put facets into pyvista's scene; ``scalars`` are by facet, or by vertex of the body."""
+    def _skin(
+        self, rest: Array, points: Array, facets: Integers, *, width: int = 3, edges: str = INK, **look: Any
+    ) -> None:
+        """Put facets and their sharp edges into pyvista's scene; ``scalars`` are by facet, or by vertex of the body."""
         skin = _surface(points, facets)
         if len(look.get("scalars", ())) == len(points) != len(facets):
             look["scalars"] = look["scalars"][skin.point_data["vertex"]]
         self.plotter.add_mesh(skin, show_scalar_bar=False, **look)
-        self._reach(np.asarray(skin.points))
+        self.reached.append(self.project(np.asarray(skin.points)))
+        self._edges(rest, points, facets, edges, width)
 
     def _edges(self, rest: Array, points: Array, facets: Integers, colour: str, width: int) -> None:
         """Put the edges of facets into pyvista's scene: where they turn sharply at rest, or end."""
@@ -93,12 +93,11 @@ class SpaceCanvas(Canvas):
         look: dict[str, Any] = {"lighting": False} if by_cell else {"ambient": 0.6, "diffuse": 0.45}
         mesh = len(body.boundary) <= LEGIBLE and not by_cell
         self._skin(
-            shape.points, body.boundary, scalars=values[body.behind] if by_cell else values, cmap=colours,
+            body.points, shape.points, body.boundary, scalars=values[body.behind] if by_cell else values, cmap=colours,
             clim=(0.0, end or 1.0), show_edges=mesh, edge_color="white", edge_opacity=0.4, line_width=1, **look,
         )  # fmt: skip
-        self._edges(body.points, shape.points, body.boundary, INK, 3)
         self._edges(body.points, body.points, body.boundary, GREY, 2)
-        self._reach(body.points[body.outermost])
+        self.reached.append(self.project(body.points[body.outermost]))
 
     def contacts(self, shape: DeformedBody, parts: Sequence[PartGeometry]) -> None:
         """The pressure on each part, with its scale.
@@ -112,12 +111,10 @@ class SpaceCanvas(Canvas):
         values = np.nan_to_num(np.concatenate([geometry.part.pressure for geometry in parts]))
         colours, low, high = pressure_scale(float(values.min(initial=0.0)), float(np.abs(values).max(initial=0.0)))
         for geometry in parts:
-            points = shape.points + 1e-3 * shape.body.size * self.toward
             self._skin(
-                points, geometry.facets, scalars=geometry.pressure, cmap=colours, clim=(low, high or 1.0),
-                nan_color=PALE, lighting=False,
+                shape.body.points, shape.points + self.nearer, geometry.facets, scalars=geometry.pressure, cmap=colours,
+                clim=(low, high or 1.0), nan_color=PALE, lighting=False,
             )  # fmt: skip
-            self._edges(shape.body.points, points, geometry.facets, INK, 3)
         unit = unit_for(high, "Pa")
         words = f"contact pressure, up to {unit.text(high)}" if low == 0.0 else f"contact pressure in {unit.name}"
         gaps = [geometry.part.largest_gap for geometry in parts if geometry.part.idle.any()]
@@ -139,66 +136,21 @@ class SpaceCanvas(Canvas):
         for number, colour in enumerate([area.tint for area in areas] or [fill]):
             facets = body.boundary[owner[body.behind] == number]
             if len(facets):
-                self._skin(body.points, facets, color=colour, ambient=0.75, diffuse=0.3)
-        self._edges(body.points, body.points, body.boundary, INK, 3)
+                self._skin(body.points, body.points, facets, color=colour, ambient=0.75, diffuse=0.3)
 
-    def sides(self, shape: DeformedBody, sides: Sequence[Side], contacts: Sequence[str], held: Sequence[str]) -> None:
-        """Name the parts, and colour them by what acts on them.
+    @override
+    def tint(self, shape: DeformedBody, side: Side, colour: str, words: str) -> None:
+        self._skin(
+            shape.body.points, shape.body.points + self.nearer, side.facets, width=2, color=colour, lighting=False
+        )
+        self.key(Patch(fc=colour, ec=INK, label=words))
 
-        Args:
-            shape: the body as it is drawn.
-            sides: the parts.
-            contacts: the names of those with contact or a law.
-            held: the names of those with a support.
-        """
-        body = shape.body
-        words = {CONTACT: "contact, friction or adhesion", SUPPORT: "support", LOADED: "loaded"}
-        for side in sides:
-            colour = CONTACT if side.part in contacts else SUPPORT if side.part in held else LOADED
-            points = body.points + 1e-3 * body.size * self.toward
-            self._skin(points, side.facets, color=colour, lighting=False)
-            self._edges(body.points, points, side.facets, INK, 2)
-            own = points[side.vertices]
-            facing = side.normals @ self.toward > 0.0
-            flat = self.project(own[facing] if facing.any() else own)
-            at = flat[np.argmin(np.linalg.norm(flat - flat.mean(axis=0), axis=1))]
-            name = side.part if facing.any() else f"{side.part} (behind)"
-            self.labels.insert(0, Label(name, at, np.zeros(2), BLUE))
-            self.key(Patch(fc=colour, ec=INK, label=words[colour]))
-
-    def supports(self, shape: DeformedBody, found: Sequence[HeldSide]) -> None:
-        """Nothing: a picture of the scene colours them, others leave them out.
-
-        Args:
-            shape: the body as it is drawn.
-            found: the sides that are held.
-        """
-
-    def loads(self, shape: DeformedBody, found: Sequence[LoadedSide]) -> None:
-        """Draw arrows onto a side where it is pushed, from it where it is pulled, off it where they are along it.
-
-        Args:
-            shape: the body as it is drawn.
-            found: the sides with loads.
-        """
-        size = shape.body.size
-        for load in found:
-            chosen = _sparse(shape.body.points[load.side.vertices], size)
-            chosen = chosen[np.linalg.norm(load.traction[chosen], axis=1) > load.largest / 8]
-            ways, normals = load.traction[chosen] * ARROW * size / load.largest, load.side.normals[chosen]
-            feet = shape.points[load.side.vertices[chosen]]
-            pushed = np.einsum("ki,ki->k", ways, normals) < 0.0
-            tails = feet - np.where(pushed[:, None], ways, 0.0)
-            beside = load.sheared[chosen]
-            tails[beside] = (feet + ARROW / 5 * size * normals - ways / 2)[beside]
-            arrow = pyvista.Arrow(tip_length=0.3, tip_radius=0.075, shaft_radius=0.022)
-            cloud = pyvista.PolyData(tails)
-            cloud.point_data["way"] = ways
-            self.plotter.add_mesh(cloud.glyph(orient="way", scale="way", geom=arrow), color=INK, lighting=False)
-            ends = np.concatenate([tails, tails + ways])
-            self._reach(ends)
-            flat = self.project(ends)
-            self.labels.append(Label(load.value, flat[np.argmax(flat[:, 1])], np.array([0.0, 1.0])))
+    @override
+    def arrows(self, tails: Array, ways: Array) -> None:
+        cloud = pyvista.PolyData(tails)
+        cloud.point_data["way"] = ways
+        arrow = pyvista.Arrow(tip_length=0.3, tip_radius=0.075, shaft_radius=0.022)
+        self.plotter.add_mesh(cloud.glyph(orient="way", scale="way", geom=arrow), color=INK, lighting=False)
 
     def ghost(self, body: BodyMesh, points: Array, ways: Array) -> None:
         """Draw a body where a motion brings it, and the ways of some of its points but that farthest behind.
@@ -206,11 +158,10 @@ class SpaceCanvas(Canvas):
         Args:
             body: the body.
             points: its points there, m, (n, 3).
-            ways: m, (j, k, 3).
+            ways: from and to, m, (j, 2, 3).
         """
-        nearer = points + 1e-3 * body.size * self.toward  # where the two share a face, the ghost's is seen
-        self._skin(nearer, body.boundary, color=VERMILION, opacity=0.16, lighting=False)
-        self._edges(body.points, nearer, body.boundary, VERMILION, 4)
+        look: dict[str, Any] = {"color": VERMILION, "opacity": 0.16, "lighting": False}
+        self._skin(body.points, points + self.nearer, body.boundary, width=4, edges=VERMILION, **look)
         depths = ways[:, 0] @ self.toward
         self.follow(np.array([self.project(way) for way in ways[np.argsort(depths)[len(ways) > 1 :]]]))
 
@@ -261,11 +212,3 @@ def _surface(points: Array, facets: Integers) -> pyvista.PolyData:
     skin.point_data["vertex"] = used
     skin.set_active_scalars(None)
     return skin
-
-
-def _sparse(points: Array, size: float) -> Integers:
-    """One point of a face near each node of a coarse grid about its middle."""
-    place = (points - (points.min(axis=0) + points.max(axis=0)) / 2) / (0.25 * size)
-    node = np.round(place)
-    order = np.argsort(np.round(np.linalg.norm(place - node, axis=1), 6), kind="stable")
-    return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
