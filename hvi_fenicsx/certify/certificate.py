@@ -21,7 +21,7 @@ from ..typing import Array
 from . import balance, contact_state
 from . import second_order as stability
 from .contact_state import ContactState, Forces
-from .thresholds import DEFAULT, CertificateThresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -111,7 +111,6 @@ def examine(
     tolerance: float,
     *,
     inertia: bool = False,
-    thresholds: CertificateThresholds = DEFAULT,
 ) -> Examination:
     """Certify u. Collective.
 
@@ -121,18 +120,17 @@ def examine(
         tolerance: relative.
         inertia: whether to factorise the Hessian where the states leave the second order undecided (it costs a
             direct solve or two).
-        thresholds: when a vertex is on a kink or a bound, and what is rounding.
     """
     comm = problem.domain.mesh.comm
     forces = contact_state.forces(problem, u)
     known = references.of(problem, forces.load)
-    states = contact_state.states(known, u, forces.reaction, thresholds)
+    states = contact_state.states(known, u, forces.reaction)
     net = {"net_force": balance.net_forces(known, forces, states, u)}
     entries = measured(known, u, forces, states)
     passed, rounding = _within(entries, tolerance), None
-    if not passed and _within(entries, thresholds.largest_rounding):
+    if not passed and _within(entries, DEFAULT.largest_rounding):
         shuffled = rounding_errors(known, u, forces, states)
-        floors = {name: thresholds.rounding_safety * moved for name, moved in shuffled.items()}
+        floors = {name: DEFAULT.rounding_safety * moved for name, moved in shuffled.items()}
         beyond = {name: np.where(values <= floors[name], 0.0, values) for name, values in entries.items()}
         passed, rounding = _within(beyond, tolerance), float(np.max(list(floors.values())))
     mixity = _mixity(comm, states)

@@ -21,8 +21,7 @@ from ..problem.references import References, elastic_forces
 from ..problem.vectors import nodal_values
 from ..typing import Array, Integers, Mask
 from . import force_attribution
-from .force_attribution import ForceAttribution
-from .thresholds import DEFAULT, CertificateThresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -126,38 +125,24 @@ def forces(problem: Problem, u: fem.Function) -> Forces:
     return Forces(*(problem.combined(force) for force in (internal - load, load, pushing)))
 
 
-def states(
-    references: References, u: fem.Function, reaction: Array, thresholds: CertificateThresholds = DEFAULT
-) -> tuple[ContactState, ...]:
+def states(references: References, u: fem.Function, reaction: Array) -> tuple[ContactState, ...]:
     """The state of each part with bounds or laws, in the problem's order. Collective.
 
     Args:
         references: of the problem that is solved.
         u: nondimensional, ghosts updated.
         reaction: internal forces minus loads at u, (blocks, d).
-        thresholds: when a vertex is on a kink or a bound.
     """
     problem = references.problem
     values = problem.relative(u.x.array)
-    near = thresholds.near * references.at(np.arange(len(reaction)))
+    near = DEFAULT.near * references.at(np.arange(len(reaction)))
     attribution = force_attribution.attribute(problem, values, reaction, near)
     laws = [
-        of_term(attribution, number, term, values, references.traction_scale(term))
-        for number, term in enumerate(problem.terms)
+        _law_state(term, values, *tractions, references.traction_scale(term), term.reach(near[term.surface.blocks]))
+        for term, tractions in zip(problem.terms, attribution.laws, strict=True)
     ]
-    contact = {bounds.surface.part: _contact(attribution, number) for number, bounds in enumerate(problem.bounds)}
+    contact = attribution.contact
     return tuple(_state(problem, surface, values, reaction, laws, contact, near) for surface in problem.surfaces)
-
-
-def _contact(attribution: ForceAttribution, number: int) -> Array:
-    """σ_n that contact carries, (m,); off the bounds what is left there, which should be nothing."""
-    bounds = attribution.bounds[number]
-    dofs, sign = bounds.component()
-    weight = np.where(attribution.contact[dofs], attribution.contact_weight[dofs], bounds.surface.weights)
-    carried = sign * attribution.contact_force[dofs] / weight
-    at, forces = attribution.shared.of_bounds(number, bounds)
-    carried[at] = -np.sum(forces * bounds.surface.normals[at], axis=1) / bounds.surface.weights[at]
-    return np.asarray(carried)
 
 
 def _state(
@@ -294,64 +279,25 @@ class LawState:
         return force_attribution.on_kink(self.term.law.convex, self.argument, self.near)
 
 
-def of_term(attribution: ForceAttribution, number: int, term: LawTerm, u: Array, scale: Array) -> LawState:
-    """The state of one law.
-
-    Args:
-        attribution: who carries which force.
-        number: of the law among the problem's.
-        term: the law.
-        u: nondimensional, relative displacements on interfaces.
-        scale: what its traction is judged by, (m,).
-    """
-    local = attribution.terms[number]
-    argument, near = term.argument(u), term.reach(attribution.near[term.surface.blocks])
+def _law_state(term: LawTerm, u: Array, given: Array, hidden: Mask, scale: Array, near: Array) -> LawState:
+    """The state of a law that gives known tractions at a local array u."""
+    components, argument = term.slip(u), term.argument(u)
     low, high = term.law.interval(argument, near)
-    parts, hidden = [], np.zeros(len(argument), dtype=bool)
-    for dofs, sign in force_attribution.components(local):
-        share = np.where(sign > 0, attribution.share[dofs], 1.0 - attribution.share[dofs])
-        parts.append(low + share * (high - low) + sign * attribution.excess[dofs])
-        hidden |= attribution.held[dofs]
-    if len(parts) == 1:
-        at, forces = attribution.shared.of_law(number, local)
-        parts[0][at] = np.sum(forces * local.directions[at, 0], axis=1) / term.weights[at]
-        traction, distance, given = parts[0], _away(parts[0], low, high), parts[0][:, None]
-        allowed = np.clip(parts[0], low, high)[:, None]
+    if term.length is None:
+        traction, allowed = given[:, 0], np.clip(given, low[:, None], high[:, None])
     else:
-        traction, distance, given, allowed = _of_length(attribution, number, term, u)
+        distance = near * term.stretch
+        traction = term.length.traction(components, given, distance)
+        allowed = term.length.allowed(components, given, (low, high), distance)
     return LawState(
         term=term,
-        components=term.slip(u),
+        components=components,
         argument=argument,
         traction=traction,
         given=given,
-        distance=distance,
+        distance=np.linalg.norm(given - allowed, axis=1),
         allowed=allowed,
         scale=scale,
         hidden=hidden,
         near=near,
     )
-
-
-def _of_length(
-    attribution: ForceAttribution, number: int, term: LawTerm, u: Array
-) -> tuple[Array, Array, Array, Array]:
-    """A law of a length: its traction, how far the tractions are from what it allows, they, and the nearest allowed."""
-    local, length = attribution.terms[number], term.length
-    assert length is not None
-    blocks, d = term.surface.blocks, term.free.shape[1]
-    near, components = attribution.near[blocks], term.slip(u)
-    low, high = term.law.interval(term.argument(u), term.reach(near))
-    gradient = length.gradient(components)
-    elsewhere = (attribution.held | attribution.contact).reshape(-1, d)[blocks]
-    hidden = np.any((local.directions != 0.0) & elsewhere[:, None, :], axis=2)
-    needed = np.einsum("mkd,md->mk", local.directions, attribution.needed.reshape(-1, d)[blocks])
-    given = np.where(hidden, gradient * ((low + high) / 2)[:, None], needed / term.weights[:, None])
-    at, forces = attribution.shared.of_law(number, local)
-    given[at] = np.einsum("mkd,md->mk", local.directions[at], forces) / term.weights[at, None]
-    allowed = length.allowed(components, given, (low, high), near)
-    return length.traction(components, given, near), np.linalg.norm(given - allowed, axis=1), given, allowed
-
-
-def _away(traction: Array, low: Array, high: Array) -> Array:
-    return np.maximum(np.maximum(low - traction, traction - high), 0.0)

@@ -1,8 +1,8 @@
-"""Which of laws, contact and prescribed displacements carry the residual force at a vertex of Γc, by component.
+"""Which of laws, contact and prescribed displacements carry the residual force at a vertex of Γc.
 
-At most vertices a component has one carrier. At corners, at the seam of two parts, and where adhesion acts beside
-contact there are several, and only their sum is known. Laws may then carry any value of the (weighted, Minkowski) sum
-of their Clarke intervals; a bound that is reached, or a support, carries the rest; without one it is the laws' error.
+At most vertices a component has one carrier, which gives what is needed. At corners, at the seam of two parts, and
+where adhesion acts beside contact there are several, and only their sum is known: such forces are taken that each
+carrier may give, with the sum nearest to what is needed. What is left is the error of all that meet there.
 """
 
 from __future__ import annotations
@@ -19,88 +19,21 @@ from ..problem.problem import Bounds, Problem
 from ..system import local_frames
 from ..system.rigid_motions import SUMMATION
 from ..typing import Array, Integers, Mask
-from .thresholds import DEFAULT, CertificateThresholds
+from .thresholds import DEFAULT
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ForceAttribution:
-    """The attribution, by owned scalar dof in local components; all arrays (n,).
+    """What laws and contact carry.
 
     Attributes:
-        terms: the problem's laws in local components.
-        bounds: its bounds in local components.
-        near: distance (of u0) from a kink or a bound that counts as being on it, at each owned vertex, (blocks,).
-        needed: minus the residual, what the carriers give.
-        low: lower end of the range of the laws' sum.
-        high: its upper end.
-        weight: area of the laws.
-        contact: whether a bound is reached.
-        held: whether it is prescribed.
-        contact_weight: area of the parts whose bound is reached.
-        shared: the forces at vertices where a law of |u_t| shares a component with others: they replace all above.
+        laws: of each law the tractions along its directions, without its multiplier, (m, k), and where a support hides
+            one of them, (m,).
+        contact: of each part with bounds σ_n, (m,); off the bounds what is left there, which should be nothing.
     """
 
-    terms: tuple[LawTerm, ...]
-    bounds: tuple[Bounds, ...]
-    near: Array
-    needed: Array
-    low: Array
-    high: Array
-    weight: Array
-    contact: Mask
-    held: Mask
-    contact_weight: Array
-    shared: SharedForces
-
-    @property
-    def by_laws(self) -> Array:
-        """What the laws carry within their range; the middle of it where a support hides their share."""
-        return np.where(self.held, (self.low + self.high) / 2, np.clip(self.needed, self.low, self.high))
-
-    @property
-    def share(self) -> Array:
-        """Where in their range the laws stand, from 0 to 1."""
-        width = self.high - self.low
-        return np.divide(self.by_laws - self.low, width, out=np.zeros_like(width), where=width > 0)
-
-    @property
-    def excess(self) -> Array:
-        """What neither the laws' range nor contact nor a support accounts for, per area of the laws."""
-        rest = np.where(self.contact | self.held, 0.0, self.needed - self.by_laws)
-        return np.divide(rest, self.weight, out=np.zeros_like(rest), where=self.weight > 0)
-
-    @property
-    def contact_force(self) -> Array:
-        """Residual force that bounds carry; off the bounds what they should not: the residual where no law acts."""
-        alone = (self.weight == 0) | self.contact
-        return np.where(self.held | ~alone, 0.0, self.by_laws - self.needed)
-
-    def enter_law(self, term: LawTerm, u: Array) -> None:
-        """Enter what a law may carry.
-
-        Args:
-            term: the law at its vertices.
-            u: the displacement, nondimensional, a local array.
-        """
-        low, high = term.law.interval(term.argument(u), term.reach(self.near[term.surface.blocks]))
-        for dofs, sign in components(term):
-            ends = np.stack([sign * low, sign * high]) * term.weights
-            np.add.at(self.low, dofs, ends.min(axis=0))
-            np.add.at(self.high, dofs, ends.max(axis=0))
-            np.add.at(self.weight, dofs, term.weights)
-
-    def enter_bounds(self, bounds: Bounds, u: Array) -> None:
-        """Enter which bounds are reached.
-
-        Args:
-            bounds: of one part.
-            u: the displacement, nondimensional, a local array.
-        """
-        dofs, _ = bounds.component()
-        lower, upper = _reached(bounds, u, self.near)
-        reached = lower | upper
-        self.contact[dofs] |= reached
-        np.add.at(self.contact_weight, dofs, np.where(reached, bounds.surface.weights, 0.0))
+    laws: Sequence[tuple[Array, Mask]]
+    contact: Mapping[str, Array]
 
 
 def attribute(problem: Problem, u: Array, residual: Array, near: Array) -> ForceAttribution:
@@ -113,31 +46,64 @@ def attribute(problem: Problem, u: Array, residual: Array, near: Array) -> Force
         near: distance (of u0) from a kink or a bound that counts as being on it, at the owned blocks, (blocks,).
     """
     local = local_frames.frames_of(problem)
+    terms, bounds = problem.terms, problem.bounds
     if local is not None:
         u, residual = local.local_components(u), local.local_components(residual)
-    n = residual.size
-    terms = problem.terms if local is None else tuple(local.term(t) for t in problem.terms)
-    bounds = problem.bounds if local is None else tuple(local.bounds(b) for b in problem.bounds)
-    needed, held = -residual.ravel(), np.isin(np.arange(n), problem.fixed)
-    reached = [(b, *_reached(b, u, near)) for b in bounds]
-    found = ForceAttribution(
-        terms=terms,
-        bounds=bounds,
-        near=near,
-        needed=needed,
-        low=np.zeros(n),
-        high=np.zeros(n),
-        weight=np.zeros(n),
-        contact=np.zeros(n, dtype=bool),
-        held=held,
-        contact_weight=np.zeros(n),
-        shared=settle(terms, reached, u, needed, held, near),
-    )
-    for term in found.terms:
-        found.enter_law(term, u)
-    for one in found.bounds:
-        found.enter_bounds(one, u)
-    return found
+        terms, bounds = tuple(map(local.term, terms)), tuple(map(local.bounds, bounds))
+    laws, pressed = np.zeros(residual.size, np.int64), np.zeros(residual.size, np.int64)
+    for dofs, _ in (pair for term in terms for pair in components(term)):
+        np.add.at(laws, dofs, 1)
+    reached = [_reached(one, u, near) for one in bounds]
+    for one, (lower, upper) in zip(bounds, reached, strict=True):
+        np.add.at(pressed, one.component()[0], lower | upper)
+    free = ~np.isin(np.arange(residual.size), problem.fixed)
+    found = _Vertices(u, near, -residual, *(v.reshape(residual.shape) for v in (free, laws, pressed)))
+    blocks = np.flatnonzero(np.any((found.laws + found.pressed > 1) & found.free, axis=1))
+    row, shown = np.full(len(near), -1), found.free[blocks]
+    row[blocks] = np.arange(len(blocks))
+    carriers = [_of_law(term, row, shown, u, near) for term in terms]
+    carriers += [_of_bounds(one, *on, row, shown) for one, on in zip(bounds, reached, strict=True)]
+    forces, left = nearest_sum(carriers, np.where(shown, found.needed[blocks], 0.0))
+    shared = iter([(c.own, force + left[c.rows]) for c, force in zip(carriers, forces, strict=True)])
+    of_laws = [found.tractions(term, *next(shared)) for term in terms]
+    return ForceAttribution(of_laws, {one.surface.part: found.pressure(one, *next(shared)) for one in bounds})
+
+
+@dataclass(frozen=True)
+class _Vertices:
+    """What is known of the vertices in local components, (blocks, d) each, but for u and the distances near to a kink.
+
+    The forces that are needed; where no support hides them; how many laws act there, and how many bounds are reached.
+    """
+
+    u: Array
+    near: Array
+    needed: Array
+    free: Mask
+    laws: Integers
+    pressed: Integers
+
+    def tractions(self, term: LawTerm, own: Integers, forces: Array) -> tuple[Array, Mask]:
+        """Of a law, and where a support hides one of them; its forces at those of its vertices that are shared."""
+        blocks = term.surface.blocks
+        low, high = term.law.interval(term.argument(self.u), term.reach(self.near[blocks]))
+        held, covered = (
+            np.any((term.directions != 0.0) & where[blocks, None], axis=2)
+            for where in (~self.free, ~self.free | (self.pressed > 0))
+        )
+        middle = term.gradient(term.slip(self.u)) * ((low + high) / 2)[:, None]
+        given = np.einsum("mkd,md->mk", term.directions, self.needed[blocks]) / term.weights[:, None]
+        given = np.where(covered, middle, given)
+        given[own] = np.einsum("mkd,md->mk", term.directions[own], forces) / term.weights[own, None]
+        return given, np.any(held, axis=1)
+
+    def pressure(self, bounds: Bounds, own: Integers, forces: Array) -> Array:
+        """σ_n of contact; its forces at those of its vertices that are shared."""
+        (dofs, sign), weights = bounds.component(), bounds.surface.weights
+        alone = self.free & (self.laws == 0) & (self.pressed < 2)
+        carried = np.where(alone, -self.needed, 0.0).ravel()[dofs] * sign / weights
+        carried[own] = -np.sum(forces * bounds.surface.normals[own], axis=1) / weights[own]
+        return np.asarray(carried)
 
 
 def _reached(bounds: Bounds, u: Array, near: Array) -> tuple[Mask, Mask]:
@@ -155,18 +121,6 @@ def on_bounds(bounds: Bounds, normal: Array, near: float | Array) -> tuple[Mask,
         near: distance that counts as being on a bound, one for all or (m,).
     """
     return normal <= bounds.lower + near, normal >= bounds.upper - near
-
-
-def touches(bounds: Bounds, normal: Array, near: float | Array) -> Mask:
-    """Whether a normal displacement is on a bound, (m,).
-
-    Args:
-        bounds: of u·n.
-        normal: u·n, (m,).
-        near: distance that counts as being on a bound, one for all or (m,).
-    """
-    lower, upper = on_bounds(bounds, normal, near)
-    return lower | upper
 
 
 def on_kink(part: ConvexPart, argument: Array, near: float | Array) -> Mask:
@@ -187,6 +141,7 @@ class Carrier:
     Attributes:
         rows: their numbers among the shared vertices, (k,).
         own: their numbers among its own vertices, (k,).
+        weights: by which it shares with others what all of them may give, (k,).
         visible: the components that no support hides, (k, d).
         along: the direction of a segment of forces, (k, d).
         low: the end of the segment behind, (k, 1).
@@ -200,6 +155,7 @@ class Carrier:
 
     rows: Integers
     own: Integers
+    weights: Array
     visible: Mask
     along: Array
     low: Array
@@ -247,93 +203,10 @@ def _squares(vectors: Array) -> Array:
     return vectors[:, :, None] * vectors[:, None, :]
 
 
-@dataclass(frozen=True)
-class SharedForces:
-    """The forces of the laws and bounds at shared vertices, in local components.
-
-    Attributes:
-        laws: for each law that has shared vertices, by its number: their numbers among its own (k,), and its forces
-            there with what is left over, (k, d).
-        bounds: the same of bounds.
-    """
-
-    laws: Mapping[int, tuple[Integers, Array]]
-    bounds: Mapping[int, tuple[Integers, Array]]
-
-    def of_law(self, number: int, term: LawTerm) -> tuple[Integers, Array]:
-        """A law's shared vertices by their numbers among its own (k,), and its forces there (k, d); k may be 0.
-
-        Args:
-            number: of the law.
-            term: the law.
-        """
-        return self.laws.get(number) or _nothing(term.directions.shape[2])
-
-    def of_bounds(self, number: int, bounds: Bounds) -> tuple[Integers, Array]:
-        """The shared vertices of a bound by their numbers among its own (k,), and its forces there (k, d).
-
-        Args:
-            number: of the bounds.
-            bounds: the bounds.
-        """
-        return self.bounds.get(number) or _nothing(bounds.surface.normals.shape[1])
-
-
-def _nothing(d: int) -> tuple[Integers, Array]:
-    return np.empty(0, dtype=np.int64), np.empty((0, d))
-
-
 def components(term: LawTerm) -> Iterator[tuple[Integers, Array]]:
     """For each of a law's directions the scalar dof at every vertex and the direction's sign."""
     for i in range(term.directions.shape[1]):
         yield component_dofs(term.surface.blocks, term.directions[:, i])
-
-
-def settle(
-    terms: Sequence[LawTerm],
-    bounds: Sequence[tuple[Bounds, Mask, Mask]],
-    u: Array,
-    needed: Array,
-    held: Mask,
-    near: Array,
-    thresholds: CertificateThresholds = DEFAULT,
-) -> SharedForces:
-    """The forces at shared vertices.
-
-    Args:
-        terms: the laws in local components.
-        bounds: the bounds in local components, with where the lower and where the upper bound is reached, (m,) each.
-        u: the displacement in local components, a local array.
-        needed: the sum of the forces by owned scalar dof, (n,).
-        held: which dofs are prescribed: there the support gives what is needed, (n,).
-        near: distance from a kink that counts as being on it, by owned vertex, (blocks,).
-        thresholds: when forces are settled.
-    """
-    if not any(term.radial for term in terms):
-        return SharedForces({}, {})
-    d = terms[0].directions.shape[2]
-    blocks = _shared(terms, bounds, len(needed), d)
-    free = ~held.reshape(-1, d)[blocks]
-    row = np.full(len(near), -1)
-    row[blocks] = np.arange(len(blocks))
-    carriers = [_of_law(term, row, free, u, near) for term in terms]
-    carriers += [_of_bounds(*one, row, free) for one in bounds]
-    wanted = np.where(free, needed.reshape(-1, d)[blocks], 0.0)
-    forces, left = nearest_sum(carriers, wanted, thresholds)
-    found = [(c.own, f + left[c.rows]) for c, f in zip(carriers, forces, strict=True)]
-    return SharedForces(dict(enumerate(found[: len(terms)])), dict(enumerate(found[len(terms) :])))
-
-
-def _shared(terms: Sequence[LawTerm], bounds: Sequence[tuple[Bounds, Mask, Mask]], dofs: int, d: int) -> Integers:
-    """The vertices at which a component of a law of a length has another carrier too."""
-    carriers = np.zeros(dofs, dtype=np.int64)
-    for term in terms:
-        for own, _ in components(term):
-            np.add.at(carriers, own, 1)
-    for one, lower, upper in bounds:
-        np.add.at(carriers, one.component()[0], (lower | upper).astype(np.int64))
-    found = [own[carriers[own] > 1] // d for term in terms if term.radial for own, _ in components(term)]
-    return np.unique(np.concatenate(found))
 
 
 def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> Carrier:
@@ -349,6 +222,7 @@ def _of_law(term: LawTerm, row: Integers, free: Mask, u: Array, near: Array) -> 
     return Carrier(
         rows=rows,
         own=own,
+        weights=term.weights[own],
         visible=free[rows],
         along=np.einsum("mk,mkd->md", unit, term.directions[own]),
         low=low,
@@ -368,6 +242,7 @@ def _of_bounds(bounds: Bounds, lower: Mask, upper: Mask, row: Integers, free: Ma
     return Carrier(
         rows=rows[own],
         own=own,
+        weights=bounds.surface.weights[own],
         visible=free[rows[own]],
         along=bounds.surface.normals[own],
         low=np.where(lower[own], -np.inf, 0.0)[:, None],  # at the upper bound of u·n contact pushes inward
@@ -380,25 +255,25 @@ def _of_bounds(bounds: Bounds, lower: Mask, upper: Mask, row: Integers, free: Ma
     )
 
 
-def nearest_sum(
-    carriers: Sequence[Carrier], wanted: Array, thresholds: CertificateThresholds = DEFAULT
-) -> tuple[list[Array], Array]:
+def nearest_sum(carriers: Sequence[Carrier], wanted: Array) -> tuple[list[Array], Array]:
     """Forces of all carriers whose sum is nearest to the wanted one, and what is left over.
 
     Args:
         carriers: at some vertices each.
         wanted: at all shared vertices, zero in hidden components, (vertices, d).
-        thresholds: when forces are settled.
 
     Returns:
         The forces by carrier, (k, d) each, and what is left, (vertices, d).
     """
-    asked: list[Array] = [np.zeros((len(c.rows), wanted.shape[1])) for c in carriers]
-    _sweep(carriers, asked, wanted, thresholds.shared_steps)
+    weights = np.zeros(len(wanted))
+    for carrier in carriers:
+        weights[carrier.rows] += carrier.weights
+    asked = [wanted[c.rows] * (c.weights / weights[c.rows])[:, None] for c in carriers]
     settled = np.finfo(np.float64).eps * float(np.max(np.abs(wanted), initial=0.0))
-    for _ in range(thresholds.shared_steps):
+    _sweep(carriers, asked, wanted, settled)
+    for _ in range(DEFAULT.shared_steps if any(np.any(c.at_rest) for c in carriers) else 0):
         left = _left(carriers, asked, wanted)
-        if np.all(np.abs(left) <= settled) or not _newton(carriers, asked, wanted, left, thresholds):
+        if np.all(np.abs(left) <= settled) or not _newton(carriers, asked, wanted, left):
             break
     return [c.nearest(a)[0] for c, a in zip(carriers, asked, strict=True)], _left(carriers, asked, wanted)
 
@@ -411,18 +286,21 @@ def _left(carriers: Sequence[Carrier], asked: Sequence[Array], wanted: Array) ->
     return left
 
 
-def _sweep(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, count: int) -> None:
-    """Ask each carrier in turn for its force and what is left."""
-    left = _left(carriers, asked, wanted)
-    for i, carrier in [pair for _ in range(count) for pair in enumerate(carriers)]:
-        before = carrier.nearest(asked[i])[0] * carrier.visible
-        asked[i] = left[carrier.rows] + before
-        left[carrier.rows] += before - carrier.nearest(asked[i])[0] * carrier.visible
+def _sweep(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, settled: float) -> None:
+    """Ask each carrier in turn for its force and what is left, until that stays."""
+    left, moved = _left(carriers, asked, wanted), np.inf
+    for _ in range(DEFAULT.shared_steps):
+        if moved <= settled:
+            break
+        old = left.copy()
+        for i, carrier in enumerate(carriers):
+            before = carrier.nearest(asked[i])[0] * carrier.visible
+            asked[i] = left[carrier.rows] + before
+            left[carrier.rows] += before - carrier.nearest(asked[i])[0] * carrier.visible
+        moved = float(np.max(np.abs(left - old), initial=0.0))
 
 
-def _newton(
-    carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left: Array, thresholds: CertificateThresholds
-) -> bool:
+def _newton(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left: Array) -> bool:
     """One Newton step at each vertex where it leaves less; whether there was any."""
     d = wanted.shape[1]
     slopes = [c.nearest(a)[1] for c, a in zip(carriers, asked, strict=True)]
@@ -432,7 +310,7 @@ def _newton(
     step = np.linalg.solve(matrix, left[:, :, None])
     steps = [(slope @ step[c.rows])[:, :, 0] for c, slope in zip(carriers, slopes, strict=True)]
     size, pending, length = np.linalg.norm(left, axis=1), np.ones(len(wanted), dtype=bool), 1.0
-    for _ in range(thresholds.shared_steps):
+    for _ in range(DEFAULT.shared_steps):
         trial = [a + length * s for a, s in zip(asked, steps, strict=True)]
         better = pending & (np.linalg.norm(_left(carriers, trial, wanted), axis=1) < (1 - 1e-3 * length) * size)
         for i, carrier in enumerate(carriers):

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from ..certify import balance
 from ..certify.certificate import Examination
 from ..certify.contact_state import ContactState
-from ..certify.force_attribution import components, on_kink, touches
+from ..certify.force_attribution import components, on_bounds, on_kink
 from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
@@ -124,7 +124,7 @@ def _held(system: System, x: PETSc.Vec) -> Entities:
     found: list[Integers] = [np.empty(0, np.int64)]
     for bounds in system.bounds:
         dofs, sign = bounds.component()
-        found.append(dofs[touches(bounds, sign * u[dofs], NEAR)])
+        found.append(dofs[np.logical_or(*on_bounds(bounds, sign * u[dofs], NEAR))])
     for term in system.terms:
         stuck = on_kink(term.law.convex, term.argument(u), term.reach(NEAR))[:, None] & term.counts(u, NEAR)
         found.extend(dofs[stuck[:, i]] for i, (dofs, _) in enumerate(components(term)))

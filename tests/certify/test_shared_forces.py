@@ -39,7 +39,7 @@ def contact(axis: int) -> Carrier:
 
 def _carrier(**given: Any) -> Carrier:
     rows, zero = np.arange(VERTICES), np.zeros((VERTICES, 1))
-    plain: dict[str, Any] = {"along": np.zeros((VERTICES, 3)), "low": zero, "high": zero}
+    plain: dict[str, Any] = {"along": np.zeros((VERTICES, 3)), "low": zero, "high": zero, "weights": np.ones(VERTICES)}
     plain |= {"axes": np.zeros((VERTICES, 2, 3)), "counts": np.ones((VERTICES, 2), bool), "length": Length.plain(2)}
     plain |= {"radius": zero, "at_rest": zero > 0, "visible": np.ones((VERTICES, 3), dtype=bool)}
     return Carrier(rows=rows, own=rows, **(plain | given))
