@@ -7,21 +7,19 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem, la
 
 from ..mesh import nodes
 from ..problem import spaces
-from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..problem.vectors import NodalForces
 from ..runtime.mpi import largest
 from ..system import rigid_motions as rigid_balance
 from ..system.rigid_motions import ActingForces, Holder, SupportedBody
-from ..typing import Array, Mask
+from ..typing import Array
 from .contact_state import ContactState, Forces
 
 
@@ -65,6 +63,7 @@ def net_forces(
     forces: Forces,
     states: Sequence[ContactState],
     u: fem.Function,
+    carried: Array | None = None,
 ) -> Array:
     """The largest net force or moment along a rigid motion that nothing carries, by body. Collective.
 
@@ -74,57 +73,26 @@ def net_forces(
     Args:
         references: of the problem that was solved.
         forces: at u.
-        states: of the parts of Γc at u.
+        states: of the parts of Γc at u; none where it is known what contact and laws carry.
         u: nondimensional, ghosts updated.
+        carried: this, nodal forces at this rank's vertices, (vertices, d); they could carry nothing else.
     """
-    acting = _acting(references, forces, [holder for state in states for holder in _holders(state)], u)
-    return _along_motions(acting, references, [(state.surface, state.contact) for state in states])
-
-
-def net_forces_carried(references: References, forces: Forces, carried: Array, u: fem.Function) -> Array:
-    """As :func:`net_forces`, where what contact and laws carry is known: they could carry nothing else. Collective.
-
-    Args:
-        references: of the problem that was solved.
-        forces: at u.
-        carried: by contact and laws, nodal forces at this rank's vertices, (vertices, d).
-        u: nondimensional, ghosts updated.
-    """
-    acting = _acting(references, forces, [], u)
-    acting = replace(acting, left=acting.left + carried, carried=[*acting.carried, NodalForces.of(carried)])
-    return _along_motions(acting, references, [])
-
-
-def _along_motions(
-    acting: ActingForces,
-    references: References,
-    closed: Sequence[tuple[Surface, Mask]],
-) -> Array:
-    problem = references.problem
-    motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
-    nets = [rigid_balance.along(references, one, acting) for one in motions]
-    return np.array([net.beyond_rounding for net in nets])
-
-
-def _acting(
-    references: References,
-    forces: Forces,
-    holders: Sequence[Holder],
-    u: fem.Function,
-) -> ActingForces:
-    """What acts on the bodies at u; what contact and laws give follows from the holders. Collective."""
     problem = references.problem
     foundation = -problem.combined(problem.bulk.foundation_force(u))
-    left = forces.pushing + foundation
-    for given in (holder.forces for holder in holders):
-        left[given.blocks] += given.values
-    return ActingForces(
+    given = [foundation] if carried is None else [foundation, carried]
+    left, holders = sum(given, forces.pushing), [holder for state in states for holder in _holders(state)]
+    for one in (holder.forces for holder in holders):
+        left[one.blocks] += one.values
+    acting = ActingForces(
         left=left,
         loads=NodalForces.of(forces.pushing),
-        carried=[NodalForces.of(foundation)],
+        carried=[NodalForces.of(force) for force in given],
         holders=holders,
         capable=rigid_balance.capable(problem),
     )
+    closed = [(state.surface, state.contact) for state in states]
+    motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
+    return np.array([rigid_balance.along(references, one, acting).beyond_rounding for one in motions])
 
 
 def _holders(state: ContactState) -> Iterator[Holder]:
@@ -184,13 +152,8 @@ def _largest(problem: Problem, state: ContactState, beyond: Array) -> float:
     everywhere.array[:] = -np.inf
     everywhere.array[state.surface.blocks] = beyond
     everywhere.scatter_forward()
-    local = everywhere.array[nodes.facet_nodes(problem.space, state.surface.facets)]
-    local = local[np.all(np.isfinite(local), axis=1)]
-    return float(np.max(local @ _functions(problem.space), initial=0.0))
-
-
-def _functions(space: fem.FunctionSpace) -> Array:
-    """The basis functions of a facet on a lattice of points, (nodes, points)."""
-    steps = itertools.product(range(_STEPS + 1), repeat=space.mesh.geometry.dim)
+    steps = itertools.product(range(_STEPS + 1), repeat=problem.scales.dimension)
     lattice = np.array([step for step in steps if sum(step) == _STEPS]) / _STEPS
-    return spaces.simplex_functions(nodes.degree(space), lattice, spaces.edge_share(space)).T
+    functions = spaces.simplex_functions(nodes.degree(problem.space), lattice, spaces.edge_share(problem.space))
+    local = everywhere.array[nodes.facet_nodes(problem.space, state.surface.facets)]
+    return float(np.max(local[np.all(np.isfinite(local), axis=1)] @ functions.T, initial=0.0))

@@ -6,7 +6,7 @@ largest of all bodies; ``passed`` means that all of them are within the toleranc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -14,10 +14,10 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..problem import references
-from ..problem.problem import Bounds, Problem
+from ..problem.problem import Problem
 from ..problem.references import References
 from ..runtime.mpi import largest, total
-from ..typing import Array
+from ..typing import Array, Entities
 from . import balance, contact_state
 from . import second_order as stability
 from .contact_state import ContactState, Forces
@@ -193,16 +193,26 @@ def measured(
         forces: at u.
         states: of the parts of Γc at u.
     """
-    sizes = references.displacements(_owned(u, forces))
-    unbalanced = references.norms(balance.unbalanced(references.problem, forces.reaction, states))
-    scales = _force_scales(references, u, forces)
-    return {
-        "equilibrium": unbalanced / scales,
-        "penetration": _worst(references, states, _penetration) / sizes,
-        "tension": _worst(references, states, _tension) / references.scale,
-        "complementarity": _worst(references, states, _Complementarity(references, sizes)),
-        "inclusion": _inclusion(references, states),
-    }
+    sizes, problem = references.displacements(_owned(u, forces)), references.problem
+    unbalanced = references.norms(balance.unbalanced(problem, forces.reaction, states))
+    names = ("penetration", "tension", "complementarity", "inclusion")
+    found = {name: np.zeros(references.count) for name in names}
+
+    def enter(name: str, blocks: Entities, values: Array) -> None:
+        found[name] = np.maximum(found[name], references.largest(blocks, values))
+
+    for state in states:
+        blocks = state.surface.blocks
+        if state.bounds is not None:
+            beyond, pressure = state.bounds.beyond(state.normal), state.contact_pressure
+            size, scale = sizes[problem.bodies.labels[blocks]], references.at(blocks)
+            wrong = np.where(state.contact, np.abs(pressure - balance.allowed_pressure(state)), 0.0)
+            enter("penetration", blocks, beyond / size)
+            enter("tension", blocks, wrong / scale)
+            enter("complementarity", blocks, np.minimum(np.abs(pressure) / scale, np.maximum(-beyond, 0.0) / size))
+        for law in state.laws:
+            enter("inclusion", blocks, law.distance / law.scale)
+    return {"equilibrium": unbalanced / _force_scales(references, u, forces), **found}
 
 
 def rounding_errors(
@@ -247,44 +257,3 @@ def _owned(u: fem.Function, forces: Forces) -> Array:
 
 def _force_scales(references: References, u: fem.Function, forces: Forces) -> Array:
     return references.forces(_owned(u, forces), forces.reaction + forces.load)
-
-
-def _worst(
-    references: References, states: Sequence[ContactState], measure: Callable[[Bounds, ContactState], Array]
-) -> Array:
-    """The largest of a measure of contact, by body. Collective."""
-    worst: Array = np.zeros(references.count)
-    for state in states:
-        if state.bounds is not None:
-            worst = np.maximum(worst, references.largest(state.surface.blocks, measure(state.bounds, state)))
-    return worst
-
-
-def _penetration(bounds: Bounds, state: ContactState) -> Array:
-    return bounds.beyond(state.normal)
-
-
-def _tension(bounds: Bounds, state: ContactState) -> Array:
-    """Pulling at the upper bound of u·n, pushing at the lower one."""
-    on_bounds = np.where(state.contact, state.contact_pressure, 0.0)
-    return np.abs(on_bounds - np.where(state.contact, balance.allowed_pressure(state), 0.0))
-
-
-class _Complementarity:
-    """The smaller one of gap and contact traction, relative to the displacements and the stress of the body."""
-
-    def __init__(self, references: References, sizes: Array) -> None:
-        self._references, self._sizes = references, sizes
-
-    def __call__(self, bounds: Bounds, state: ContactState) -> Array:
-        blocks = state.surface.blocks
-        gap = np.maximum(-bounds.beyond(state.normal), 0.0)
-        size = self._sizes[self._references.problem.bodies.labels[blocks]]
-        return np.minimum(np.abs(state.contact_pressure) / self._references.at(blocks), gap / size)
-
-
-def _inclusion(references: References, states: Sequence[ContactState]) -> Array:
-    worst: Array = np.zeros(references.count)
-    for law in (law for state in states for law in state.laws):
-        worst = np.maximum(worst, references.largest(law.term.surface.blocks, law.distance / law.scale))
-    return worst

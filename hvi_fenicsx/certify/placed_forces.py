@@ -11,10 +11,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..effects import Place
+from ..problem import references
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.vectors import NodalForces, nodal, nodal_values
-from ..typing import Array, Entities
+from ..typing import Array
 from .contact_state import ContactState, Forces
 
 SECOND = ".second"
@@ -96,7 +97,7 @@ def _on_bodies(problem: Problem, surface: Surface, own: Array) -> Iterator[tuple
     every = np.zeros((problem.space.dofmap.index_map.size_local, own.shape[1]))
     every[surface.blocks] = own
     acting, first = problem.on_bodies(every), np.zeros(len(every), dtype=bool)
-    first[_owned_on(problem, surface.facets)] = True
+    first[references.vertices(problem, surface.facets)] = True
     yield surface.part, NodalForces.of(np.where(first[:, None], acting, 0.0))
     yield f"{surface.part}{SECOND}", NodalForces.of(np.where(first[:, None], 0.0, acting))
 
@@ -118,16 +119,10 @@ def second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:
             areas[state.surface.blocks] = state.surface.weights[:, None]
             forces[state.surface.blocks] = traction(state) * state.surface.weights[:, None]
             covered, acting = -problem.on_bodies(areas), problem.on_bodies(forces)
-            here = _owned_on(problem, problem.domain.facets([interface.sides.second]))
+            here = references.vertices(problem, problem.domain.facets([interface.sides.second]))
             here = here[covered[here, 0] > 0.0]
             found[here] = acting[here] / covered[here]
     return found
-
-
-def _owned_on(problem: Problem, facets: Entities) -> Entities:
-    """The vertices of facets that this rank owns. Collective."""
-    dofs = fem.locate_dofs_topological(problem.space, problem.domain.dimension - 1, facets)
-    return np.asarray(dofs[dofs < problem.space.dofmap.index_map.size_local])
 
 
 def _springs(problem: Problem, u: fem.Function) -> dict[str, NodalForces]:

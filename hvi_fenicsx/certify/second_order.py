@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
@@ -29,7 +29,7 @@ from ..system.factorisation import Factorisation, form_of
 from ..system.system import System
 from ..typing import Array, Entities, Integers, Mask
 from . import force_attribution
-from .thresholds import DEFAULT, CertificateThresholds
+from .thresholds import DEFAULT
 
 LOCAL_MINIMISER, NO_MINIMISER, UNDECIDED = "local minimiser", "not a minimiser", "undecided"
 _PREFIX = "inertia_"
@@ -138,9 +138,7 @@ class Growth:
         return (self.curvature < 0.0) & ~self.strong
 
 
-def growth(
-    references: References, u: Array, forces: Array, tolerance: float, thresholds: CertificateThresholds = DEFAULT
-) -> Growth:
+def growth(references: References, u: Array, forces: Array, tolerance: float) -> Growth:
     """The growth at a displacement.
 
     Args:
@@ -148,7 +146,6 @@ def growth(
         u: nondimensional, a local array.
         forces: internal forces minus loads at the owned blocks, (blocks, d).
         tolerance: relative traction up to which a growth is none.
-        thresholds: when a vertex is on a kink or a bound.
     """
     problem = references.problem
     local = local_frames.frames_of(problem)
@@ -156,8 +153,7 @@ def growth(
     if local is not None:
         u, forces = local.local_components(u), local.local_components(forces)
         terms, bounds = tuple(local.term(t) for t in terms), tuple(local.bounds(b) for b in bounds)
-    near = thresholds.near * references.at(np.arange(len(forces)))
-    found = _Collector(references, u, forces.ravel(), forces.shape[1], near, tolerance, thresholds)
+    found = _Collector(references, u, forces, tolerance)
     for term in terms:
         (found.enter_vector_law if term.radial else found.enter_law)(term)
     for one in bounds:
@@ -166,36 +162,24 @@ def growth(
     return found.growth()
 
 
-@dataclass
 class _Collector:
-    """The sums over laws, bounds and supports, by scalar dof (n,); couplings by vertex.
+    """The sums over laws, bounds and supports, by scalar dof (n,), and the kinks of lengths by vertex.
 
-    Attributes:
+    Args:
         references: what tractions are relative to.
         u: the displacement in local components, a local array.
-        forces: r, (n,).
-        d: the dimension.
-        near: distance from a kink or a bound that counts as being on it, by vertex.
-        tolerance: relative traction up to which a growth is none.
-        thresholds: up to when a jump is rounding.
-        couplings: of the laws of a length.
+        forces: internal forces minus loads in local components, (blocks, d).
+        tolerance: relative traction up to which a growth of the energy is none.
     """
 
-    references: References
-    u: Array
-    forces: Array
-    d: int
-    near: Array
-    tolerance: float
-    thresholds: CertificateThresholds
-    couplings: list[CoupledVertices] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        n = len(self.forces)
-        self.up, self.down = self.forces.copy(), -self.forces
+    def __init__(self, references: References, u: Array, forces: Array, tolerance: float) -> None:
+        self.references, self.u, self.tolerance, self.d = references, u, tolerance, forces.shape[1]
+        self.near = DEFAULT.near * references.at(np.arange(len(forces)))
+        self.up, self.down, n = forces.ravel().copy(), -forces.ravel(), forces.size
         self.jump, self.slack = np.zeros(n), np.zeros(n)
         self.curved_up, self.curved_down = np.zeros(n), np.zeros(n)
         self.bent = np.zeros(n, dtype=bool)
+        self.lengths: dict[int, list[tuple[float, Array, Length]]] = {}
 
     def enter_law(self, term: LawTerm) -> None:
         """Enter a law of a signed displacement.
@@ -249,7 +233,9 @@ class _Collector:
         self._couple(term, on & ~moving, w * right, counting, term.length or Length.plain(1))
 
     def _couple(self, term: LawTerm, on: Mask, factors: Array, rows: Array, length: Length) -> None:
-        self.couplings.append(CoupledVertices(term.surface.blocks[on], factors[on], rows[on], length))
+        """Enter the growth factor times length of rows times direction at vertices on a kink."""
+        for i in np.flatnonzero(on):
+            self.lengths.setdefault(int(term.surface.blocks[i]), []).append((float(factors[i]), rows[i], length))
 
     def enter_bounds(self, bounds: Bounds) -> None:
         """Directions beyond a reached bound are not admissible.
@@ -280,10 +266,14 @@ class _Collector:
         free_up, free_down = np.isfinite(self.up), np.isfinite(self.down)
         opposite = np.where(free_up & free_down, self.jump, np.inf)
         least = np.minimum(self.up, self.down)
-        for dofs, lowest, pair in coupled(self.couplings, SideSlopes(self.up, self.down, self.jump), self.d):
-            least[dofs], opposite[dofs], self.bent[dofs] = lowest, pair, True
+        for vertex, lengths in self.lengths.items():
+            moved = np.flatnonzero(np.any(np.vstack([rows for _, rows, _ in lengths]) != 0.0, axis=0))
+            dofs = vertex * self.d + moved
+            bends = [(factor, rows[:, moved], length) for factor, rows, length in lengths]
+            least[dofs], opposite[dofs] = _least(self.up[dofs], self.down[dofs], self.jump[dofs], bends)
+            self.bent[dofs] = True
         up, down = np.where(free_up, self.curved_up, np.inf), np.where(free_down, self.curved_down, np.inf)
-        rounding = self.thresholds.near / self.tolerance * self.slack
+        rounding = DEFAULT.near / self.tolerance * self.slack
         return Growth(least, opposite, self.slack, rounding, np.minimum(up, down), self.bent)
 
 
@@ -303,85 +293,16 @@ _DIRECTIONS = 256
 """How many directions are tried where components are coupled, beside that of steepest descent."""
 
 
-@dataclass(frozen=True)
-class CoupledVertices:
-    """The terms c δ(B v) of one law of a length at vertices on its kinks.
-
-    Attributes:
-        blocks: the vertices, (m,).
-        factors: c, (m,).
-        rows: B, (m, q, d).
-        length: δ.
-    """
-
-    blocks: Entities
-    factors: Array
-    rows: Array
-    length: Length
-
-
-@dataclass(frozen=True)
-class _Bend:
-    """One term c δ(B v) at one vertex.
-
-    Attributes:
-        factor: c.
-        rows: B, (q, d), or its columns of some components.
-        length: δ.
-    """
-
-    factor: float
-    rows: Array
-    length: Length
-
-    def value(self, v: Array) -> Array:
-        """The term at directions v (p, d), (p,)."""
-        return self.factor * self.length.of(v @ self.rows.T)
-
-
-@dataclass(frozen=True)
-class SideSlopes:
-    """The growth by components, by scalar dof, (n,) each.
-
-    Attributes:
-        up: in the positive direction; infinite where that is not admissible.
-        down: in the negative direction, likewise.
-        jump: the sum of both, of the laws.
-    """
-
-    up: Array
-    down: Array
-    jump: Array
-
-
-def coupled(couplings: Sequence[CoupledVertices], sides: SideSlopes, d: int) -> Iterator[tuple[Integers, float, float]]:
-    """For each vertex with couplings: the components that they touch, their least growth, and that of a pair.
-
-    Args:
-        couplings: the terms.
-        sides: the growth without them.
-        d: the dimension.
-    """
-    at: dict[int, list[_Bend]] = {}
-    for one in couplings:
-        for i, block in enumerate(one.blocks):
-            at.setdefault(int(block), []).append(_Bend(float(one.factors[i]), one.rows[i], one.length))
-    for vertex, bends in at.items():
-        moved = np.flatnonzero(np.any(np.vstack([b.rows for b in bends]) != 0.0, axis=0))
-        dofs = vertex * d + moved
-        here = SideSlopes(sides.up[dofs], sides.down[dofs], sides.jump[dofs])
-        yield dofs, *_least(here, [replace(b, rows=b.rows[:, moved]) for b in bends])
-
-
-def _least(sides: SideSlopes, bends: list[_Bend]) -> tuple[float, float]:
+def _least(up: Array, down: Array, jump: Array, bends: Sequence[tuple[float, Array, Length]]) -> tuple[float, float]:
     """The least growth of coupled components over their admissible directions, and of opposite ones together."""
-    up, down = sides.up, sides.down
     v = _admissible(np.vstack([_steepest(up, down), _sphere(len(up))]), np.isfinite(up), np.isfinite(down))
-    ahead, behind = (np.sum([b.value(side) for b in bends], axis=0) for side in (v, -v))
+    ahead, behind = (
+        np.sum([factor * length.of(side @ rows.T) for factor, rows, length in bends], axis=0) for side in (v, -v)
+    )
     one_way = np.where(v > 0, np.where(np.isfinite(up), up, 0.0), np.where(np.isfinite(down), down, 0.0))
     both = np.all((v == 0.0) | (np.isfinite(up) & np.isfinite(down)), axis=1)
     rises = np.sum(one_way * np.abs(v), axis=1) + ahead
-    pairs = np.abs(v) @ sides.jump + ahead + behind
+    pairs = np.abs(v) @ jump + ahead + behind
     return float(np.min(rises, initial=np.inf)), float(np.min(pairs[both], initial=np.inf))
 
 

@@ -23,6 +23,7 @@ from typing import Literal
 
 import numpy as np
 from dolfinx import fem
+from petsc4py import PETSc
 
 from ..laws import TractionGraph
 from ..laws.traction_graph import Arc
@@ -36,7 +37,7 @@ from ..typing import Array
 from .certificate import Examination
 from .contact_state import LawState
 from .second_order import growth, negative_eigenvalues
-from .thresholds import DEFAULT, UNIQUENESS, UniquenessThresholds
+from .thresholds import DEFAULT, UNIQUENESS
 
 
 def needed_falls(state: LawState) -> Array | None:
@@ -119,34 +120,28 @@ class Uniqueness:
         return asdict(self)
 
 
-def is_convex(system: System, thresholds: UniquenessThresholds = UNIQUENESS) -> bool:
+def is_convex(system: System) -> bool:
     """Whether the energy is known to be convex; the laws' tangents of the system are set to 0. Collective.
 
     Args:
         system: the system.
-        thresholds: what is tried, and what is rounding.
     """
-    modes = existence.motions(system.problem, contact_closed=False)
-    return _doubt(system, modes, _motions(system, modes), thresholds) is None
+    return _doubt(system, _motions(system)) is None
 
 
-def uniqueness(
-    system: System, u: fem.Function, examination: Examination, thresholds: UniquenessThresholds = UNIQUENESS
-) -> Uniqueness:
+def uniqueness(system: System, u: fem.Function, examination: Examination) -> Uniqueness:
     """What is known about equilibria beside a certified one; the laws' tangents of the system are set to 0. Collective.
 
     Args:
         system: the system that was solved.
         u: its solution, nondimensional, ghosts updated.
         examination: of u.
-        thresholds: what is tried, and what is rounding.
     """
-    modes = existence.motions(system.problem, contact_closed=False)
-    motions = _motions(system, modes)
-    doubt, pressed = _doubt(system, modes, motions, thresholds), any(b.force is not None for b in system.bounds)
+    motions = _motions(system)
+    doubt, pressed = _doubt(system, motions), any(b.force is not None for b in system.bounds)
     everywhere = "; at every position of the obstacle" if pressed else ""
     if doubt is not None:
-        supported = _supported(system, modes, motions, examination, thresholds)
+        supported = _supported(system, motions, examination)
         if supported is not None:
             why = f"{supported} ({doubt}, so there may be other equilibria){everywhere}"
             return Uniqueness(state="lowest", why=why)
@@ -154,22 +149,26 @@ def uniqueness(
         return Uniqueness(state="unknown", why=f"{doubt}; {WAY_OUT}" if searched else doubt)
     falling = any(term.law.steepest_fall > 0.0 for term in system.terms)
     proof = "the body is stiffer than its laws fall, so the energy is convex" if falling else "the energy is convex"
-    left = _left(system, modes, motions, u, examination)
+    left = _left(system, motions, u, examination)
     if not left:
-        here = "; with the obstacle where it is" if pressed and modes else everywhere
+        here = "; with the obstacle where it is" if pressed and motions else everywhere
         return Uniqueness(state="unique", why=f"{proof}, and no rigid motion leaves it as it is{here}")
     together = ", or by motions together with the obstacle" if pressed else ""
     return Uniqueness(state="lowest", why=f"{proof}; others of the same energy may differ by: {left}{together}")
 
 
-def _motions(system: System, modes: Sequence[Mode]) -> list[Array]:
-    """Rigid motions in this rank's unknowns, (n,) each. Collective."""
-    return [system.unknowns(field).array_r.copy() for field in rigid_motions.fields(system.problem, modes)]
+Motions = Sequence[tuple[Mode, PETSc.Vec]]
+"""Rigid motions that the supports leave, and what they are in the unknowns."""
 
 
-def _doubt(
-    system: System, modes: Sequence[Mode], motions: Sequence[Array], thresholds: UniquenessThresholds
-) -> str | None:
+def _motions(system: System) -> Motions:
+    """The rigid motions that the supports leave. Collective."""
+    modes = existence.motions(system.problem, contact_closed=False)
+    fields = rigid_motions.fields(system.problem, modes)
+    return [(mode, system.unknowns(field)) for mode, field in zip(modes, fields, strict=True)]
+
+
+def _doubt(system: System, motions: Motions) -> str | None:
     """Why the energy is not known to be convex; None where it is. Collective."""
     falls = [_fall(term) for term in system.terms]
     for term, fall in zip(system.terms, falls, strict=True):
@@ -177,24 +176,18 @@ def _doubt(
             return f"boundary.{term.surface.part}: {_steepness(term)}"
     if not any(falls):
         return None
-    if not _is_tried(system, thresholds):
+    if not _is_tried(system):
         return (
-            f"a law falls, and it was not tried whether the body is stiffer: more than {thresholds.most_on_boundary} "
-            f"unknowns on Γc, or {thresholds.most_unknowns[system.problem.scales.dimension - 2]:,} in all"
+            f"a law falls, and it was not tried whether the body is stiffer: more than {UNIQUENESS.most_on_boundary} "
+            f"unknowns on Γc, or {UNIQUENESS.most_unknowns[system.problem.scales.dimension - 2]:,} in all"
         )
     each = [np.asarray(fall / term.stretch, dtype=np.float64) for term, fall in zip(system.terms, falls, strict=True)]
-    if (moved := _moved(system, modes, motions, each)) is not None:
+    if (moved := _moved(system, motions, each)) is not None:
         return f"a law falls, and only laws and contact hold the motion {moved}"
-    return None if _stiffer(system, modes, each, thresholds) else "a law falls more steeply than the body is stiff"
+    return None if _stiffer(system, motions, each) else "a law falls more steeply than the body is stiff"
 
 
-def _supported(
-    system: System,
-    modes: Sequence[Mode],
-    motions: Sequence[Array],
-    examination: Examination,
-    thresholds: UniquenessThresholds,
-) -> str | None:
+def _supported(system: System, motions: Motions, examination: Examination) -> str | None:
     """Why no displacement has a lower energy, be the energy convex or not; None where this is not known. Collective."""
     laws = {id(law.term): law for state in examination.states for law in state.laws}
     falls = [needed_falls(laws[id(term)]) for term in system.problem.terms]
@@ -203,31 +196,26 @@ def _supported(
         return None
     if most == 0.0:
         return "no law's energy is anywhere below its tangent at this state"
-    if not _is_tried(system, thresholds) or _moved(system, modes, motions, known) is not None:
+    if not _is_tried(system) or _moved(system, motions, known) is not None:
         return None
     return (
         "the body is stiffer than the laws' energies fall below their tangents at this state"
-        if _stiffer(system, modes, known, thresholds)
+        if _stiffer(system, motions, known)
         else None
     )
 
 
-def _is_tried(system: System, thresholds: UniquenessThresholds) -> bool:
+def _is_tried(system: System) -> bool:
     """Whether the problem is small enough for a factorisation. Collective."""
     unknowns = int(total(system.comm, float(len(system.jacobian.rows.dofs))))
-    most = thresholds.most_unknowns[system.problem.scales.dimension - 2]
-    return unknowns <= thresholds.most_on_boundary and system.dofs <= most
+    most = UNIQUENESS.most_unknowns[system.problem.scales.dimension - 2]
+    return unknowns <= UNIQUENESS.most_on_boundary and system.dofs <= most
 
 
-def _moved(
-    system: System,
-    modes: Sequence[Mode],
-    motions: Sequence[Array],
-    falls: Sequence[Array],
-) -> str | None:
+def _moved(system: System, motions: Motions, falls: Sequence[Array]) -> str | None:
     """A rigid motion that moves a vertex whose law falls; None if there is none. Collective."""
-    for mode, motion in zip(modes, motions, strict=True):
-        falling = [term.slip(motion)[fall > 0.0] for term, fall in zip(system.terms, falls, strict=True)]
+    for mode, motion in motions:
+        falling = [term.slip(motion.array_r)[fall > 0.0] for term, fall in zip(system.terms, falls, strict=True)]
         if largest(system.comm, _size(falling)) > DEFAULT.near:
             return mode.name
     return None
@@ -254,11 +242,13 @@ def _size(values: Sequence[Array]) -> float:
     return max((float(np.max(np.abs(v), initial=0.0)) for v in values), default=0.0)
 
 
-def _stiffer(system: System, modes: Sequence[Mode], falls: Sequence[Array], thresholds: UniquenessThresholds) -> bool:
+def _stiffer(system: System, motions: Motions, falls: Sequence[Array]) -> bool:
     """Whether A less C, a little enlarged, is positive but for the motions, which C does not feel. Collective."""
-    vectors = [system.unknowns(field) for field in rigid_motions.fields(system.problem, modes)]
-    pins = rigid_motions.create(vectors, modes).pins.astype(np.int64) if modes else np.empty(0, np.int64)
-    enlarged = 1.0 + thresholds.enlarged
+    pins = np.empty(0, np.int64)
+    if motions:
+        made = rigid_motions.create([motion.copy() for _, motion in motions], [mode for mode, _ in motions])
+        pins = made.pins.astype(np.int64)
+    enlarged = 1.0 + UNIQUENESS.enlarged
     system.jacobian.set_rates([_rate(t, -enlarged * c) for t, c in zip(system.terms, falls, strict=True)])
     with negative_eigenvalues(system) as negative:
         count = negative(pins)
@@ -273,23 +263,18 @@ def _rate(term: LawTerm, slope: Array) -> Array:
     return np.asarray(term.free[:, :, None] * full * term.free[:, None, :])
 
 
-def _left(
-    system: System,
-    modes: Sequence[Mode],
-    motions: Sequence[Array],
-    u: fem.Function,
-    examination: Examination,
-) -> str:
+def _left(system: System, motions: Motions, u: fem.Function, examination: Examination) -> str:
     """The rigid motions if some of them, together, are not shown to raise the energy; else nothing. Collective."""
-    if not modes:
+    if not motions:
         return ""
     problem, certificate = system.problem, examination.certificate
     allowed = max(certificate.tolerance, certificate.rounding or 0.0)
     known = references.of(problem, examination.forces.load)
     strong = growth(known, problem.relative(u.x.array), examination.forces.reaction, allowed).strong
     springs = [term for term in system.terms if term.is_linear]
-    rows = [np.concatenate([m[strong], *(term.slip(m).ravel() for term in springs)]) for m in motions]
+    moved = [motion.array_r for _, motion in motions]
+    rows = [np.concatenate([m[strong], *(term.slip(m).ravel() for term in springs)]) for m in moved]
     gram = sum(agree(system.comm, np.array([[a @ b for a in rows] for b in rows])))
     least, most = np.linalg.eigvalsh(gram)[[0, -1]]
     held = bool(least > DEFAULT.near * most)
-    return "" if held else ", ".join(mode.name for mode in modes)
+    return "" if held else ", ".join(mode.name for mode, _ in motions)
