@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from ..mesh import nodes
 from ..problem.problem import Problem
-from ..problem.vectors import nodal_sum
+from ..problem.vectors import nodal
 from ..runtime import forms
 from ..typing import Array, Entities
 
@@ -429,7 +429,7 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
             for share in sorted(set(shares.values())):
                 rule = _rule([index for index, own in shares.items() if own == share])
                 integrals.append(along[0].reconstruct(integrand=share * density, metadata=rule))
-    return nodal_sum(ufl.Form(integrals))
+    return nodal(ufl.Form(integrals))
 
 
 def _energies(problem: Problem) -> Iterator[tuple[Any, Any, Mapping[Index, float]]]:

@@ -26,7 +26,7 @@ from ..typing import Array, Entities
 from . import spaces
 from .scaling import DEFAULT, Scales
 from .spaces import Dilatation, coefficients_of
-from .vectors import LinearForm, nodal, nodal_sum, nodal_values
+from .vectors import LinearForm, nodal, nodal_values
 
 
 def feels_no_rigid_motion(form: Any, space: fem.FunctionSpace) -> bool:
@@ -154,7 +154,7 @@ class Bulk:
     @functools.cached_property
     def dilatations(self) -> list[Dilatation]:
         """The regions in ``averaged``, assembled. Collective when first used."""
-        return spaces.assemble(self.averaged)
+        return [spaces.assemble(part) for part in self.averaged]
 
     def without_dilatation(self) -> Bulk:
         """The operator without what is averaged by vertex."""
@@ -236,17 +236,8 @@ class Bulk:
         form = ufl.Form([integral for part in each for integral in part.integrals()])
         for part in self.dilatations:
             form -= part.work(part.pressure(u), v)
-        return nodal_sum(form)
+        return nodal(form)
 
-    def energy_form(self, v: Any, q: Any) -> Any:
-        """The UFL form of the density of a(v, v) times q, without what is averaged by vertex.
-
-        Args:
-            v: a displacement.
-            q: a test function that is constant in cells.
-        """
-        integrals = self.between(v, v).integrals()
-        return ufl.Form([integral.reconstruct(integrand=integral.integrand() * q) for integral in integrals])
 
     @functools.cached_property
     def _constants(self) -> fem.FunctionSpace:
@@ -282,8 +273,9 @@ class Bulk:
         Args:
             v: a displacement of any space, or a sum of such in UFL.
         """
-        form = self.energy_form(v, ufl.TestFunction(self._constants))
-        return np.maximum(LinearForm(form).values()[:, 0], 0.0)
+        q, integrals = ufl.TestFunction(self._constants), self.between(v, v).integrals()
+        form = ufl.Form([one.reconstruct(integrand=one.integrand() * q) for one in integrals])
+        return np.maximum(nodal(form)[:, 0], 0.0)
 
     def pressures(self, u: fem.Function) -> list[fem.Function]:
         """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""
@@ -314,8 +306,7 @@ class Bulk:
         """
         q = ufl.TestFunction(self._constants)
         pairs = zip(self.dilatations, pressures, strict=True)
-        found = [nodal_sum(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs]
-        return np.asarray(sum(found))
+        return sum(nodal(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs)
 
     def dilatation_error(self, u: fem.Function) -> Array:
         """2μ/d ∫ (div u - p/λ)² of every owned cell, p being the averaged volumetric stress, (cells,). Collective.

@@ -122,11 +122,11 @@ def overlaps(first: Facets, second: Facets) -> Overlaps:
         pair, of_second = _parts(second, other)
     outlines = local[:, :d, :-1]
     if second.curved:
-        outlines = _curved_outlines(first, second, number[pair], other[pair], local[pair, :, :-1], of_second)
+        outlines = _curved_outlines(first, number[pair], local[pair, :, :-1], of_second)
     pieces, outline = _clipped(outlines)
-    seen = _visible(pieces, outline, number[pair], np.abs(local[pair, :d, -1].mean(axis=1)))
-    pieces, outline = pieces[seen], outline[seen]
     on = pair[outline]
+    seen = _visible(_sizes(pieces), number[on], np.abs(local[on, :d, -1].mean(axis=1)))
+    pieces, outline, on = pieces[seen], outline[seen], on[seen]
     return Overlaps(
         sides=(first, second),
         first=number[on],
@@ -164,7 +164,7 @@ def _balls(side: Facets) -> tuple[Array, Array]:
 
 def _sizes(simplices: Array) -> Array:
     """Lengths or areas of simplices (n, d, d-1), in parts of that of the reference simplex, (n,)."""
-    return np.asarray(np.abs(np.linalg.det(simplices[:, 1:] - simplices[:, :1])))
+    return np.abs(np.linalg.det(simplices[:, 1:] - simplices[:, :1]))
 
 
 def _barycentric(simplices: Array, points: Array) -> Array:
@@ -210,44 +210,21 @@ def _cut(ring: Array, sizes: Integers, side: int) -> tuple[Array, Integers]:
     return np.take_along_axis(both, order[:, :, None], axis=1), kept.sum(axis=1)
 
 
-def _visible(pieces: Array, outline: Integers, number: Integers, distance: Array) -> Mask:
-    """Which pieces, of outlines on facets (o,) at distances (o,), do not lie behind nearer ones, (n,)."""
-    kept, sizes, under = np.ones(len(pieces), dtype=bool), _sizes(pieces), number[outline]
-    for crowded in np.flatnonzero(np.bincount(under, weights=sizes, minlength=1) > 1.0 + DEFAULT.uncovered):
-        here, nearer = np.flatnonzero(under == crowded), pieces[:0]
-        several = np.unique(outline[here])
-        for one in several[np.argsort(distance[several], kind="stable")]:
-            own = here[outline[here] == one]
-            kept[own] = _common(pieces[own], nearer) < 0.5 * sizes[own].sum()
-            nearer = np.concatenate([nearer, pieces[own[kept[own]]]])
-    return kept
-
-
-def _common(simplices: Array, others: Array) -> float:
-    """What simplices (n, d, d-1) and others (m, d, d-1), of which none overlap, have in common."""
-    inverse = np.linalg.inv(others[:, 1:] - others[:, :1])
-    local = (simplices[None] - others[:, None, :1]) @ inverse[:, None]
-    pieces, number = _clipped(local.reshape(-1, *simplices.shape[1:]))
-    return float(np.sum(_sizes(pieces) * _sizes(others)[number // len(simplices)]))
+def _visible(sizes: Array, number: Integers, distance: Array) -> Mask:
+    """Which pieces of facets are met before nearer ones fill these, (n,)."""
+    order = np.lexsort([distance, number])
+    before = np.cumsum(sizes[order]) - sizes[order]
+    before -= before[np.searchsorted(number[order], number[order])]
+    return (before + 0.5 * sizes[order] < 1.0)[np.argsort(order)]
 
 
 def _covered(pieces: Array, number: Integers, count: int, near: float) -> Mask:
-    """Whether pieces on facets (n,) fill the angle at each corner of these, (count, d)."""
+    """Whether pieces on facets (n,) reach each corner of these, (count, d)."""
     d = pieces.shape[1]
-    filled, reference, angles = np.zeros((count, d)), np.eye(d)[:, 1:], _angles(pieces)
-    for corner, place in enumerate(reference):
-        piece, at = np.nonzero(np.linalg.norm(pieces - place, axis=2) <= near)
-        np.add.at(filled[:, corner], number[piece], angles[piece, at])
-    return np.asarray(filled >= (1.0 - near) * _angles(reference[None]))
-
-
-def _angles(simplices: Array) -> Array:
-    """The angles at the corners of triangles, (n, 3); of segments 1, (n, 2)."""
-    if simplices.shape[1] == 2:
-        return np.ones(simplices.shape[:2])
-    one, other = (np.roll(simplices, step, axis=1) - simplices for step in (1, -1))
-    turn = one[:, :, 0] * other[:, :, 1] - one[:, :, 1] * other[:, :, 0]
-    return np.asarray(np.abs(np.arctan2(turn, np.sum(one * other, axis=2))))
+    found = np.zeros((count, d), dtype=bool)
+    for corner, place in enumerate(np.eye(d)[:, 1:]):
+        found[number[np.any(np.linalg.norm(pieces - place, axis=2) <= near, axis=1)], corner] = True
+    return found
 
 
 def _parts(second: Facets, other: Integers) -> tuple[Integers, Array]:
@@ -277,9 +254,7 @@ def _fan(pattern: Mask) -> Array:
     return np.stack([np.full_like(ring, 1 / 3), ring, np.roll(ring, -1, axis=0)], axis=1)
 
 
-def _curved_outlines(
-    first: Facets, second: Facets, number: Integers, other: Integers, local: Array, of_second: Array
-) -> Array:
+def _curved_outlines(first: Facets, number: Integers, local: Array, of_second: Array) -> Array:
     """Simplices of curved facets (o, d, d) in the reference coordinates of those of the first side, (o, d, d-1)."""
     d = first.dimension
     at = places(np.repeat(local, d, axis=0), of_second.reshape(-1, d))
@@ -287,24 +262,15 @@ def _curved_outlines(
     straight = np.column_stack([1.0 - at.sum(axis=1), at])
     found = _coordinates_of(np.repeat(own, d, axis=0), at, straight).reshape(-1, d, d)
     if d == 3:
-        both = _on_rim(second, other, of_second)[:, :, None] & _rim_edges(first)[number][:, None]
-        found[both & (np.abs(found) < DEFAULT.rim)] = 0.0
-    return np.asarray(found[:, :, 1:] / found.sum(axis=2, keepdims=True))
+        found[_rim_edges(first)[number][:, None] & (np.abs(found) < DEFAULT.rim)] = 0.0
+    return found[:, :, 1:] / found.sum(axis=2, keepdims=True)
 
 
 def _rim_edges(side: Facets) -> Mask:
     """Whether no other facet of the side has the edge opposite to each corner, (f, 3)."""
     edges = np.sort(side.nodes[:, _EDGES], axis=2)
     _, which, times = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
-    return np.asarray(times[which.ravel()].reshape(-1, 3) == 1)
-
-
-def _on_rim(side: Facets, which: Integers, at: Array) -> Mask:
-    """Whether places (o, 3, 3) of facets (o,) are on the rim of the side, (o, 3)."""
-    alone = _rim_edges(side)
-    corners = np.isin(side.nodes[:, :3], side.nodes[:, _EDGES][alone])
-    on_edge, at_corner = at == 0.0, at == 1.0
-    return np.asarray(np.any(alone[which][:, None] & on_edge | corners[which][:, None] & at_corner, axis=2))
+    return times[which.ravel()].reshape(-1, 3) == 1
 
 
 def _coordinates_of(nodes: Array, at: Array, start: Array) -> Array:

@@ -35,7 +35,7 @@ def rule(dimension: int, degree: int, *, curved: bool) -> tuple[Array, Array]:
         curved: whether facets are curved.
     """
     made: tuple[Any, Any] = basix.make_quadrature(_KINDS[dimension], _DEGREE if curved else 2 * degree)
-    return np.column_stack([1.0 - made[0].sum(axis=1), made[0]]), np.asarray(made[1] / made[1].sum())
+    return np.column_stack([1.0 - made[0].sum(axis=1), made[0]]), made[1] / made[1].sum()
 
 
 def samples(space: fem.FunctionSpace, facets: Entities) -> tuple[Array, Array, Array]:
@@ -66,7 +66,7 @@ def function_integrals(space: fem.FunctionSpace, facets: Entities) -> Array:
         facets: local facets (f of them).
     """
     _, weights, functions = samples(space, facets)
-    return np.asarray(weights @ functions)
+    return weights @ functions
 
 
 def places(nodes: Array, barycentric: Array) -> Array:
@@ -77,7 +77,7 @@ def places(nodes: Array, barycentric: Array) -> Array:
         barycentric: the points, (p, d).
     """
     degree = 1 if nodes.shape[1] == barycentric.shape[1] else 2
-    return np.asarray(np.einsum("pn,pnk->pk", spaces.simplex_functions(degree, barycentric), nodes))
+    return np.einsum("pn,pnk->pk", spaces.simplex_functions(degree, barycentric), nodes)
 
 
 def slopes(nodes: Array, barycentric: Array) -> Array:
@@ -89,18 +89,9 @@ def slopes(nodes: Array, barycentric: Array) -> Array:
     """
     d = barycentric.shape[1]
     if nodes.shape[1] == d:
-        return np.asarray(nodes[:, 1:] - nodes[:, :1])
-    by = (4.0 * barycentric - 1.0)[:, :, None] * nodes[:, :d]
-    for node, (a, b) in enumerate(_ends(d), d):
-        by[:, a] += 4.0 * barycentric[:, [b]] * nodes[:, node]
-        by[:, b] += 4.0 * barycentric[:, [a]] * nodes[:, node]
-    return np.asarray(by[:, 1:] - by[:, :1])
-
-
-def _ends(dimension: int) -> list[list[int]]:
-    """The ends of the edges of a facet, in the order of their midpoints."""
-    found: list[list[int]] = basix.topology(_KINDS[dimension])[1]
-    return found
+        return nodes[:, 1:] - nodes[:, :1]
+    functions = spaces.transformed(_KINDS[d].name, 0.0).tabulate(1, barycentric[:, 1:])[1:]
+    return np.einsum("jpn,pnk->pjk", functions, nodes)
 
 
 def across(slopes: Array) -> Array:
@@ -150,7 +141,7 @@ class Facets:
     @property
     def edges(self) -> list[list[int]]:
         """The ends of the edges whose midpoints are nodes, in their order."""
-        return _ends(self.dimension) if self.degree == 2 else []
+        return basix.topology(_KINDS[self.dimension])[1] if self.degree == 2 else []
 
     def _middles(self, share: float, weight: float) -> Array:
         """The nodes, of each midpoint that less a share of both ends, times a weight, (f, n, d)."""
@@ -178,7 +169,7 @@ class Facets:
     def areas(self) -> Array:
         """Lengths or areas of the corners' segments or triangles, m^(d-1), (f,)."""
         sides = self.corners[:, 1:] - self.corners[:, :1]
-        return np.asarray(np.linalg.norm(across(sides), axis=1) / (self.dimension - 1))
+        return np.linalg.norm(across(sides), axis=1) / (self.dimension - 1)
 
     @property
     def width(self) -> float:
@@ -198,7 +189,7 @@ class Facets:
             facets: their numbers, (p,).
             points: for each facet, (p, n, d).
         """
-        return np.asarray(np.einsum("pvi,pij->pvj", points - self.corners[facets, :1], self._frames[facets]))
+        return np.einsum("pvi,pij->pvj", points - self.corners[facets, :1], self._frames[facets])
 
     def normals_at(self, facets: Integers, barycentric: Array) -> Array:
         """The outward unit normals at points of facets, (p, d).
@@ -209,7 +200,7 @@ class Facets:
         """
         found = across(slopes(self.points[facets], barycentric))
         found /= np.linalg.norm(found, axis=1, keepdims=True)
-        return np.asarray(found * np.sign(np.sum(found * self.normals[facets], axis=1, keepdims=True)))
+        return found * np.sign((found * self.normals[facets]).sum(axis=1, keepdims=True))
 
 
 def outward(corners: Array, inner: Array) -> Array:
@@ -221,4 +212,4 @@ def outward(corners: Array, inner: Array) -> Array:
     """
     normals = across(corners[:, 1:] - corners[:, :1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals * -np.sign(np.sum(normals * (inner - corners[:, 0]), axis=1, keepdims=True)))
+    return normals * -np.sign((normals * (inner - corners[:, 0])).sum(axis=1, keepdims=True))

@@ -29,7 +29,7 @@ from ..effects import Averaged
 from ..mesh import nodes
 from ..runtime import forms
 from ..typing import Array, Entities, Integers
-from .vectors import assembled, nodal_sum
+from .vectors import assembled, nodal
 
 EDGE_SHARE = {2: 0.0, 3: 0.125}
 """The share of an edge's function that goes to each of its ends at degree 2, by dimension (docs/degree-2.md)."""
@@ -61,7 +61,8 @@ def displacement_space(mesh: dmesh.Mesh, degree: int = 1) -> fem.FunctionSpace:
     d = mesh.geometry.dim
     if degree == 1 or EDGE_SHARE[d] == 0.0:
         return fem.functionspace(mesh, ("Lagrange", degree, (d,)))
-    return fem.functionspace(mesh, basix.ufl.blocked_element(_transformed(mesh.topology.cell_name()), shape=(d,)))
+    scalar = transformed(mesh.topology.cell_name(), EDGE_SHARE[d])
+    return fem.functionspace(mesh, basix.ufl.blocked_element(scalar, shape=(d,)))
 
 
 def global_numbers(space: fem.FunctionSpace, local: Entities) -> Integers:
@@ -72,7 +73,7 @@ def global_numbers(space: fem.FunctionSpace, local: Entities) -> Integers:
         local: the nodes.
     """
     found = space.dofmap.index_map.local_to_global(np.ascontiguousarray(local, dtype=np.int32).ravel())
-    return np.asarray(found, dtype=np.int64).reshape(np.shape(local))
+    return found.reshape(np.shape(local))
 
 
 def pressure_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
@@ -96,14 +97,10 @@ def values(space: fem.FunctionSpace, coefficients: Array) -> Array:
         space: of the displacements.
         coefficients: at the local nodes, ghosts among them, of any shape that reshapes to (n, d).
     """
-    return _values(space, np.asarray(coefficients.reshape(-1, space.mesh.geometry.dim)))
-
-
-def _values(space: fem.FunctionSpace, found: Array) -> Array:
-    share = edge_share(space)
+    found, share = coefficients.reshape(-1, space.mesh.geometry.dim), edge_share(space)
     if share == 0.0:
         return found
-    return np.asarray((1 - 2 * share) * found + share * found[nodes.edge_ends(space)].sum(axis=1))
+    return (1 - 2 * share) * found + share * found[nodes.edge_ends(space)].sum(axis=1)
 
 
 def in_lagrange_basis(u: fem.Function) -> fem.Function:
@@ -112,10 +109,9 @@ def in_lagrange_basis(u: fem.Function) -> fem.Function:
     Args:
         u: a displacement, ghosts updated.
     """
-    space, d = u.function_space, u.function_space.mesh.geometry.dim
-    found = fem.Function(fem.functionspace(space.mesh, ("Lagrange", nodes.degree(space), (d,))))
-    found.x.array.reshape(-1, d)[found.function_space.dofmap.list] = values(space, u.x.array)[space.dofmap.list]
-    return found
+    mesh = u.function_space.mesh
+    lagrange = fem.functionspace(mesh, ("Lagrange", nodes.degree(u.function_space), (mesh.geometry.dim,)))
+    return carried_over(u, lagrange)
 
 
 def carried_over(u: fem.Function, space: fem.FunctionSpace) -> fem.Function:
@@ -125,12 +121,8 @@ def carried_over(u: fem.Function, space: fem.FunctionSpace) -> fem.Function:
         u: the displacement, ghosts updated.
         space: of degree 1 or 2.
     """
-    d, found = space.mesh.geometry.dim, fem.Function(space)
-    common = min(u.function_space.dofmap.list.shape[1], space.dofmap.list.shape[1])
-    blocks, given = (f.x.array.reshape(-1, d) for f in (found, u))
-    blocks[space.dofmap.list[:, :common]] = given[u.function_space.dofmap.list[:, :common]]
-    if nodes.degree(space) > nodes.degree(u.function_space):
-        blocks[:] = blocks[nodes.edge_ends(space)].mean(axis=1)
+    found = fem.Function(space)
+    found.interpolate(u)
     return found
 
 
@@ -141,7 +133,8 @@ def positions(space: fem.FunctionSpace, coefficients: Array) -> Array:
         space: of the displacements.
         coefficients: of the position.
     """
-    return coefficients if compat.geometry_degree(space.mesh) == 1 else _values(space, coefficients)
+    straight = edge_share(space) == 0.0 or compat.geometry_degree(space.mesh) == 1
+    return coefficients if straight else values(space, coefficients)
 
 
 def coefficients_of(space: fem.FunctionSpace, points: Array) -> Array:
@@ -154,7 +147,7 @@ def coefficients_of(space: fem.FunctionSpace, points: Array) -> Array:
     share = edge_share(space)
     if share == 0.0 or compat.geometry_degree(space.mesh) == 1:
         return points
-    return np.asarray((points - share * points[nodes.edge_ends(space)].sum(axis=1)) / (1 - 2 * share))
+    return (points - share * points[nodes.edge_ends(space)].sum(axis=1)) / (1 - 2 * share)
 
 
 def simplex_functions(degree: int, barycentric: Array, share: float = 0.0) -> Array:
@@ -167,37 +160,42 @@ def simplex_functions(degree: int, barycentric: Array, share: float = 0.0) -> Ar
     """
     if degree == 1:
         return barycentric
-    kind = basix.CellType[{2: "interval", 3: "triangle", 4: "tetrahedron"}[barycentric.shape[1]]]
-    pairs: list[list[int]] = basix.topology(kind)[1]
-    corners = barycentric * (2 * barycentric - 1)
-    edges = np.stack([4 * barycentric[:, a] * barycentric[:, b] for a, b in pairs], axis=1)
-    for number, ends in enumerate(pairs):
-        corners[:, ends] += share * edges[:, [number]]
-    return np.hstack([corners, (1 - 2 * share) * edges])
+    kind = {2: "interval", 3: "triangle", 4: "tetrahedron"}[barycentric.shape[1]]
+    return transformed(kind, share).tabulate(0, barycentric[:, 1:])[0]
 
 
 @functools.cache
-def _transformed(cell: str) -> Any:
-    """The transformed element of degree 2, a scalar one.
+def transformed(cell: str, share: float) -> Any:
+    """The transformed element of degree 2, a scalar one; Lagrange's without a share.
 
     With the share α, the coefficient of an edge is (u - α (u_a + u_b))/(1 - 2α), u at the middle, u_a and u_b at the
     ends.
+
+    Args:
+        cell: its kind.
+        share: of an edge's function that goes to each of its ends.
     """
     kind = basix.CellType[cell]
     topology: Any = basix.topology(kind)
-    corners = np.asarray(basix.geometry(kind), dtype=np.float64)
-    d = corners.shape[1]
-    extra = EDGE_SHARE[d] / (1 - 2 * EDGE_SHARE[d])
-    where: list[list[Any]] = [[np.zeros((0, d)) for _ in entities] for entities in topology] + [[]] * (3 - d)
-    what: list[list[Any]] = [[np.zeros((0, 1, 0, 1)) for _ in entities] for entities in topology] + [[]] * (3 - d)
-    where[0], what[0] = [corner[None, :] for corner in corners], [np.ones((1, 1, 1, 1)) for _ in corners]
-    ends = [corners[list(edge)] for edge in topology[1]]
-    where[1] = [np.vstack([pair.mean(axis=0), pair]) for pair in ends]
-    what[1] = [np.array([1 + 2 * extra, -extra, -extra]).reshape(1, 1, 3, 1) for _ in ends]
-    count = len(corners) + len(ends)
-    smooth, standard = basix.SobolevSpace.H1, basix.PolysetType.standard
+    corners: Any = basix.geometry(kind)
+    d, extra = corners.shape[1], share / (1 - 2 * share)
+    ends, inside = corners[np.array(topology[1])], [*map(len, topology[2:]), *[0] * (3 - d)]
+    where = [list(corners[:, None]), [np.vstack([pair.mean(axis=0), pair]) for pair in ends]]
+    weights = np.array([1 + 2 * extra, -extra, -extra]).reshape(1, 1, 3, 1)
+    what = [[np.ones((1, 1, 1, 1))] * len(corners), [weights] * len(ends)]
     return basix.ufl.custom_element(
-        kind, [], np.eye(count), where, what, 0, basix.MapType.identity, smooth, False, 2, 2, standard
+        kind,
+        [],
+        np.eye(len(corners) + len(ends)),
+        where + [[np.zeros((0, d))] * n for n in inside],
+        what + [[np.zeros((0, 1, 0, 1))] * n for n in inside],
+        0,
+        basix.MapType.identity,
+        basix.SobolevSpace.H1,
+        False,
+        2,
+        2,
+        basix.PolysetType.standard,
     )
 
 
@@ -275,20 +273,16 @@ class Dilatation:
         pressure, mesh = self.pressure(u), u.function_space.mesh
         q, d = ufl.TestFunction(fem.functionspace(mesh, ("Discontinuous Lagrange", 0))), mesh.geometry.dim
         scalar, vector = self.averaged.divergence.arguments()
-        volume = nodal_sum(ufl.replace(self.averaged.volume, {scalar: q}))
-        dilated = nodal_sum(ufl.replace(self.averaged.divergence, {scalar: q, vector: u}))
+        volume = nodal(ufl.replace(self.averaged.volume, {scalar: q}))
+        dilated = nodal(ufl.replace(self.averaged.divergence, {scalar: q, vector: u}))
         mean = np.divide(dilated, volume, out=np.zeros_like(dilated), where=volume > 0)
         at = mean - pressure.x.array[pressure.function_space.dofmap.list[: len(mean)]] / self.averaged.modulus
         squares = np.sum(at**2, axis=1) + np.sum(at, axis=1) ** 2
-        return np.asarray(self.averaged.shear / d * volume[:, 0] * squares / ((d + 1) * (d + 2)))
+        return self.averaged.shear / d * volume[:, 0] * squares / ((d + 1) * (d + 2))
 
 
-def assemble(averaged: Sequence[Averaged]) -> list[Dilatation]:
-    """Assemble the averages that effects contribute. Collective."""
-    return [_assembled(a) for a in averaged]
-
-
-def _assembled(averaged: Averaged) -> Dilatation:
+def assemble(averaged: Averaged) -> Dilatation:
+    """Assemble the averages that an effect contributes. Collective."""
     divergence = assemble_matrix(forms.compiled(averaged.divergence))
     divergence.assemble()
     volume = assembled(forms.compiled(averaged.volume))

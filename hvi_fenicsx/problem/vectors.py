@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,21 +31,16 @@ def assembled(form: fem.Form) -> PETSc.Vec:
     return vector
 
 
-def nodal(form: Any) -> Array:
-    """A UFL linear form's values at the blocks that this rank owns, (n, d). Collective."""
-    return nodal_values(forms.compiled(form))
-
-
 def nodal_values(compiled: fem.Form) -> Array:
-    """As :func:`nodal`, of a compiled form. Collective."""
+    """A compiled linear form's values at the blocks that this rank owns, (n, d). Collective."""
     dofs = compiled.function_spaces[0].dofmap
     vector = fem.assemble_vector(compiled)
     vector.scatter_reverse(la.InsertMode.add)
-    return np.asarray(vector.array.reshape(-1, dofs.index_map_bs)[: dofs.index_map.size_local], dtype=np.float64)
+    return vector.array.reshape(-1, dofs.index_map_bs)[: dofs.index_map.size_local]
 
 
-def nodal_sum(form: Any) -> Array:
-    """As :func:`nodal`, of a form whose integrals may have different subdomain data. Collective."""
+def nodal(form: Any) -> Array:
+    """As :func:`nodal_values`, of a UFL form whose integrals may have different subdomain data. Collective."""
     return LinearForm(form).values()
 
 
@@ -56,29 +52,14 @@ class LinearForm:
     """
 
     def __init__(self, form: Any) -> None:
-        self._parts = [forms.compiled(ufl.Form(integrals)) for integrals in _alike(form)]
+        groups: dict[int, list[Any]] = {}
+        for integral in form.integrals():
+            groups.setdefault(id(integral.subdomain_data()), []).append(integral)
+        self._parts = [forms.compiled(ufl.Form(integrals)) for integrals in groups.values()]
 
     def values(self) -> Array:
         """The values at the blocks that this rank owns, (n, d), with the coefficients as they are. Collective."""
-        found = nodal_values(self._parts[0])
-        for part in self._parts[1:]:
-            found += nodal_values(part)
-        return found
-
-
-def _alike(form: Any) -> list[list[Any]]:
-    """A form's integrals in groups: within one, dolfinx wants all of a type to have the same subdomain data."""
-    seen: dict[str, list[Any]] = {}
-    groups: list[list[Any]] = []
-    for integral in form.integrals():
-        known, data = seen.setdefault(integral.integral_type(), []), integral.subdomain_data()
-        place = next((i for i, other in enumerate(known) if other is data), len(known))
-        if place == len(known):
-            known.append(data)
-        if place == len(groups):
-            groups.append([])
-        groups[place].append(integral)
-    return groups
+        return functools.reduce(np.add, map(nodal_values, self._parts))
 
 
 def turn(vector: PETSc.Vec, rotation: PETSc.Mat | None) -> None:
