@@ -20,7 +20,7 @@ from ..formula import SpatialValue
 from ..mesh.boundary_part import BoundaryPart, InterfaceSides
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
-from ..typing import Array, Entities
+from ..typing import Entities
 from . import constraints, domain_forms, elastic_operator, interfaces, law_term, scaling
 from .contact_surface import Surface
 from .domain_forms import DomainForms
@@ -78,10 +78,12 @@ def compose(domain: Domain, model: Formulation) -> Problem:
 
 def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, formula: SpatialValue) -> float:
     """The largest absolute value of a formula where an effect acts. Collective."""
-    found = _entities(domain, facets, placed)
-    points = _points(domain, *found)
-    if placed[1].drive is Drive.LOAD or placed[1].place is Place.BODY:  # integrated, not taken at vertices
-        points = np.vstack([points, _midpoints(domain, *found)])
+    dimension, found = _entities(domain, facets, placed)
+    points = np.empty((0, 3))
+    if len(found):  # dolfinx divides by their number
+        points = domain.mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(domain.mesh, dimension, found))]
+        if placed[1].drive is Drive.LOAD or placed[1].place is Place.BODY:  # integrated, not taken at vertices
+            points = np.vstack([points, dolfinx.mesh.compute_midpoints(domain.mesh, dimension, found)])
     values = np.abs(formula.at(points))
     largest = max(agree(domain.mesh.comm, float(np.max(np.where(np.isnan(values), np.inf, values), initial=0.0))))
     if largest == np.inf:
@@ -90,32 +92,14 @@ def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, for
     return largest
 
 
-def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> tuple[int, Any]:
-    """Dimension and local entities of where an effect acts; None: the whole body."""
+def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> tuple[int, Entities]:
+    """Dimension and local entities of where an effect acts."""
     where, effect = placed
-    if where is None:
-        return domain.dimension, None
-    if effect.place is Place.BOUNDARY:
+    if where is not None and effect.place is Place.BOUNDARY:
         return domain.dimension - 1, facets[where]
-    return domain.dimension, domain.cells([where])
-
-
-def _points(domain: Domain, dimension: int, found: Any) -> Array:
-    """The vertices of entities, m, (n, 3)."""
-    if found is None:
-        return domain.mesh.geometry.x
-    if not len(found):
-        return np.empty((0, 3))  # dolfinx divides by their number
-    return domain.mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(domain.mesh, dimension, found))]
-
-
-def _midpoints(domain: Domain, dimension: int, found: Any) -> Array:
-    """The midpoints of entities, m, (n, 3): a load may be zero at all vertices, but for rounding."""
-    if found is None:
-        found = np.arange(domain.mesh.topology.index_map(dimension).size_local, dtype=np.int32)
-    if not len(found):
-        return np.empty((0, 3))  # dolfinx divides by their number
-    return np.asarray(dolfinx.mesh.compute_midpoints(domain.mesh, dimension, found))
+    if where is not None:
+        return domain.dimension, domain.cells([where])
+    return domain.dimension, np.arange(domain.mesh.topology.index_map(domain.dimension).size_local, dtype=np.int32)
 
 
 def _problem(
@@ -168,7 +152,7 @@ def _surfaces(
     """The parts of Γc by name, those of interfaces too, and the interfaces. Collective."""
     surfaces = constraints.make_surfaces(context, contributions, fixed, model.interfaces)
     occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
-    found = interfaces.find(context, model.interfaces, occupied.astype(np.int32))
+    found = interfaces.find(context, model.interfaces, occupied)
     return surfaces | {one.name: one.surface for one in found}, found
 
 

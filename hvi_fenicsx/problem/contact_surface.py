@@ -6,14 +6,15 @@ Vertex (trapezoidal) quadrature makes every boundary term a sum over these nodes
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from scipy.spatial import KDTree
 
 from ..errors import InputError
 from ..geometry import spot, tangents
@@ -87,10 +88,7 @@ def make_surface(
     Raises:
         InputError: on all ranks alike: a vertex is on none but facets inside the body, which have no outward normal.
     """
-    dimension = space.mesh.geometry.dim
-    dofs = fem.locate_dofs_topological(space, dimension - 1, facets)
-    blocks = np.unique(dofs[dofs < space.dofmap.index_map.size_local]).astype(np.int32)
-    test = ufl.TestFunction(space)
+    blocks, test = own_nodes(space, facets), ufl.TestFunction(space)
     normal = nodal(ufl.inner(ufl.FacetNormal(space.mesh), test) * measure)[blocks]
     weights: Array = _weights(space, normal, test, measure, blocks) / area
     if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
@@ -108,15 +106,26 @@ def make_surface(
     )
 
 
+def own_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
+    """The nodes of facets that this rank owns, ascending. Collective.
+
+    Args:
+        space: of the displacements.
+        facets: local facets.
+    """
+    dofs = fem.locate_dofs_topological(space, space.mesh.geometry.dim - 1, facets)
+    return np.unique(dofs[dofs < space.dofmap.index_map.size_local])
+
+
 def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, blocks: Entities) -> Any:
     """The integrals of the basis functions, (m,); of curved cells the sizes of those times the normal.
 
     With the latter a uniform pressure has exactly the forces of its nodal values, whatever the curve.
     """
     if is_curved(space):
-        return np.asarray(np.linalg.norm(normal, axis=1))
+        return np.linalg.norm(normal, axis=1)
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * space.mesh.geometry.dim)
-    return np.asarray(nodal(ufl.inner(ones, test) * measure)[blocks, 0])
+    return nodal(ufl.inner(ones, test) * measure)[blocks, 0]
 
 
 def component_dofs(blocks: Entities, directions: Array) -> tuple[Integers, Array]:
@@ -130,20 +139,11 @@ def component_dofs(blocks: Entities, directions: Array) -> tuple[Integers, Array
     return blocks.astype(np.int64) * directions.shape[1] + axis, np.sign(directions[np.arange(len(axis)), axis])
 
 
-@dataclass(frozen=True)
-class _Row:
-    """A direction that a vertex has already.
-
-    Attributes:
-        name: what brought it.
-        direction: unit vector, (d,).
-        exact: whether it is that of a flat part or a prescribed component.
-        prescribed: whether it is a prescribed component.
-    """
+class _Row(NamedTuple):
+    """A direction that a vertex has already: what brought it, its unit vector (d,), is it a prescribed component?"""
 
     name: str
     direction: Array
-    exact: bool
     prescribed: bool
 
 
@@ -175,7 +175,7 @@ def largest_turn(comm: MPI.Comm, surface: Surface) -> float:
         comm: the ranks of the mesh.
         surface: the part.
     """
-    mean = np.asarray(comm.allreduce(surface.weights @ surface.measured))
+    mean = comm.allreduce(surface.weights @ surface.measured)
     away = surface.measured - mean / (np.linalg.norm(mean) or 1.0)
     return largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
 
@@ -192,13 +192,13 @@ def _own(surface: Surface, stated: Array | None, length: float, rounding: float)
 def _relative_refinement(surface: Surface, length: float) -> Array:
     """Size of the coordinates over that of the facets at each vertex, (m, 1): so much larger is rounding of normals."""
     facet = length * surface.weights ** (1 / (surface.normals.shape[1] - 1))
-    return np.asarray((length + np.linalg.norm(surface.points, axis=1)) / facet)[:, None]
+    return ((length + np.linalg.norm(surface.points, axis=1)) / facet)[:, None]
 
 
 def _without_rounding(normals: Array, rounding: Array | float) -> Array:
     """Unit vectors (m, d), with zero for components up to the size of rounding, a number or (m, 1)."""
     kept = np.where(np.abs(normals) <= rounding, 0.0, normals)
-    return np.asarray(kept / np.linalg.norm(kept, axis=1, keepdims=True))
+    return kept / np.linalg.norm(kept, axis=1, keepdims=True)
 
 
 def _at_shared_vertices(
@@ -206,80 +206,57 @@ def _at_shared_vertices(
 ) -> dict[str, Array]:
     """The normals (m, d) by part, orthogonal or equal to what else a vertex has. Collective."""
     normals = {name: surface.normals.copy() for name, surface in surfaces.items()}
+    if not normals:
+        return normals
+    axes, prescribed = np.eye(next(iter(normals.values())).shape[1]), set(fixed.tolist())
     bad: list[str] = []
-    for places, held in _shared(surfaces, fixed):
-        rows = [_Row(f"u_{'xyz'[i]}", e, True, True) for i, e in held]
+    for block in _candidates(surfaces, fixed // len(axes)):
+        places = [(name, int(i)) for name, s in surfaces.items() for i in np.flatnonzero(s.blocks == block)]
+        held = [i for i in range(len(axes)) if int(block) * len(axes) + i in prescribed]
+        if len(held) == len(axes):  # no use for a normal
+            continue
+        rows = [_Row(f"u_{'xyz'[i]}", axes[i], True) for i in held]
         for name, i in sorted(places, key=lambda place: place[0] not in flat):
-            found = _turned(_Row(f"boundary.{name}", normals[name][i], name in flat, False), rows)
+            found = _turned(normals[name][i], rows, flat=name in flat)
             if isinstance(found, str):
                 bad.append(f"boundary.{name}: at the vertex {surfaces[name].spot(i)} {found}")
                 break
-            normals[name][i] = found.direction
-            rows.append(found)
+            normals[name][i] = found
+            rows.append(_Row(f"boundary.{name}", found, False))
     refuse(comm, bad)
     return normals
 
 
-def _shared(
-    surfaces: Mapping[str, Surface], fixed: Entities
-) -> Iterator[tuple[list[tuple[str, int]], list[tuple[int, Array]]]]:
-    """The vertices with a slanted normal and more than one direction: (part, row) of each, and the prescribed axes.
-
-    Vertices at which every component is prescribed have no use for a normal and are left out.
-    """
-    if not surfaces:
-        return
-    d = next(iter(surfaces.values())).normals.shape[1]
-    prescribed = {int(dof) for dof in fixed}
-    places: dict[int, list[tuple[str, int]]] = {}
-    candidates = _candidates(surfaces, fixed)
-    for name, surface in surfaces.items():
-        for i in np.flatnonzero(np.isin(surface.blocks, candidates)):
-            places.setdefault(int(surface.blocks[i]), []).append((name, int(i)))
-    for block, found in places.items():
-        held = [(i, np.eye(d)[i]) for i in range(d) if block * d + i in prescribed]
-        if len(held) < d:
-            yield found, held
-
-
-def _candidates(surfaces: Mapping[str, Surface], fixed: Entities) -> Integers:
-    """The blocks with a slanted normal that lie on several parts, or on one and have a prescribed component."""
+def _candidates(surfaces: Mapping[str, Surface], fixed: Entities) -> Entities:
+    """The blocks with a slanted normal that lie on several parts, or on one and are among those that are fixed."""
     slanted = [s.blocks[np.count_nonzero(s.normals, axis=1) > 1] for s in surfaces.values()]
     blocks, counts = np.unique(np.concatenate([s.blocks for s in surfaces.values()]), return_counts=True)
-    d = next(iter(surfaces.values())).normals.shape[1]
-    shared = np.union1d(blocks[counts > 1], np.unique(fixed // d))
-    return np.intersect1d(np.concatenate(slanted), shared)
+    return np.intersect1d(np.concatenate(slanted), np.union1d(blocks[counts > 1], fixed))
 
 
-def _turned(normal: _Row, rows: Sequence[_Row]) -> _Row | str:
-    """The normal, orthogonal or equal to each row; or why not."""
-    rest = normal.direction
+def _turned(normal: Array, rows: Sequence[_Row], *, flat: bool) -> Array | str:
+    """The normal of a part, flat or not, orthogonal or equal to each row; or why not."""
+    rest = normal
     for row in rows:
-        limit, along = _largest_turn(normal, row), float(row.direction @ normal.direction)
-        if math.hypot(*(normal.direction - along * row.direction)) <= limit:
-            return replace(normal, direction=math.copysign(1.0, along) * row.direction)
+        exact = DEFAULT.turned_to_prescribed if row.prescribed else DEFAULT.same
+        limit, along = exact if flat else DEFAULT.uneven, float(row.direction @ normal)
+        if math.hypot(*(normal - along * row.direction)) <= limit:
+            return math.copysign(1.0, along) * row.direction
         if abs(along) > limit:
-            return _refusal(normal, row, limit)
+            return _refusal(along, row, limit)
         rest = rest - (row.direction @ rest) * row.direction
-    return replace(normal, direction=rest / np.linalg.norm(rest))
+    return rest / np.linalg.norm(rest)
 
 
-def _refusal(normal: _Row, row: _Row, limit: float) -> str:
-    """Why two directions cannot stand at one vertex, and what to do."""
-    angle = math.degrees(math.acos(min(abs(float(row.direction @ normal.direction)), 1.0)))
+def _refusal(along: float, row: _Row, limit: float) -> str:
+    """Why two directions, of which this is the product, cannot stand at one vertex, and what to do."""
+    angle = math.degrees(math.acos(min(abs(along), 1.0)))
     return (
         f"its normal makes an angle of {angle:.6g}° with the direction of {row.name}; they must be orthogonal or "
         f"equal, here to within {math.degrees(limit):.2g}°. Move the edge of the part, prescribe all components "
         "there, leave it out of the part (`where`), or state the normal: contact = { obstacle = { point = ..., normal "
         "= ... } }, of a round obstacle its `direction`"
     )
-
-
-def _largest_turn(normal: _Row, row: _Row) -> float:
-    """By which angle a normal may be turned to be orthogonal or equal to another direction."""
-    if not normal.exact:
-        return DEFAULT.uneven
-    return DEFAULT.turned_to_prescribed if row.prescribed else DEFAULT.same
 
 
 def refuse_facing_sides(comm: MPI.Comm, surfaces: Iterable[Surface], length: float) -> None:
@@ -308,10 +285,6 @@ def refuse_facing_sides(comm: MPI.Comm, surfaces: Iterable[Surface], length: flo
 
 def _facing(points: Array, normals: Array, near: float) -> Array | None:
     """The first point (3,) that two vertices with opposite normals share; None: there is none."""
-    from scipy.spatial import cKDTree
-
-    if len(points) < 2:
-        return None
-    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    pairs = KDTree(points).query_pairs(near, output_type="ndarray")
     facing = pairs[np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]]) < -0.5]
     return points[np.sort(facing.ravel())[0]] if len(facing) else None

@@ -142,16 +142,12 @@ class ScaledMeasure:
 
 def _tags(mesh: Any, dimension: int, parts: dict[str, Any]) -> tuple[Any, dict[str, tuple[int, ...]]]:
     """Mesh tags in which overlapping parts are unions of atoms. The atoms' numbers agree on all ranks. Collective."""
-    names = sorted(parts)
-    codes: dict[int, int] = {}
-    for bit, name in enumerate(names):
-        for entity in parts[name]:
-            codes[int(entity)] = codes.get(int(entity), 0) | 1 << bit
-    atoms = sorted({code for rank in agree(mesh.comm, set(codes.values())) for code in rank})
-    number = {code: i + 1 for i, code in enumerate(atoms)}
-    entities = np.array(sorted(codes), dtype=np.int32)
-    values = np.array([number[codes[int(e)]] for e in entities], dtype=np.int32)
-    ids = {n: tuple(number[c] for c in atoms if c >> bit & 1) for bit, n in enumerate(names)}
+    entities = np.unique(np.concatenate(list(parts.values())))
+    within = np.column_stack([np.isin(entities, parts[name]) for name in sorted(parts)])
+    others = agree(mesh.comm, np.unique(within, axis=0))
+    atoms, number = np.unique(np.concatenate([within, *others]), axis=0, return_inverse=True)
+    values = number.ravel()[: len(entities)].astype(np.int32) + 1
+    ids = {n: tuple((np.flatnonzero(of) + 1).tolist()) for n, of in zip(sorted(parts), atoms.T, strict=True)}
     return dolfinx.mesh.meshtags(mesh, dimension, entities, values), ids
 
 
@@ -187,15 +183,11 @@ def _empty(name: str, part: BoundaryPart) -> str:
 def _check_overlap(domain: Domain, facets: Mapping[str, Entities], effects: Sequence[Placed]) -> None:
     """A facet bears one effect of an exclusive kind. Collective."""
     placed = [(where, e) for where, e in effects if e.place is Place.BOUNDARY and e.exclusive and where is not None]
-    pairs = [
-        (one, other, effect.key)
-        for (one, effect), (other, second) in combinations(placed, 2)
-        if effect.key == second.key
-    ]
-    shared = [bool(len(np.intersect1d(facets[one], facets[other]))) for one, other, _ in pairs]
-    anywhere = np.any(agree(domain.mesh.comm, shared), axis=0) if pairs else []
-    for one, other, key in (pair for pair, here in zip(pairs, anywhere, strict=True) if here):
-        raise InputError(f"boundary.{other}.{key}: shares facets with boundary.{one}, which has {key} already")
+    for (one, effect), (other, second) in combinations(placed, 2):
+        if (key := effect.key) != second.key:
+            continue
+        if any(agree(domain.mesh.comm, len(np.intersect1d(facets[one], facets[other])))):
+            raise InputError(f"boundary.{other}.{key}: shares facets with boundary.{one}, which has {key} already")
 
 
 def of(space: fem.FunctionSpace, facets: Entities) -> SideMoments:

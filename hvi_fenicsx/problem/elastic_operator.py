@@ -238,7 +238,6 @@ class Bulk:
             form -= part.work(part.pressure(u), v)
         return nodal(form)
 
-
     @functools.cached_property
     def _constants(self) -> fem.FunctionSpace:
         """Functions that are constant in cells."""

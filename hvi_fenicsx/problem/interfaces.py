@@ -30,7 +30,7 @@ from .facets import Facets, is_curved, outward
 from .scaling import DEFAULT
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Pair:
     """The facets of the two sides of an interface, the same on all ranks.
 
@@ -51,12 +51,6 @@ class Pair:
         middles = [overlaps.covered[:, ends].all(axis=1) for ends in self.first.edges]
         return np.column_stack([overlaps.covered, *middles])
 
-    def members(self, context: DomainForms) -> Entities:
-        """Local vertices (owned) of both sides."""
-        start, end = context.space.dofmap.index_map.local_range
-        both = np.unique(np.concatenate([self.first.nodes.ravel(), self.second.nodes.ravel()]))
-        return np.asarray(both[(both >= start) & (both < end)] - start, dtype=np.int32)
-
 
 def _pair(context: DomainForms, name: str, sides: InterfaceSides) -> Pair:
     """The facets of both sides on all ranks; refuses a side without facets. Collective."""
@@ -67,8 +61,7 @@ def _pair(context: DomainForms, name: str, sides: InterfaceSides) -> Pair:
             raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
         found.append(facets)
     curved = is_curved(context.space) and any(curved_cells.is_curved(facets.points) for facets in found)
-    first, second = (replace(facets, curved=curved) for facets in found)
-    return Pair(name=name, sides=sides, first=first, second=second)
+    return Pair(name, sides, *(replace(facets, curved=curved) for facets in found))
 
 
 def _gathered(context: DomainForms, local: Entities) -> Facets:
@@ -83,7 +76,7 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
     blocks = nodes.facet_nodes(space, local)
     inner = space.dofmap.list[cells][:, : d + 1][of_cell[cells] == local[:, None]]
     parts = [
-        space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel())).reshape(blocks.shape),
+        spaces.global_numbers(space, blocks),
         (context.points if is_curved(space) else context.points_on_curves)[blocks][:, :, :d],
         outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
     ]
@@ -166,32 +159,24 @@ def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array) -> Non
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interface:
+class Interface(Pair):
     """An interface on a mesh.
 
     Attributes:
-        name: of the interface.
         tied: the scalar dofs (owned and ghost) of relative displacements that are zero for ever.
         surface: the vertices of the first side that carry something, as a part with contact or laws has them.
         gap: the distance of the two sides as they are meshed, at these vertices, m, (m,).
         rows: what the relative displacement is made of, the same on all ranks.
-        first: the facets of the first side.
-        second: those of the second.
-        overlaps: their intersections.
-        sides: what the scene says of it.
-        members: local vertices of both sides.
+        overlaps: the intersections of the facets.
+        members: local vertices (owned) of both sides.
     """
 
-    name: str
     tied: Entities
     surface: Surface
     gap: Array
     rows: RelativeRows
-    members: Entities
-    first: Facets
-    second: Facets
     overlaps: Overlaps
-    sides: InterfaceSides
+    members: Entities
 
 
 def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: Entities) -> tuple[Interface, ...]:
@@ -208,8 +193,7 @@ def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: E
     if not wanted:
         return ()
     pairs = {name: _pair(context, name, sides) for name, sides in wanted.items()}
-    taken = context.space.dofmap.index_map.local_to_global(np.asarray(occupied, dtype=np.int32))
-    taken = np.unique(np.concatenate(agree(context.domain.mesh.comm, taken)))
+    taken = np.concatenate(agree(context.domain.mesh.comm, spaces.global_numbers(context.space, occupied)))
     return tuple(_interface(context, name, pairs, taken) for name in wanted)
 
 
@@ -221,45 +205,37 @@ def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken
     pair = pairs[name]
     overlaps = facet_overlaps.overlaps(pair.first, pair.second)
     check_facing(pair, overlaps)
-    others = [taken, np.unique(pair.second.nodes)]
-    others += [np.unique([*p.first.nodes.flat, *p.second.nodes.flat]) for n, p in pairs.items() if n != name]
+    others = [taken, pair.second.nodes.ravel()]
+    others += [side.nodes.ravel() for n, p in pairs.items() if n != name for side in (p.first, p.second)]
     busy, covered = np.isin(pair.first.nodes, np.concatenate(others)), pair.covered(overlaps)
-    kept = ~np.isin(pair.first.nodes, np.unique(pair.first.nodes[~covered | busy]))
+    kept = ~np.isin(pair.first.nodes, pair.first.nodes[~covered | busy])
     check_carried(pair, overlaps, kept, covered & busy)
     size = context.space.dofmap.index_map.size_global
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)
     surface = _surface(context, pair, overlaps, rows)
     gap = _gaps(context, surface, pair, rows)
     check_apart(context.domain.mesh.comm, pair, surface, gap)
-    tied = _dofs(context, surface) if pair.sides.tied else np.empty(0, np.int32)
+    start, end = context.space.dofmap.index_map.local_range
+    both = np.union1d(pair.first.nodes, pair.second.nodes)
     return Interface(
-        name=name,
-        tied=tied,
+        **vars(pair),
+        tied=_dofs(context, surface) if pair.sides.tied else np.empty(0, np.int32),
         surface=surface,
         gap=gap,
         rows=rows,
-        members=pair.members(context),
-        first=pair.first,
-        second=pair.second,
         overlaps=overlaps,
-        sides=pair.sides,
+        members=(both[(both >= start) & (both < end)] - start).astype(np.int32),
     )
 
 
-def _own(context: DomainForms, rows: RelativeRows) -> Entities:
-    """Local vertices that this rank owns and that carry something."""
-    start, end = context.space.dofmap.index_map.local_range
-    return np.flatnonzero(rows.weights[start:end] > 0.0).astype(np.int32)
-
-
 def _surface(context: DomainForms, pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> Surface:
-    d, start = context.dimension, context.space.dofmap.index_map.local_range[0]
-    blocks = _own(context, rows)
+    d, (start, end) = context.dimension, context.space.dofmap.index_map.local_range
+    blocks = np.flatnonzero(rows.weights[start:end] > 0.0).astype(np.int32)
     sums, weights = _summed_normals(pair, overlaps, rows)
     mean = sums[start + blocks]
     normals = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    normals = np.where(np.abs(normals) < DEFAULT.rounding * 10, 0.0, normals)
-    normals = np.where(np.abs(normals) > 1 - DEFAULT.rounding * 10, np.round(normals), normals)
+    rounded = np.round(normals)
+    normals = np.where(np.abs(normals - rounded) < DEFAULT.rounding * 10, rounded, normals)
     return Surface(
         part=pair.name,
         facets=context.part_facets[pair.name],
@@ -300,7 +276,7 @@ def _gaps(context: DomainForms, surface: Surface, pair: Pair, rows: RelativeRows
     for side in (pair.first, pair.second):
         places[side.nodes.ravel()] = side.positions.reshape(-1, d)
     apart = (rows.second[own] @ places - rows.first[own] @ places) / rows.weights[own, None]
-    return np.asarray(np.sum(apart * surface.normals, axis=1))
+    return np.sum(apart * surface.normals, axis=1)
 
 
 def _dofs(context: DomainForms, surface: Surface) -> Entities:

@@ -49,7 +49,7 @@ class References:
         """Euclidean norms of values at this rank's vertices, any shape of (vertices, d), by body. Collective."""
         by_vertex = values.reshape(-1, self.problem.scales.dimension)
         squares = np.einsum("vd,vd->v", by_vertex, by_vertex)  # a sum over a short axis is much slower
-        return np.sqrt(_total(self.problem, _sums(self.problem, squares)))
+        return np.sqrt(_sums(self.problem, squares))
 
     def largest(self, blocks: npt.NDArray[np.integer], values: Array) -> Array:
         """The largest of values (m,) at vertices, at least 0, by body. Collective.
@@ -70,7 +70,7 @@ class References:
 
     def at(self, blocks: npt.NDArray[np.integer]) -> Array:
         """``scale`` at local vertices (m,), (m,)."""
-        return np.asarray(self.scale[self.problem.bodies.labels[blocks]])
+        return self.scale[self.problem.bodies.labels[blocks]]
 
     def displacements(self, u: Array) -> Array:
         """The largest component of a displacement, by body; where nothing drives, at least its scale. Collective.
@@ -102,15 +102,12 @@ class References:
 
     @functools.cached_property
     def surface(self) -> Array:
-        """Norm of the nodal forces of a unit traction on a block of unit size with as many vertices, by body."""
-        d = self.problem.scales.dimension
-        return np.asarray(self.vertices ** (-(d - 1) / (2 * d)))
+        """Norm of the nodal forces of a unit traction on a block of unit size with as many vertices, by body.
 
-    @functools.cached_property
-    def vertices(self) -> Array:
-        """Number of vertices, by body. Collective when first used."""
-        owned = self.problem.space.dofmap.index_map.size_local
-        return _total(self.problem, _sums(self.problem, np.ones(owned)))
+        Collective when first used.
+        """
+        d, owned = self.problem.scales.dimension, self.problem.space.dofmap.index_map.size_local
+        return _sums(self.problem, np.ones(owned)) ** (-(d - 1) / (2 * d))
 
     def traction_scale(self, term: LawTerm) -> Array:
         """What a law's j' is judged by at its vertices: its own size, but at least a share of the body's, (m,)."""
@@ -133,7 +130,7 @@ def of(problem: Problem, load: Array) -> References:
     free.reshape(-1)[problem.fixed_here] = 0.0
     everywhere = np.ones(len(problem.bodies.bodies))
     found = References(problem, everywhere, everywhere, everywhere > 0, everywhere > 0, holding)
-    loaded, moved = _total(problem, _sums(problem, np.linalg.norm(load, axis=1))), demanded(problem)
+    loaded, moved = _sums(problem, np.linalg.norm(load, axis=1)), demanded(problem)
     drive = np.maximum(loaded, moved)
     scale = np.where(drive > 0.0, drive / (np.max(drive) or 1.0), 1.0)
     return replace(found, load=found.norms(free), scale=scale, moved=moved > 0.0, driven=drive > 0.0)
@@ -148,8 +145,7 @@ def demanded(problem: Problem) -> Array:
     force, displacement = np.zeros((2, len(problem.bodies.bodies)))
     for term in problem.terms:
         rest = np.zeros(len(term.surface.blocks))
-        push = term.weights * _outside(rest, *term.law.interval(rest))
-        np.add.at(force, problem.bodies.labels[term.surface.blocks], push)
+        force += _sums(problem, term.weights * _outside(rest, *term.law.interval(rest)), term.surface.blocks)
     for bounds in problem.bounds:
         away = _outside(np.zeros_like(bounds.lower), bounds.lower, bounds.upper)
         np.maximum.at(displacement, problem.bodies.labels[bounds.surface.blocks], away)
@@ -159,35 +155,18 @@ def demanded(problem: Problem) -> Array:
     sizes = np.max(np.abs(prescribed.x.array.reshape(-1, problem.scales.dimension)), axis=1)
     np.maximum.at(displacement, problem.bodies.labels, sizes)
     problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, displacement, op=MPI.MAX)
-    return np.maximum(_total(problem, force), displacement)
+    return np.maximum(force, displacement)
 
 
 def _outside(x: Array, lower: Array, upper: Array) -> Array:
     return np.maximum(np.maximum(lower - x, x - upper), 0.0)
 
 
-def _sums(problem: Problem, values: Array) -> Array:
-    """Sums of values at this rank's vertices by body, without those of other ranks."""
-    labels = problem.bodies.labels[: len(values)]
-    return np.bincount(labels, weights=values, minlength=len(problem.bodies.bodies)).astype(np.float64)
-
-
-def _total(problem: Problem, values: Array) -> Array:
-    """Values by body, summed over the ranks. Collective."""
-    found = values.copy()
-    problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, found)
-    return found
-
-
-def vertices(problem: Problem, facets: Entities) -> Entities:
-    """The vertices of facets that this rank owns, ascending. Collective.
-
-    Args:
-        problem: the problem.
-        facets: local facets.
-    """
-    dofs = fem.locate_dofs_topological(problem.space, problem.domain.dimension - 1, facets)
-    return np.unique(dofs[dofs < problem.space.dofmap.index_map.size_local])
+def _sums(problem: Problem, values: Array, blocks: Entities | slice = slice(None)) -> Array:
+    """Sums of values at this rank's vertices, or at some of them, by body, over all ranks. Collective."""
+    labels = problem.bodies.labels[blocks][: len(values)]
+    found = np.bincount(labels, weights=values, minlength=len(problem.bodies.bodies))
+    return problem.domain.mesh.comm.allreduce(found)
 
 
 def lumped(problem: Problem, facets: Entities) -> Array:
@@ -202,22 +181,7 @@ def lumped(problem: Problem, facets: Entities) -> Array:
     if len(own):
         np.add.at(found.array, nodes.facet_nodes(problem.space, own), function_integrals(problem.space, own))
     found.scatter_reverse(la.InsertMode.add)
-    return np.asarray(found.array[: problem.space.dofmap.index_map.size_local], dtype=np.float64)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _BodyMotions:
-    """The rigid motions of one body.
-
-    Attributes:
-        places: of its values among all local ones, those that this rank owns first, (n,).
-        owned: how many these are.
-        values: of the motions, orthonormal over all ranks, (m, n).
-    """
-
-    places: Integers
-    owned: int
-    values: Array
+    return found.array[: problem.space.dofmap.index_map.size_local]
 
 
 def elastic_forces(problem: Problem, u: fem.Function) -> Array:
@@ -247,26 +211,29 @@ def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) 
         u itself where none is.
     """
     comm, found = problem.domain.mesh.comm, u
-    for body in problem.once("rigid motions of displacements", None, lambda: _motions(problem)):
-        values = u.x.array[body.places]
+    for places, owned, motions in problem.once("rigid motions of displacements", None, lambda: _motions(problem)):
+        values = u.x.array[places]
         with np.errstate(invalid="ignore"):  # what is no number is told by who judges it
-            share = comm.allreduce(body.values[:, : body.owned] @ values[: body.owned])
-            rest = values - share @ body.values
-        if share @ share > travel**2 * comm.allreduce(rest[: body.owned] @ rest[: body.owned]):
+            share = comm.allreduce(motions[:, :owned] @ values[:owned])
+            rest = values - share @ motions
+        if share @ share > travel**2 * comm.allreduce(rest[:owned] @ rest[:owned]):
             found = u.copy() if found is u else found
-            found.x.array[body.places] = rest
+            found.x.array[places] = rest
     return found
 
 
-def _motions(problem: Problem) -> list[_BodyMotions]:
-    """All rigid motions of all bodies. Collective."""
-    points, d = np.asarray(problem.points / problem.scales.length), problem.scales.dimension
-    here, every = problem.space.dofmap.index_map.size_local, list[_BodyMotions]()
+def _motions(problem: Problem) -> list[tuple[Integers, int, Array]]:
+    """The rigid motions of each body, collective: places of its local values, those of this rank first; their number.
+
+    The motions are orthonormal over all ranks.
+    """
+    points, d = problem.points / problem.scales.length, problem.scales.dimension
+    here, every = problem.space.dofmap.index_map.size_local, list[tuple[Integers, int, Array]]()
     for body in problem.bodies:
         blocks = np.flatnonzero(problem.bodies.labels == body.index)
         fields = problem.bodies.fields(points[blocks], blocks, body).transpose(1, 0, 2)
         places = (blocks[:, None] * d + np.arange(d)).ravel()
         values, owned = fields.reshape(len(fields), -1), d * int(np.count_nonzero(blocks < here))
         factor = np.linalg.cholesky(problem.domain.mesh.comm.allreduce(values[:, :owned] @ values[:, :owned].T))
-        every.append(_BodyMotions(places=places, owned=owned, values=np.asarray(np.linalg.solve(factor, values))))
+        every.append((places, owned, np.asarray(np.linalg.solve(factor, values))))
     return every

@@ -19,6 +19,7 @@ from ..certify import placed_forces
 from ..model import Model, dump_scene
 from ..paths.load_path import LoadPath, PathRow
 from ..problem import references, spaces
+from ..problem.contact_surface import own_nodes
 from ..problem.stress import stress_of_parts
 from ..problem.vectors import NodalForces
 from ..report import page, solution_arrays
@@ -205,7 +206,7 @@ def boundary_rows(solution: Solution) -> Iterator[tuple[Any, ...]]:
 def _at_vertices(solution: Solution, loads: Mapping[str, NodalForces], part: str, facets: Entities) -> Array:
     """The numbers at the vertices of a part that this rank owns, (m, 12); NaN: none. Collective."""
     problem, forces = solution.problem, solution.forces
-    blocks = references.vertices(problem, facets)
+    blocks = own_nodes(problem.space, facets)
     d, scales = problem.scales.dimension, problem.scales
     found = np.full((len(blocks), len(_QUANTITIES), 3), np.nan)
     found[:, 0, :d] = problem.positions[blocks, :d]
