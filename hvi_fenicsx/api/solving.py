@@ -29,7 +29,7 @@ from ..runtime.mpi import time_over
 from ..schema import Positive, Table, require_path
 from ..solvers.method import Progress
 from ..study import plan as study_plan
-from ..study.conduct import conduct
+from ..study.conduct import Measurement
 from ..study.table import Study
 from ..system import petsc_options
 from ..system.thresholds import DEFAULT, Thresholds
@@ -279,10 +279,8 @@ def study(
     if isinstance(repeats, bool) or not isinstance(repeats, int | np.integer) or repeats < 1:
         raise InputError(f"study: repeats must be a whole number, 1 or more (is {repeats!r})")
     plan = study_plan.make(_on_its_mesh(model), [_axis(name, values) for name, values in axes.items()])
-    found, _ = conduct(
-        plan, ranks, None if folder is None else Path(folder), repeats=repeats, existing=existing(force=force)
-    )
-    return found
+    measurement = Measurement(plan=plan, comm=ranks, repeats=int(repeats))
+    return measurement.conduct(None if folder is None else Path(folder), existing(force=force))[0]
 
 
 def _axis(name: str, values: Any) -> tuple[str, tuple[str, ...]]:

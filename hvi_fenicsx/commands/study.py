@@ -12,8 +12,7 @@ from ..results.output_folder import Existing
 from ..runtime.manifest import MARKS
 from ..runtime.mpi import on_root, stop_on_signals
 from ..study import plan
-from ..study.conduct import conduct
-from ..study.table import Study
+from ..study.conduct import Measurement
 from .session import COMM, display, say
 
 
@@ -31,26 +30,18 @@ def execute(options: argparse.Namespace) -> int:
     interrupted = stop_on_signals(COMM)
     default = Path("results") / f"{options.scene.stem}-study"
     folder = on_root(COMM, lambda: results.resolved(options.out or default))
+    measurement = Measurement(
+        plan=planned, comm=COMM, repeats=options.repeat, limit=options.limit, interrupted=interrupted
+    )
     with display():
-        study, warnings = conduct(
-            planned,
-            COMM,
-            folder,
-            repeats=options.repeat,
-            existing=existing,
-            inputs=[options.scene],
-            limit=options.limit,
-            interrupted=interrupted,
-        )
+        study, warnings = measurement.conduct(folder, existing, [options.scene])
         told = [f"warning: {text}" for text in warnings]
-        say([*_heading(study), *study.sentences, *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
+        certified, ranks = (
+            sum(row.converged for row in study.rows),
+            "1 rank" if COMM.size == 1 else f"{COMM.size} ranks",
+        )
+        say([f"{study.title or 'untitled'}: {len(study.rows)} points, {certified} certified, on {ranks}"])
+        if study.left_out:
+            say([f"{len(study.left_out)} combinations are no scenes, like {study.left_out[0]}"])
+        say([*study.sentences, *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
     return ExitCode.CERTIFIED
-
-
-def _heading(study: Study) -> list[str]:
-    certified = sum(row.converged for row in study.rows)
-    ranks = "1 rank" if study.ranks == 1 else f"{study.ranks} ranks"
-    lines = [f"{study.title or 'untitled'}: {len(study.rows)} points, {certified} certified, on {ranks}"]
-    if study.left_out:
-        lines.append(f"{len(study.left_out)} combinations are no scenes, like {study.left_out[0]}")
-    return lines

@@ -113,6 +113,8 @@ def _text(file: Path) -> str:
         str(file.absolute()).encode("utf-8")  # the result names its scene, and files beside it
         strange = file.exists() and not file.is_file()
         raw = b"" if strange else file.read_bytes()
+    except UnicodeEncodeError:
+        raise InputError(f"{file.absolute()}: this name is not UTF-8; rename the file or folder") from None
     except FileNotFoundError:
         raise InputError(f"{file}: does not exist") from None
     except (OSError, ValueError) as error:  # the latter is about a null byte in the name

@@ -11,6 +11,7 @@ import gc
 import json
 import statistics
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -62,50 +63,6 @@ class StudyInterruptedError(HviError):
     exit_code = ExitCode.INTERRUPTED
 
 
-def conduct(
-    plan: Plan,
-    comm: MPI.Comm,
-    target: Path | None,
-    *,
-    repeats: int,
-    existing: Existing = "refuse",
-    inputs: Iterable[Path] = (),
-    limit: float | None = None,
-    interrupted: Callable[[], bool] = never,
-) -> tuple[Study, list[str]]:
-    """Solve, measure and write a study; the same on all ranks. Collective.
-
-    Args:
-        plan: what is run.
-        comm: the ranks that solve it.
-        target: the folder where it goes; None: nowhere.
-        repeats: solves of each point at most, for the median of its time.
-        existing: what to do with a study that is in the folder.
-        inputs: files that must not be replaced.
-        limit: seconds after which a point is given up; None: never.
-        interrupted: whether to stop; collective.
-
-    Returns:
-        What was found, and warnings about what could not be done or was moved aside.
-
-    Raises:
-        InputError: the folder cannot be used; on all ranks alike, as all errors.
-        NoReferenceError: no solution exists (3), or the reference is not certified (4).
-        StudyInterruptedError: it was asked to stop; finished points are kept.
-    """
-    measured = Measurement(plan=plan, comm=comm, repeats=repeats, limit=limit, interrupted=interrupted)
-    if target is None:
-        measured.run()
-        return on_root(comm, lambda: evaluate(plan, measured.known, comm.size)), []
-    with ResultFolder(comm, target, existing, inputs, kind="study") as folder:
-        on_root(comm, lambda: measured.resume(folder.announce(JOURNAL), anew=existing == "replace"))
-        measured.run()
-        study = on_root(comm, lambda: evaluate(plan, measured.known, comm.size))
-        warnings = on_root(comm, lambda: _fill(folder.work, study))
-        folder.commit(plan.own.scene, keep=[JOURNAL])
-        return study, [*warnings, *folder.kept]
-
-
 def _fill(work: Path, study: Study) -> list[str]:
     """Write tables, pictures and page of a study; what could not be done, in words. Rank 0 only."""
     pictures.draw(study, work)
@@ -142,6 +99,37 @@ class Measurement:
     _journal: Journal | None = None
     _reference: ReferenceSolution | None = None
     _exact: tuple[Point | None, Fields | None] = (None, None)
+
+    def conduct(
+        self, target: Path | None, existing: Existing = "refuse", inputs: Iterable[Path] = ()
+    ) -> tuple[Study, list[str]]:
+        """Solve, measure and write a study; the same on all ranks. Collective.
+
+        Args:
+            target: the folder where it goes; None: nowhere.
+            existing: what to do with a study that is in the folder.
+            inputs: files that must not be replaced.
+
+        Returns:
+            What was found, and warnings about what could not be done or was moved aside.
+
+        Raises:
+            InputError: the folder cannot be used; on all ranks alike, as all errors.
+            NoReferenceError: no solution exists (3), or the reference is not certified (4).
+            StudyInterruptedError: it was asked to stop; finished points are kept.
+        """
+        plan, comm = self.plan, self.comm
+        into = nullcontext() if target is None else ResultFolder(comm, target, existing, inputs, kind="study")
+        with into as folder:
+            if folder is not None:
+                on_root(comm, lambda: self.resume(folder.announce(JOURNAL), anew=existing == "replace"))
+            self.run()
+            study = on_root(comm, lambda: evaluate(plan, self.known, comm.size))
+            if folder is None:
+                return study, []
+            warnings = on_root(comm, lambda: _fill(folder.work, study))
+            folder.commit(plan.own.scene, keep=[JOURNAL])
+            return study, [*warnings, *folder.kept]
 
     def resume(self, file: Path, *, anew: bool) -> None:
         """Keep records in a journal, and know those in it that were measured against the same reference. Rank 0 only.

@@ -32,17 +32,14 @@ def draw(study: Study, folder: Path) -> None:
         folder: where to.
     """
     for name, (along, label) in _PICTURES.items():
-        fig = _page(study, along, label)
-        if fig is not None:
-            save(fig, folder / f"{name}.png", f"Error over {label}.")
+        lines = {name: rows for name, rows in _lines(study, along).items() if along == "seconds" or len(rows) > 1}
+        if lines and study.headlines():
+            save(_page(study, along, label, lines), folder / f"{name}.png", f"Error over {label}.")
 
 
-def _page(study: Study, along: str, label: str) -> Figure | None:
-    """A panel for each quantity, the traction first: it is what accuracy costs most in; None without two points."""
-    lines = {name: rows for name, rows in _lines(study, along).items() if along == "seconds" or len(rows) > 1}
+def _page(study: Study, along: str, label: str, lines: Mapping[str, list[Row]]) -> Figure:
+    """A panel for each quantity, the traction first: it is what accuracy costs most in."""
     drawn = study.headlines()[::-1]
-    if not lines or not drawn:
-        return None
     fig = figure(0.5 + 2.9 * len(drawn))
     titled(fig, study.title or "untitled", f"error over {label}")
     panels = fig.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
@@ -64,11 +61,10 @@ def _lines(study: Study, along: str) -> dict[str, list[Row]]:
     own, found = study.own, dict[str, list[Row]]()
     for row in study.rows:
         degree = f", degree {row.degree}" if row.degree != own.degree else ""
-        alike = (row.method, row.tolerance, row.linear_solver) == (own.method, own.tolerance, own.linear_solver)
         name = (row.law if along == "h" else row.smoothing or "exact law") + degree
         if along == "seconds":
             name += "" if row.method == "auto" else ", another method"
-        elif not alike or (along == "epsilon" and row.mesh != own.mesh):
+        elif row.way != own.way or (along == "epsilon" and row.mesh != own.mesh):
             continue
         if row.converged and getattr(row, along):
             found.setdefault(name, []).append(row)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -86,10 +87,6 @@ class Point:
         law = law_text(solver.smoothing, solver.epsilon, solver.epsilon_absolute)
         return f"{self.mesh}, degree {self.degree}, {law}, {solver.method}"
 
-    def exact(self) -> Point:
-        """The exact law on the same mesh at the same degree, all else as the program chooses it."""
-        return Point(self.scene.with_solver(**_UNSMOOTHED))
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -97,22 +94,20 @@ class Plan:
 
     Attributes:
         own: the scene as it is.
-        exact: the scene with the law itself; the same where nothing is smoothed.
-        points: all that is measured, cheapest mesh first, on each the exact law; ``own`` and ``exact`` are among them.
+        points: all that is measured, cheapest mesh first, on each the exact law; ``own`` is among them.
         reference: what is measured against and the next coarser levels, finest first.
         left_out: combinations that are no scene, in words.
     """
 
     own: Point
-    exact: Point
-    points: tuple[Point, ...]
-    reference: tuple[Point, ...]
     left_out: tuple[str, ...]
+    points: tuple[Point, ...] = ()
+    reference: tuple[Point, ...] = ()
 
     def exact_like(self, point: Point) -> Point:
         """The exact law on a point's mesh and at its degree, by the scene's own method."""
-        scene = self.exact.scene.changed(domain=point.scene.domain)
-        return Point(scene.with_solver(degree=point.degree))
+        scene = self.own.scene.changed(domain=point.scene.domain)
+        return Point(scene.with_solver(**_UNSMOOTHED, degree=point.degree))
 
 
 def read_axis(text: str) -> tuple[str, tuple[str, ...]]:
@@ -131,21 +126,13 @@ def read_axis(text: str) -> tuple[str, tuple[str, ...]]:
     return name, values
 
 
-def _value(text: str) -> Any:
-    """A value of the solver table as TOML has it; what is none is a text."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
-
-
 def _combinations(scene: Model, axes: Values, left_out: list[str]) -> Iterator[Point]:
     """The points of all combinations of values; those that are no scenes are noted."""
     for values in itertools.product(*axes.values()):
         pairs = dict(zip(axes, values, strict=True))
         on_mesh = _on_mesh(scene, pairs.pop("mesh", scene.domain))
         accuracy = pairs.pop("accuracy", None)
-        if accuracy is not None and not _can_be_refined(on_mesh):
+        if accuracy is not None and on_mesh.domain.refined(Fraction(2)) is None:
             raise InputError("--axis accuracy: this mesh cannot be refined; leave the axis out")
         try:  # an accuracy is between 0 and 1, as a tolerance is
             least = None if accuracy is None else _solved(scene, {"tolerance": accuracy}).solver.tolerance
@@ -173,7 +160,7 @@ def _default(scene: Model) -> Iterator[Values]:
     yield {**exact, "tolerance": ("1e-4", "1e-10")}
     yield {**exact, "linear_solver": ("lu", "gamg")}
     yield {**meshes, **exact, "degree": ("2",)}
-    if _can_be_refined(scene):
+    if scene.domain.refined(Fraction(2)) is not None:
         yield {"accuracy": ("0.1", "0.03"), "degree": ("1", "2")}
 
 
@@ -196,14 +183,14 @@ def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
     if not wanted:
         raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(left_out))
     own = Point(scene)
-    plan = Plan(own, own.exact(), (), (), tuple(dict.fromkeys(left_out)))
+    plan = Plan(own, tuple(dict.fromkeys(left_out)))
     uniform = [own, *(point for point in wanted if point.accuracy is None)]
-    everything = [*wanted, own, plan.exact, *map(plan.exact_like, uniform)]
+    everything = [*wanted, own, *map(plan.exact_like, uniform)]
     distinct = {(dump_scene(p.scene), p.accuracy): p for p in everything}.values()
     finest = max(uniform, key=lambda p: p.scene.domain.unknowns(scene.dimension))
     degree = max(point.degree for point in everything)
     points = tuple(sorted(distinct, key=lambda p: (p.unknowns, p.scene.solver.smoothing is not None)))
-    return Plan(plan.own, plan.exact, points, _reference(finest, degree), plan.left_out)
+    return replace(plan, points=points, reference=_reference(finest, degree))
 
 
 def _asked(axes: Values) -> Iterator[Values]:
@@ -222,8 +209,6 @@ def _check_axes(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> None
             raise InputError(f"--axis {name}: is given twice; put its values into one list")
         if name in _UNSMOOTHED and not scene.laws():
             raise InputError(f"--axis {name}: the scene has no law that could be smoothed; leave the axis out")
-    if set(_WIDTHS) <= set(names):
-        raise InputError("--axis epsilon_absolute: epsilon is given too; leave one of them out")
 
 
 def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:
@@ -232,7 +217,10 @@ def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:
     Raises:
         InputError: they contradict each other, or the laws cannot be smoothed so.
     """
-    values = {name: _value(value) for name, value in pairs.items()}
+    values: dict[str, Any] = dict(pairs)
+    for name, text in pairs.items():
+        with contextlib.suppress(tomllib.TOMLDecodeError):  # what is no value of TOML is a text
+            values[name] = tomllib.loads(f"value = {text}")["value"]
     width = next((name for name in _WIDTHS if name in values), None)
     if width is not None and values[width] == EXACT:
         values |= _UNSMOOTHED
@@ -251,10 +239,6 @@ def _refined(scene: Model, factor: Fraction) -> Model | None:
     """The scene with cells ``factor`` times finer each way; None where there is no such mesh."""
     shape = scene.domain.refined(factor)
     return None if shape is None else scene.changed(domain=shape)
-
-
-def _can_be_refined(scene: Model) -> bool:
-    return scene.domain.refined(Fraction(2)) is not None
 
 
 def _default_meshes(scene: Model) -> list[DomainShape]:

@@ -125,6 +125,11 @@ class Row:
         return law_text(self.smoothing, self.epsilon, self.epsilon_absolute)
 
     @property
+    def way(self) -> tuple[str, str, float]:
+        """How it is solved, but for law and degree."""
+        return self.method, self.linear_solver, self.tolerance
+
+    @property
     def text(self) -> str:
         """The setting in words; what is as the program chooses is left out."""
         parts = [self.mesh, *(["degree 2"] if self.degree == 2 else []), self.law]
@@ -207,8 +212,7 @@ class Study:
             like: whose law and degree the points have.
         """
         own, least = self.own, RESOLVED * (self.certain[quantity].error or 0.0)
-        wanted = (like.law, like.degree, own.method, own.tolerance, own.linear_solver)
-        alike = [r for r in self.rows if (r.law, r.degree, r.method, r.tolerance, r.linear_solver) == wanted]
+        alike = [r for r in self.rows if (r.law, r.degree, r.way) == (like.law, like.degree, own.way)]
         errors = {r.h: e for r in alike if r.h is not None and (e := r.error(quantity)) is not None and e > least}
         if len(errors) < 2:
             return None
@@ -253,21 +257,19 @@ class Study:
 
     def lines(self) -> list[dict[str, Any]]:
         """The lines of ``study.csv``, one for each point; errors are in columns ``error_QUANTITY``."""
-        return [_flat(r) for r in self.rows]
+        found = []
+        for data in map(asdict, self.rows):
+            line = {key: value for key, value in data.items() if key not in _NESTED}
+            for name, keys in _NESTED.items():
+                prefix = "error" if name == "errors" else name
+                line |= {f"{prefix}_{key}": (data[name] or {}).get(key) for key in keys}
+            found.append({**line, "beyond_reference": " ".join(data["beyond_reference"])})
+        return found
 
 
 _ITERATIONS = ("newton", "linear", "levels", "branch")
-_NESTED = {"phases": PHASES, "iterations": _ITERATIONS, "errors": tuple(NORMS), "epsilon_part": tuple(NORMS)}
+_NESTED = {"phases": PHASES, "iterations": _ITERATIONS, "errors": NORMS, "epsilon_part": NORMS}
 """The columns that a column of a row becomes."""
-
-
-def _flat(row: Row) -> dict[str, Any]:
-    data = asdict(row)
-    plain = {key: value for key, value in data.items() if key not in _NESTED}
-    for name, keys in _NESTED.items():
-        prefix = "error" if name == "errors" else name
-        plain |= {f"{prefix}_{key}": (data[name] or {}).get(key) for key in keys}
-    return {**plain, "beyond_reference": " ".join(row.beyond_reference)}
 
 
 def evaluate(plan: Plan, known: Mapping[str, Mapping[str, Any]], ranks: int) -> Study:
@@ -286,7 +288,7 @@ def evaluate(plan: Plan, known: Mapping[str, Mapping[str, Any]], ranks: int) -> 
         title=plan.own.scene.title,
         rows=tuple(rows.values()),
         own=rows[plan.own.name],
-        exact=rows[plan.exact.name],
+        exact=rows[plan.exact_like(plan.own).name],
         certain=certain,
         reference=_row(finest, known[finest.name], certain),
         coarser=levels,
@@ -295,15 +297,13 @@ def evaluate(plan: Plan, known: Mapping[str, Mapping[str, Any]], ranks: int) -> 
     )
 
 
-_OF_SOLVER = ("smoothing", "epsilon_absolute", "method", "linear_solver", "tolerance")
-
-
 def _row(point: Point, known: Mapping[str, Any], certain: Mapping[str, Certainty]) -> Row:
     """A point's setting, and its record."""
     record = {key: value for key, value in known.items() if key != "limit"}
     solver, errors = point.scene.solver, record.get("errors") or {}
     found = [(q, error, certain[q].error) for q, error in errors.items()]
-    setting: dict[str, Any] = {name: getattr(solver, name) for name in _OF_SOLVER}
+    of_solver = ("smoothing", "epsilon_absolute", "method", "linear_solver", "tolerance")
+    setting: dict[str, Any] = {name: getattr(solver, name) for name in of_solver}
     setting |= {name: getattr(point, name) for name in ("mesh", "accuracy", "degree")}
     setting["h"] = None if point.accuracy is not None else point.scene.domain.width() or record.get("h")
     setting["epsilon"] = (record.get("epsilon") or solver.epsilon) if solver.smoothing else None
