@@ -18,7 +18,7 @@ from ..problem.references import References
 from ..problem.vectors import NodalForces
 from ..runtime.mpi import largest
 from ..system import rigid_motions as rigid_balance
-from ..system.rigid_motions import ActingForces, Holder, SupportedBody
+from ..system.rigid_motions import ActingForces, Holder, Motions
 from ..typing import Array
 from .contact_state import ContactState, Forces
 
@@ -88,10 +88,9 @@ def net_forces(
         loads=NodalForces.of(forces.pushing),
         carried=[NodalForces.of(force) for force in given],
         holders=holders,
-        capable=rigid_balance.capable(problem),
     )
     closed = [(state.surface, state.contact) for state in states]
-    motions = (SupportedBody.of(problem, body).motions(closed) for body in problem.bodies)
+    motions = (Motions.of(problem, body, closed) for body in problem.bodies)
     return np.array([rigid_balance.along(references, one, acting).beyond_rounding for one in motions])
 
 

@@ -10,7 +10,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpstrf
 
 from ..system.interior import Interior
-from ..system.rigid_motions import SupportedBody
+from ..system.rigid_motions import Motions
 from ..system.system import System
 from ..typing import Array, Integers
 
@@ -170,8 +170,6 @@ def _fields(system: System) -> Array:
     problem, frames = system.problem, system.frames
     if problem.bulk.foundation is not None or system.comm.allreduce(len(system.pins)):
         return np.zeros((system.load.local_size, 0))
-    bodies = (SupportedBody.of(problem, body) for body in problem.bodies)
-    local = (lambda v: v) if frames is None else frames.local_components
-    fields = [body.in_components(local).fields for body in bodies]
-    every = np.concatenate([f.reshape(len(f), system.load.local_size) for f in fields])
-    return np.asarray(every.T)
+    fields = [field for body in problem.bodies for field in Motions.of(problem, body).fields]
+    local = fields if frames is None else [frames.local_components(field) for field in fields]
+    return np.array(local).reshape(len(fields), system.load.local_size).T

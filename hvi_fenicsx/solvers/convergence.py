@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from ..problem.contact_surface import Surface
+from ..problem.problem import Bounds
 from ..problem.vectors import NodalForces
 from ..system import rigid_motions
-from ..system.rigid_motions import ActingForces, Holder, Motions, SupportedBody
+from ..system.rigid_motions import ActingForces, Holder, Motions
 from ..system.system import System
 from ..typing import Array, Mask
 
@@ -22,7 +22,7 @@ class Sizes:
     Attributes:
         norm: its Euclidean norm, over the forces there (:class:`.References`).
         traction: the largest nodal traction on Γc, over what is allowed there.
-        net: the largest net force along a rigid motion (:mod:`.net_forces`).
+        net: the largest net force along a rigid motion (:mod:`.rigid_motions`).
         net_rounding: of that.
     """
 
@@ -77,7 +77,9 @@ class ConvergenceTest:
         self._limits = traction_limits(system)[rows]
         self._blocks = rows // system.problem.scales.dimension
         self._near = self._thresholds.near * system.references.at(self._blocks)
-        self._net = NetForceTest(system)
+        self._loads = NodalForces.of(system.pushing)
+        self._masks: list[Mask] | None = None
+        self._motions: list[Motions] = []
 
     def sizes(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> Sizes:
         """Size of the residual of the inequality. Collective.
@@ -92,19 +94,47 @@ class ConvergenceTest:
         on_lower = x.array_r[at] <= lower.array_r[at] + self._near
         on_upper = x.array_r[at] >= upper.array_r[at] - self._near
         r[at] = projected(r[at], on_lower, on_upper)
-        net = self._net.sizes(x, residual.array_r, r, (on_lower, on_upper))
-        return Sizes(*self._forces(r, x), *net)
+        return Sizes(*self._forces(r, x), *self._net_forces(x, residual.array_r, r, on_lower, on_upper))
 
     def _forces(self, residual: Array, x: PETSc.Vec) -> tuple[Array, Array]:
-        """Norm and largest traction of a residual (n,) at x, relative, by body. Collective."""
+        """Norm and largest traction on Γc of a residual (n,) at x, relative, by body. Collective."""
         references = self._system.references
         forces = references.forces(x.array_r, self._system.holding_forces(x))
-        return references.norms(residual) / forces, self._traction(residual)
-
-    def _traction(self, residual: Array) -> Array:
-        """The largest traction of a residual (n,) on Γc, relative, by body. Collective."""
         nodal = np.abs(residual[self._system.jacobian.rows.dofs]) / self._limits
-        return self._system.references.largest(self._blocks, nodal)
+        return references.norms(residual) / forces, references.largest(self._blocks, nodal)
+
+    def _net_forces(self, x: PETSc.Vec, residual: Array, left: Array, on_lower: Mask, on_upper: Mask) -> Array:
+        """The largest net force along a rigid motion of each body, relative, and its rounding, (2, bodies). Collective.
+
+        The residual is that of the equations, (n,); left is what of it bounds do not bear, (n,); k unknowns of Γc are
+        on their bounds.
+        """
+        system, axes = self._system, self._system.contact_axes
+        at, contact, d = system.jacobian.rows.dofs, system.jacobian.rows.vertices, axes.shape[1]
+        self._find_motions(x)
+        laws, acting = system.equations.at_contact(x) - residual[at], -left.reshape(-1, d)
+        laws, acting[contact] = (np.einsum("mij,mi->mj", axes, v.reshape(-1, d)) for v in (laws, acting[contact]))
+        least, most = np.where(on_upper, -np.inf, 0.0), np.where(on_lower, np.inf, 0.0)
+        columns = [values.reshape(-1, d) for values in (residual[at] - left[at], least, most)]
+        holders = [Holder(contact, axes[:, k], *(c[:, k] for c in columns)) for k in range(d)]
+        forces = ActingForces(left=acting, loads=self._loads, carried=[NodalForces(contact, laws)], holders=holders)
+        nets = [rigid_motions.along(system.references, y, forces) for y in self._motions]
+        return np.array([net.relative for net in nets]).T
+
+    def _find_motions(self, x: PETSc.Vec) -> None:
+        """The motions that supports leave, and those that closed contact does not see, where that has changed."""
+        problem, masks = self._system.problem, [self._closed(x, bounds) for bounds in self._system.bounds]
+        known = self._masks is not None and all(map(np.array_equal, masks, self._masks))
+        if self._system.comm.allreduce(not known):
+            closed = [(bounds.surface, mask) for bounds, mask in zip(problem.bounds, masks, strict=True)]
+            self._motions = [Motions.of(problem, body, closed) for body in problem.bodies]
+        self._masks = masks
+
+    def _closed(self, x: PETSc.Vec, bounds: Bounds) -> Mask:
+        """Where some bounds are reached."""
+        dofs, sign = bounds.component()
+        near = self._thresholds.near * self._system.references.at(bounds.surface.blocks)
+        return bounds.beyond(sign * x.array_r[dofs]) >= -near
 
     def rounding(self, x: PETSc.Vec) -> tuple[Array, Array]:
         """What rounding makes of the norm and the largest traction of the residual at x, by body. Collective.
@@ -174,87 +204,6 @@ def traction_limits(system: System) -> Array:
         limit = references.traction_scale(term) * term.weights
         limits[dofs[touched]] = np.minimum(limits[dofs], limit[:, None])[touched]
     return limits
-
-
-class NetForceTest:
-    """The net forces of one system. Creation is collective.
-
-    Args:
-        system: the assembled problem.
-    """
-
-    def __init__(self, system: System) -> None:
-        self._system, self._thresholds = system, system.thresholds
-        self._d = system.problem.scales.dimension
-        self._contact = (system.jacobian.rows.dofs[:: self._d] // self._d).astype(np.int32)
-        self._loads = NodalForces.of(self._local(system.pushing))
-        self._capable = [self._local_part(force) for force in rigid_motions.capable(system.problem)]
-        bodies = (SupportedBody.of(system.problem, body) for body in system.problem.bodies)
-        self._bodies = [body.in_components(self._local) for body in bodies]
-        self._masks: list[Mask] | None = None
-        self._motions: list[Motions] = []
-
-    def sizes(self, x: PETSc.Vec, residual: Array, projected: Array, on: tuple[Mask, Mask]) -> Array:
-        """The largest net force of each body, relative, and its rounding, (2, bodies). Collective.
-
-        Args:
-            x: the displacement.
-            residual: of the equations at x, (n,) on this rank.
-            projected: the residual without the reactions of bounds, (n,).
-            on: which unknowns of Γc are on their lower and on their upper bound, (k,) each.
-        """
-        system = self._system
-        self._find_motions(x)
-        at = system.jacobian.rows.dofs
-        laws = residual[at] - system.equations.at_contact(x)
-        acting = ActingForces(
-            left=-self._blocks(projected),
-            loads=self._loads,
-            carried=[NodalForces(self._contact, -self._blocks(laws))],
-            holders=self._holders(residual[at] - projected[at], *on),
-            capable=self._capable,
-        )
-        nets = [rigid_motions.along(system.references, y, acting) for y in self._motions]
-        return np.array([net.relative for net in nets]).T
-
-    def _holders(self, reactions: Array, on_lower: Mask, on_upper: Mask) -> list[Holder]:
-        """The bounds that are reached: each pushes along the axis of its unknown."""
-        least, most = np.where(on_upper, -np.inf, 0.0), np.where(on_lower, np.inf, 0.0)
-        columns = [self._blocks(values) for values in (reactions, least, most)]
-        axes = (np.broadcast_to(axis, columns[0].shape) for axis in np.eye(self._d))
-        return [Holder(self._contact, axis, *(c[:, k] for c in columns)) for k, axis in enumerate(axes)]
-
-    def _find_motions(self, x: PETSc.Vec) -> None:
-        """The motions that supports leave, and those that closed contact does not see, where that has changed."""
-        system = self._system
-        closed = [self._closed(x, k) for k in range(len(system.bounds))]
-        masks = [mask for _, mask in closed]
-        known = self._masks is not None and all(map(np.array_equal, masks, self._masks))
-        if system.comm.allreduce(not known):
-            self._motions = [body.motions(closed) for body in self._bodies]
-        self._masks = masks
-
-    def _closed(self, x: PETSc.Vec, k: int) -> tuple[Surface, Mask]:
-        """The surface of some bounds, and where they are reached."""
-        system = self._system
-        bounds = system.bounds[k]
-        dofs, sign = bounds.component()
-        normal, near = sign * x.array_r[dofs], self._thresholds.near * system.references.at(bounds.surface.blocks)
-        return system.problem.bounds[k].surface, bounds.beyond(normal) >= -near
-
-    def _local(self, vectors: Array) -> Array:
-        """Vectors (vertices, d) in the components of the unknowns."""
-        frames = self._system.frames
-        return vectors if frames is None else frames.local_components(vectors)
-
-    def _local_part(self, forces: NodalForces) -> NodalForces:
-        """Forces in the components of the unknowns."""
-        every = np.zeros((len(self._system.pushing), self._d))
-        every[forces.blocks] = forces.values
-        return NodalForces(forces.blocks, self._local(every)[forces.blocks])
-
-    def _blocks(self, values: Array) -> Array:
-        return values.reshape(-1, self._d)
 
 
 @dataclass

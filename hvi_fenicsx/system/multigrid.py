@@ -287,26 +287,18 @@ class Level:
         from sliding.
         """
         fine, own = self.finer.jacobian, self.system.jacobian
-        forces, moved = fine.rows.tangent @ _axes_on_contact(self.finer), np.empty_like(own.rows.tangent)
+        forces, moved = fine.rows.tangent @ self.finer.contact_axes, np.empty_like(own.rows.tangent)
         for direction in range(moved.shape[2]):
             moved[:, :, direction] = self._restricted(forces[:, :, direction].ravel()).reshape(moved.shape[:2])
         weights = np.abs(self._restricted(np.isin(fine.rows.dofs, fine.held)))
         held = own.rows.dofs[weights > self.finer.thresholds.held_weight].astype(np.int32)
-        own.set_restricted(moved @ _axes_on_contact(self.system).transpose(0, 2, 1), held)
+        own.set_restricted(moved @ self.system.contact_axes.transpose(0, 2, 1), held)
 
     def free(self) -> None:
         """Free the system and the way to it; what other problems on the mesh share stays. Collective."""
         for name in ("interpolation", "_traces", "prolongation"):
             self.__dict__.pop(name, None)
         self.system.free()
-
-
-def _axes_on_contact(system: System) -> Array:
-    """The local axes at the vertices of Γc that this rank owns, as rows, (m, d, d)."""
-    rows = system.jacobian.rows
-    if system.frames is None:
-        return np.broadcast_to(np.eye(rows.tangent.shape[1]), rows.tangent.shape)
-    return system.frames.at(rows.vertices)
 
 
 Levels = tuple[Level, ...]

@@ -11,8 +11,8 @@ for each motion. Two solutions differ by such motions; the one returned is ortho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -114,84 +114,43 @@ def _pins(comm: MPI.Comm, columns: list[Array]) -> Entities:
 
 
 @dataclass(frozen=True)
-class SupportedBody:
-    """A body, and the rigid motions of it that its supports leave.
+class Motions:
+    """Rigid motions of a body that its supports leave, some perhaps twice: those first that contact does not see.
 
     On interfaces they are relative, as forces there are those of bounds and laws.
 
     Attributes:
-        problem: the problem.
-        body: the body that moves.
-        coefficients: of the motions, (basis motions, n).
-        fields: the motions at this rank's vertices, zero on other bodies, (n, vertices, d).
+        body: its number.
+        fields: the motions at this rank's vertices, Cartesian, zero on other bodies, (j, vertices, d).
     """
 
-    problem: Problem
-    body: AnyBody
-    coefficients: Array
+    body: int
     fields: Array
 
     @classmethod
-    def of(cls, problem: Problem, body: AnyBody) -> Self:
-        """A body of a problem. Collective.
+    def of(cls, problem: Problem, body: AnyBody, closed: Sequence[tuple[Surface, Mask]] = ()) -> Self:
+        """All that supports leave, then those that closed contact does not see. Collective.
 
         Args:
             problem: the problem.
             body: the body that moves.
-        """
-        name, origin = f"supported motions of body {body.index}", problem.fixed.tobytes()
-        return cls(problem, body, *problem.once(name, origin, lambda: _supported(problem, body)))
-
-    def in_components(self, components: Callable[[Array], Array]) -> Self:
-        """The same, its fields in other components; ``components`` makes them of vectors (vertices, d)."""
-        fields = np.array([components(field) for field in self.fields]).reshape(self.fields.shape)
-        return replace(self, fields=fields)
-
-    @cached_property
-    def products(self) -> Array:
-        """The products of each two motions, on this rank, (n, n)."""
-        return np.asarray(np.tensordot(self.fields, self.fields, ((1, 2), (1, 2))))
-
-    def motions(self, closed: Sequence[tuple[Surface, Mask]]) -> Motions:
-        """All of these, then those that closed contact does not see. Collective.
-
-        Args:
             closed: surfaces, and at which of their vertices contact is closed.
         """
-        count, comm = len(self.fields), self.problem.domain.mesh.comm
-        fixed = existence.prescribed(self.problem, self.body)
-        rows = [existence.normals(self.problem, self.body, surface, mask) for surface, mask in closed]
-        unseen = kernel(comm, self.body, [fixed, *rows]) if count else np.empty((len(self.coefficients), 0))
-        if unseen.shape[1] == count:
-            return Motions(self, np.eye(count))
-        return Motions(self, np.hstack([np.eye(count), np.linalg.pinv(self.coefficients) @ unseen]))
+        name, origin = f"supported motions of body {body.index}", problem.fixed.tobytes()
+        coefficients, fields = problem.once(name, origin, lambda: _supported(problem, body))
+        if len(fields) and closed:
+            fixed = existence.prescribed(problem, body)
+            rows = [existence.normals(problem, body, surface, mask) for surface, mask in closed]
+            unseen = kernel(problem.domain.mesh.comm, body, [fixed, *rows])
+            if unseen.shape[1] < len(fields):
+                combined = np.linalg.pinv(coefficients) @ unseen
+                fields = np.concatenate([fields, np.tensordot(combined, fields, (0, 0))])
+        return cls(body.index, fields)
 
-
-@dataclass(frozen=True)
-class Motions:
-    """Some rigid motions (j) of a body.
-
-    Attributes:
-        of: the body.
-        combined: how they are made of the motions that its supports leave, (n, j).
-    """
-
-    of: SupportedBody
-    combined: Array
-
-    def at(self, blocks: Entities) -> Array:
-        """The motions at some vertices (m,), (j, m, d)."""
-        return np.asarray(np.einsum("nmd,nj->jmd", self.of.fields[:, blocks], self.combined))
-
-    def works(self, forces: Array) -> Array:
-        """The work of forces at all of this rank's vertices, (vertices, d), in each, (j,)."""
-        fields = self.of.fields
-        return np.asarray(self.combined.T @ (fields.reshape(len(fields), forces.size) @ forces.ravel()))
-
-    @property
+    @cached_property
     def squares(self) -> Array:
         """The square of the length of each on this rank, (j,)."""
-        return np.asarray(np.einsum("nj,nk,kj->j", self.combined, self.of.products, self.combined))
+        return np.asarray(np.einsum("jvd,jvd->j", self.fields, self.fields))
 
 
 def _supported(problem: Problem, body: AnyBody) -> tuple[Array, Array]:
@@ -212,7 +171,7 @@ SUMMATION = 1e-14
 
 @dataclass(frozen=True)
 class Holder:
-    """A contact or a law that acts along one direction at some of this rank's vertices, in the components of motions.
+    """A contact or a law that acts along one direction at some of this rank's vertices.
 
     Attributes:
         blocks: the vertices, each once, (m,).
@@ -235,7 +194,7 @@ class Holder:
 
     def spare(self, motions: Motions) -> tuple[Array, Array]:
         """By how much its work in motions of a body may fall and rise, (j,) each."""
-        along = np.einsum("md,jmd->jm", self.direction, motions.at(self.blocks))
+        along = np.einsum("md,jmd->jm", self.direction, motions.fields[:, self.blocks])
         ends = np.zeros((2, *along.shape))
         for end, limit in zip(ends, (self.least, self.most), strict=True):
             np.multiply(along, limit - self.force, out=end, where=np.abs(along) > NOTHING)
@@ -244,21 +203,19 @@ class Holder:
 
 @dataclass(frozen=True, kw_only=True)
 class ActingForces:
-    """Nodal forces at this rank's vertices, in the components of the motions.
+    """Nodal forces at this rank's vertices, Cartesian.
 
     Attributes:
         left: what is left of all forces that act on the bodies, (vertices, d).
         loads: the loads.
         carried: forces that follow from the displacement.
         holders: contact and laws whose forces do not.
-        capable: forces of the laws' own size, along their directions.
     """
 
     left: Array
     loads: NodalForces
     carried: Sequence[NodalForces]
     holders: Sequence[Holder]
-    capable: Sequence[NodalForces]
 
 
 @dataclass(frozen=True)
@@ -297,7 +254,7 @@ class NetForces:
         return float(np.max(found, initial=0.0))
 
 
-def capable(problem: Problem) -> list[NodalForces]:
+def _capable(problem: Problem) -> list[NodalForces]:
     """Forces of the laws' own size along each of their directions."""
     found = []
     for term in problem.terms:
@@ -315,25 +272,26 @@ def along(references: References, motions: Motions, acting: ActingForces) -> Net
         acting: what acts on all bodies.
     """
     carried = [*acting.carried, *(holder.forces for holder in acting.holders)]
-    spare = np.zeros((2, motions.combined.shape[1]))
+    spare = np.zeros((2, len(motions.fields)))
     for holder in acting.holders:
         spare += holder.spare(motions)
-    loads, carry, could = (_works(motions, forces) for forces in ([acting.loads], carried, acting.capable))
-    left = motions.works(acting.left)
+    loads, carry, could = (
+        _works(motions, forces) for forces in ([acting.loads], carried, _capable(references.problem))
+    )
+    left = np.tensordot(motions.fields, acting.left)
     sums = np.array([left, loads[0], carry[1], could[1], loads[2] + carry[2], motions.squares, *spare])
     references.problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, sums)
     left, push, held, able, sizes, squares, fall, rise = sums
-    index, lengths = motions.of.body.index, np.sqrt(squares)
-    scale = np.max([np.abs(push), held, able], axis=0) * lengths * references.surface[index]
+    scale = np.max([np.abs(push), held, able], axis=0) * np.sqrt(squares) * references.surface[motions.body]
     free = np.maximum(np.abs(left) - np.where(left > 0, fall, rise), 0.0)
     return NetForces(free, SUMMATION * sizes, scale, sizes)
 
 
 def _works(motions: Motions, forces: Sequence[NodalForces]) -> Array:
     """The work of forces in motions, the sum of its sizes by vertex, and of the products of lengths there, (3, j)."""
-    found = np.zeros((3, motions.combined.shape[1]))
+    found = np.zeros((3, len(motions.fields)))
     for force in forces:
-        fields = motions.at(force.blocks)
+        fields = motions.fields[:, force.blocks]
         works = np.einsum("md,jmd->jm", force.values, fields)
         lengths = np.linalg.norm(fields, axis=2) @ np.linalg.norm(force.values, axis=1)
         found += [works.sum(axis=1), np.abs(works).sum(axis=1), lengths]

@@ -117,6 +117,14 @@ class System:
         """The rigid motions, which algebraic multigrid must keep. Collective when first used."""
         return local_frames.rigid_modes(self.problem, self.rotation)
 
+    @cached_property
+    def contact_axes(self) -> Array:
+        """The local axes at the vertices of Γc that this rank owns, as rows, (m, d, d)."""
+        rows = self.jacobian.rows
+        if self.frames is None:
+            return np.broadcast_to(np.eye(rows.tangent.shape[1]), rows.tangent.shape)
+        return self.frames.at(rows.vertices)
+
     def _in_local_components(
         self, stiffness: PETSc.Mat
     ) -> tuple[PETSc.Mat, PETSc.Mat | None, tuple[LawTerm, ...], tuple[Bounds, ...]]:
