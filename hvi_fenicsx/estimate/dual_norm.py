@@ -75,8 +75,7 @@ class DualNorm:
         """
         system = self.system
         x, out = system.unknowns(field), system.load.duplicate()
-        system.jacobian.matrix.mult(x, out)
-        system.jacobian.rows.overwrite(x, out)  # without what laws and holding add to them
+        system.jacobian.elastic_product(x, out)
         cartesian = out if system.rotation is None else system.rotation * out
         return np.array(cartesian.array_r).reshape(-1, system.problem.scales.dimension)
 

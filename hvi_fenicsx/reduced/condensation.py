@@ -82,7 +82,7 @@ class Condensation:
     def _reduce(self, carrying: Integers) -> Integers:
         """Keep those unknowns alone that carry something, where they hold the body; which are kept. Collective."""
         interior, every = self._interior, np.arange(self._interior.size)
-        own = np.isin(interior.own_part(every), carrying)
+        own = np.isin(every[interior.here], carrying)
         with suppress(SolverError):
             fewer = Interior(self._form, interior.kept[own])
             if fewer.is_held():
@@ -201,7 +201,7 @@ class Condensation:
             factor: λ.
         """
         unknowns = self._system.unknowns(u)
-        kept = self._interior.kept_values(unknowns)
+        kept = self._interior.gathered(unknowns.array_r)
         unknowns.destroy()
         return np.asarray(kept[self._elimination.stay] - factor * self._shift)
 
@@ -274,7 +274,7 @@ class BodyForces:
         interior, whole = self._interior, np.zeros(self._interior.size)
         whole[self._elimination.stay] = forces
         found = self._system.load.duplicate()
-        found.array[interior.kept] = interior.own_part(whole)
+        found.array[interior.kept] = whole[interior.here]
         return found
 
     def condensed(self, forces: Array) -> CondensedForces:

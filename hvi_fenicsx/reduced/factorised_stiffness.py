@@ -114,10 +114,10 @@ class FactorisedStiffness(CondensedStiffness):
         Raises:
             numpy.linalg.LinAlgError: it is singular.
         """
-        own = self._interior.own_part
+        here = self._interior.here
         factors = Factorisation(self._form, self._matrix.copy(), _INDEFINITE, _PREFIX)
-        slope = own(slope) + self._added
-        return FactorisedCell(self._system, self._interior, self._stiffness, factors, own(moving), slope)
+        slope = slope[here] + self._added
+        return FactorisedCell(self._system, self._interior, self._stiffness, factors, moving[here], slope)
 
     @override
     def free(self) -> None:
@@ -170,7 +170,7 @@ class FactorisedCell:
             right: of the equations, (n,).
         """
         interior, moving = self._interior, self._moving
-        kept, own = interior.kept, interior.own_part(right)
+        kept, own = interior.kept, right[interior.here]
         self._load.set(0.0)
         self._load.array[kept] = np.where(moving, own, 0.0)
         self.factors.apply(self._load, self._found)

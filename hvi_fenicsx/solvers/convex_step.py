@@ -292,7 +292,7 @@ def _majorant(
 ) -> RigidProblem:
     """The existence question of one body with H - ξ in the place of its laws, given as (term, H^∞, ξ). Collective."""
     whole = existence.rigid_problem(problem, existence.loads_of_rigid_motions(problem, forces), body)
-    here = [one for one in terms if existence.acts_on(problem, body, one[0])]
+    here = [one for one in terms if existence.acts_on(problem, body, one[0].surface)]
     mine = [xi[existence.inside(problem, body, term.surface.blocks)] for term, _, xi in here]
     parts = list(zip(whole.resistances, here, mine, strict=True))
     works = sum((_work(part, term, xi) for part, (term, _, _), xi in parts), np.zeros(body.motions))

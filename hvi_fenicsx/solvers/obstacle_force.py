@@ -186,7 +186,8 @@ class ObstacleForceSolve:
 
     def _at(self, way: float, start: LevelSolution | CoarseStart | fem.Function | None) -> LevelSolution:
         """The solution with the obstacle there, from a start, else from the coarse meshes. Collective."""
-        system, metres = self._system.with_obstacle_at(way), way * self._system.problem.scales.displacement
+        system = self._system.with_obstacles_of(self._system.problem.with_obstacle_at(way))
+        metres = way * system.problem.scales.displacement
         if isinstance(start, CoarseStart):
             return nested_iteration.solve_from_coarser(self._task, system, start)
         effects = [(where, effect.obstacle_moved(metres)) for where, effect in self._task.model.effects]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +29,7 @@ from ..rigid import (
     null_space,
     works,
 )
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers, Mask
 
 
@@ -101,7 +101,7 @@ def _with_obstacles(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[
     if all(b.force is None for b in problem.bounds):
         return None
     touched = [
-        {b.force.name: b.force for b in problem.bounds if b.force is not None and _meets(problem, one.body, b)}
+        {b.force.name: b.force for b in problem.bounds if b.force is not None and acts_on(problem, one.body, b.surface)}
         for one in whole
     ]
     names = [name for one in touched for name in one]
@@ -112,12 +112,6 @@ def _with_obstacles(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[
         for one, here in zip(whole, touched, strict=True)
     ]
     return tuple(replace(one, loads={n: np.zeros(one.body.motions) for n in names} | dict(one.loads)) for one in found)
-
-
-def _meets(problem: Problem, body: AnyBody, bounds: Bounds) -> bool:
-    """Whether bounds act on a body. Collective."""
-    mine = bool(inside(problem, body, bounds.surface.blocks).any())
-    return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
 
 
 def _ways(problem: Problem, body: AnyBody, names: Sequence[str]) -> list[Array]:
@@ -188,7 +182,9 @@ def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBo
         loads=loads,
         fixed=(prescribed(problem, body), *held),
         contact=tuple(normals(problem, body, b.surface) for b in problem.bounds if not _bilateral(b)),
-        resistances=tuple(_resistance(problem, body, term) for term in problem.terms if acts_on(problem, body, term)),
+        resistances=tuple(
+            _resistance(problem, body, term) for term in problem.terms if acts_on(problem, body, term.surface)
+        ),
         force=force,
     )
 
@@ -247,15 +243,15 @@ def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBody) -> 
     return found, size
 
 
-def acts_on(problem: Problem, body: AnyBody, term: LawTerm) -> bool:
-    """Whether a law acts on a body. Collective.
+def acts_on(problem: Problem, body: AnyBody, surface: Surface) -> bool:
+    """Whether a part of Γc has vertices of a body. Collective.
 
     Args:
         problem: the problem.
         body: the body.
-        term: the law.
+        surface: the part.
     """
-    mine = bool(inside(problem, body, term.surface.blocks).any())
+    mine = bool(inside(problem, body, surface.blocks).any())
     return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
 
 
@@ -287,25 +283,19 @@ def named(problem: Problem, mode: Mode | None) -> Mode | None:
     """
     if mode is None:
         return None
-    left: dict[str, list[str]] = {}
-    for way, other in _partings(problem, mode):
-        left.setdefault(way, []).append(other)
-    words = ", ".join(f"{way} {' and '.join(dict.fromkeys(others))}" for way, others in left.items())
-    return replace(mode, name=f"{mode.name}: {words}") if words else mode
-
-
-def _partings(problem: Problem, mode: Mode) -> Iterator[tuple[str, str]]:
-    """Where one body moves relative to another: which one and how, and the other. Collective."""
-    names = [body.name for body in problem.bodies.single()]
-    moved = problem.bodies.motion(np.asarray(problem.points / problem.scales.length), mode)
-    largest = _most(problem, np.linalg.norm(moved, axis=1))
-    moving = {number for number in range(len(names)) if _speed(problem, moved, number) > STILL * largest}
+    names, left = [body.name for body in problem.bodies.single()], dict[str, list[str]]()
+    moved = np.linalg.norm(problem.bodies.motion(np.asarray(problem.points / problem.scales.length), mode), axis=1)
+    numbers = problem.bodies.number_at(np.arange(len(moved)))
+    speeds = [_most(problem, moved[numbers == number]) for number in range(len(names))]
+    still = STILL * max(speeds)
+    moving = [number for number, speed in enumerate(speeds) if speed > still]
     for interface in problem.interfaces:
-        way = _way(problem, interface, mode, STILL * largest)
-        if way is not None:
+        if (way := _way(problem, interface, mode, still)) is not None:
             first, second = (_body(problem, side.nodes) for side in (interface.first, interface.second))
             who, other = (first, second) if first in moving else (second, first)
-            yield f"{'it' if moving == {who} else names[who]} {way}", names[other]
+            left.setdefault(f"{'it' if moving == [who] else names[who]} {way}", []).append(names[other])
+    words = ", ".join(f"{way} {' and '.join(dict.fromkeys(others))}" for way, others in left.items())
+    return replace(mode, name=f"{mode.name}: {words}") if words else mode
 
 
 def _way(problem: Problem, interface: Interface, mode: Mode, still: float) -> str | None:
@@ -321,12 +311,6 @@ def _way(problem: Problem, interface: Interface, mode: Mode, still: float) -> st
     return "lifts off" if -_most(problem, -opening) > still else "comes off"
 
 
-def _speed(problem: Problem, moved: Array, number: int) -> float:
-    """The largest motion of a body. Collective."""
-    mine = problem.bodies.number_at(np.arange(len(moved))) == number
-    return _most(problem, np.linalg.norm(moved[mine], axis=1))
-
-
 def _body(problem: Problem, nodes: Integers) -> int:
     """The number of the body of a side. Collective."""
     start, end = problem.space.dofmap.index_map.local_range
@@ -337,5 +321,4 @@ def _body(problem: Problem, nodes: Integers) -> int:
 
 def _most(problem: Problem, values: Array) -> float:
     """The largest value of all ranks. Collective."""
-    own = float(values.max(initial=-np.inf))
-    return float(problem.domain.mesh.comm.allreduce(own, op=MPI.MAX))
+    return largest(problem.domain.mesh.comm, float(values.max(initial=-np.inf)))

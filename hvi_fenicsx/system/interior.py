@@ -11,10 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, vstack
@@ -28,7 +26,6 @@ from .petsc_options import CHOLESKY
 _NO_MEMORY = PETSc.PC.FailedReason.FACTOR_OUTMEMORY
 PREFIX = "condensed_"
 """The prefix of options of factorisations that condense a body."""
-Number = TypeVar("Number", bound=np.generic)
 
 
 class Interior:
@@ -80,14 +77,6 @@ class Interior:
         first = sum(agree(self._comm, len(self.kept))[: self._comm.rank])
         return slice(first, first + len(self.kept))
 
-    def kept_values(self, x: PETSc.Vec) -> Array:
-        """The kept unknowns of a vector, (n,). Collective.
-
-        Args:
-            x: the unknowns of the whole body.
-        """
-        return np.concatenate(agree(self._comm, x.array_r[self.kept]))
-
     def _columns(self, matrix: PETSc.Mat) -> csr_matrix:
         """The columns of kept unknowns in a matrix, this rank's rows, (rows, n)."""
         rows, total = matrix.getLocalSize()[0], matrix.getSize()[1]
@@ -115,25 +104,6 @@ class Interior:
         found[: len(right)] = right
         return found
 
-    def response(self, interrupted: Callable[[], bool] = lambda: False) -> Array:
-        """A_ki A_ii⁻¹ A_ik: forces on Γc by the body inside, for unit displacements of Γc, (n, n). Collective.
-
-        Args:
-            interrupted: whether to stop (collective), asked every few columns.
-
-        Raises:
-            Interrupted: on all ranks alike: it is to stop.
-        """
-        columns, at_once = self.coupling.tocsc(), self._system.thresholds.columns
-        found = np.zeros((self.size, self.size))
-        for start in range(0, self.size, at_once):
-            if interrupted():
-                raise Interrupted
-            block = slice(start, start + at_once)
-            found[:, block] = self.coupling.T @ self.solve(columns[:, block].toarray())
-        self._comm.Allreduce(MPI.IN_PLACE, found)
-        return found
-
     def own(self) -> csr_matrix:
         """This rank's rows of A_kk, (kept unknowns here, n)."""
         rows = self.form.contact_rows
@@ -148,10 +118,15 @@ class Interior:
         Raises:
             Interrupted: on all ranks alike: it is to stop.
         """
-        found = np.zeros((self.size, self.size))
+        found, columns = np.zeros((self.size, self.size)), self.coupling.tocsc()
+        at_once = self._system.thresholds.columns
         found[self.here] = self.own().toarray()
+        for start in range(0, self.size, at_once):
+            if interrupted():
+                raise Interrupted
+            block = slice(start, start + at_once)
+            found[:, block] -= self.coupling.T @ self.solve(columns[:, block].toarray())
         self._comm.Allreduce(MPI.IN_PLACE, found)
-        found -= self.response(interrupted)
         return np.asarray(0.5 * (found + found.T))
 
     def is_held(self) -> bool:
@@ -171,14 +146,6 @@ class Interior:
             values: (local unknowns, ...).
         """
         return np.concatenate(agree(self._comm, values[self.kept]))
-
-    def own_part(self, values: npt.NDArray[Number]) -> npt.NDArray[Number]:
-        """This rank's part of values at all kept unknowns. Collective, at first.
-
-        Args:
-            values: (n, ...).
-        """
-        return values[self.here]
 
     def pulled(self, inner: Array) -> Array:
         """A_ki times displacements of the body inside, (n, k). Collective.
@@ -204,7 +171,7 @@ class Interior:
             right: the load, this rank's, (local unknowns,).
         """
         found = self.solve((self._inner(right) - self.coupling @ values)[:, None])[: len(right), 0]
-        found[self.kept] = self.own_part(values)
+        found[self.kept] = values[self.here]
         return found
 
     def free(self) -> None:

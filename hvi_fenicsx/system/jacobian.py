@@ -84,17 +84,6 @@ class ContactRows:
         self.bulk.mult(x, self._product)
         return np.array(self._product.array_r)
 
-    def overwrite(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Replace these rows of a product with J by those of the product with A. Collective.
-
-        K and H may be larger than A by any factor; to subtract their part would leave nothing but rounding.
-
-        Args:
-            x: the vector.
-            out: the product with J, changed in place.
-        """
-        out.array[self.dofs] = self.elastic(x)
-
     def free(self) -> None:
         """Free the PETSc objects. Collective."""
         self.bulk.destroy()
@@ -128,21 +117,10 @@ class HoldingForces:
         """
         found = np.zeros(x.local_size)
         found[rows.dofs] = rows.elastic(x)
-        found[self._fixed] = self.at_prescribed(x, rotation)
-        return found
-
-    def at_prescribed(self, x: PETSc.Vec, rotation: PETSc.Mat | None) -> Array:
-        """The elastic forces at the prescribed unknowns of this rank. Collective.
-
-        Args:
-            x: the unknowns.
-            rotation: Q with u = Q x; None where both are the same.
-        """
         cartesian = x if rotation is None else rotation * x
         self._rows.mult(cartesian, self._product)
-        if cartesian is not x:
-            cartesian.destroy()
-        return np.array(self._product.array_r)
+        found[self._fixed] = self._product.array_r
+        return found
 
     def pull(self, prescribed: PETSc.Vec) -> PETSc.Vec:
         """The elastic forces of prescribed displacements on a body that is undisplaced elsewhere. Collective.
@@ -232,12 +210,14 @@ class Jacobian:
     def elastic_product(self, x: PETSc.Vec, out: PETSc.Vec) -> None:
         """The product A x: by J, and by A's own rows where the two differ. Collective.
 
+        K and H may be larger than A by any factor; to subtract their part would leave nothing but rounding.
+
         Args:
             x: the vector.
             out: where the product is written.
         """
         self.matrix.mult(x, out)
-        self.rows.overwrite(x, out)
+        out.array[self.rows.dofs] = self.rows.elastic(x)
 
     def free(self) -> None:
         """Free the PETSc objects. Collective."""

@@ -13,13 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
+from scipy.linalg import null_space
 
-from ..problem.bodies import whole
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
-from ..problem.vectors import new_vector, null_space, turn
-from ..rigid import rigid_fields
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Mask
 from .thresholds import DEFAULT
@@ -87,11 +85,8 @@ class LocalFrames:
         d = problem.scales.dimension
         q = PETSc.Mat().createAIJ(like.getSizes(), bsize=d, nnz=d, comm=like.comm)
         start, end = like.getOwnershipRange()
-        every = np.arange(start // d, end // d)
-        for plain in np.setdiff1d(every, self.blocks + start // d):
-            q.setValuesBlocked([plain], [plain], np.eye(d))
-        for turned, axes in zip(self.blocks + start // d, self.axes, strict=True):
-            q.setValuesBlocked([turned], [turned], np.ascontiguousarray(axes.T))
+        rows = np.arange(start // d, end // d, dtype=PETSc.IntType)
+        q.setValuesBlockedRCV(rows[:, None], rows[:, None], self.at(rows - start // d).transpose(0, 2, 1).copy())
         q.assemble()
         return q
 
@@ -126,43 +121,14 @@ def _normals_at_slanted(problem: Problem) -> dict[int, list[Array]]:
 
 
 def _axes(normals: Sequence[Array], held: Sequence[int], d: int) -> Array:
-    """Local axes as rows: the prescribed components, and the normals, which are orthogonal or equal to these."""
-    if len(held) == d:
-        return np.eye(d)
+    """Local axes as rows: the prescribed components, the normals, orthogonal or equal to these; others near axes."""
     rows: dict[int, Array] = {i: np.eye(d)[i] for i in held}
     for normal in normals:
         if all(abs(float(row @ normal)) < 0.5 for row in rows.values()):
-            free = [i for i in range(d) if i not in rows]
-            rows[max(free, key=lambda i: abs(normal[i]))] = normal
-    return _completed(rows, d)
-
-
-def _completed(rows: dict[int, Array], d: int) -> Array:
-    """The rows completed to an orthonormal basis, each new one near its Cartesian axis."""
-    frame = np.zeros((d, d))
-    for i, row in rows.items():
-        frame[i] = row
-    for i in (i for i in range(d) if i not in rows):
-        known = [row for row in frame if row.any()]
-        candidates = np.eye(d) - sum((np.outer(k @ np.eye(d), k) for k in known), np.zeros((d, d)))
-        best = candidates[i] if np.linalg.norm(candidates[i]) > 0.1 else max(candidates, key=np.linalg.norm)
-        frame[i] = best / np.linalg.norm(best)
+            rows[max(set(range(d)) - set(rows), key=lambda i: abs(normal[i]))] = normal
+    frame, free = np.zeros((d, d)), [i for i in range(d) if i not in rows]
+    frame[list(rows)] = list(rows.values())
+    others = null_space(frame)
+    left, _, right = np.linalg.svd(others[free])
+    frame[free] = left @ right @ others.T
     return frame
-
-
-def rigid_modes(problem: Problem, rotation: PETSc.Mat | None) -> PETSc.NullSpace:
-    """All rigid motions of the body without supports, orthonormal, in the components of the unknowns. Collective.
-
-    Args:
-        problem: the problem.
-        rotation: Q with u = Q û for unknowns û in local components; None where there are none.
-    """
-    body, vectors = whole(problem.domain), []
-    owned = problem.points[: problem.space.dofmap.index_map.size_local]
-    fields = rigid_fields(np.asarray(owned / problem.scales.length), body)
-    for number in range(body.motions):
-        vector = new_vector(problem.space)
-        vector.array[:] = problem.relative(fields[:, number].ravel())[: vector.local_size]
-        turn(vector, rotation)
-        vectors.append(vector)
-    return null_space(vectors)

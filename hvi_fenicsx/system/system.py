@@ -20,12 +20,13 @@ from ..effects import load_name
 from ..errors import InputError
 from ..mesh.domain import Domain
 from ..problem import references, scaling
+from ..problem.bodies import whole
 from ..problem.compose import Formulation, compose
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import elastic_forces
-from ..problem.vectors import assembled, new_vector, product, turn
-from ..rigid import Mode
+from ..problem.vectors import assembled, new_vector, null_space, product, turn
+from ..rigid import Mode, rigid_fields
 from ..runtime.cost import Timer
 from ..typing import Array, Entities
 from . import existence, local_frames, rigid_motions
@@ -114,8 +115,14 @@ class System:
 
     @cached_property
     def near_null(self) -> PETSc.NullSpace:
-        """The rigid motions, which algebraic multigrid must keep. Collective when first used."""
-        return local_frames.rigid_modes(self.problem, self.rotation)
+        """The rigid motions without supports, which algebraic multigrid must keep. Collective when first used."""
+        body, vectors = whole(self.problem.domain), []
+        fields = rigid_fields(np.asarray(self.problem.points / self.problem.scales.length), body)
+        for number in range(body.motions):
+            vectors.append(self.load.duplicate())
+            vectors[-1].array[:] = self.problem.relative(fields[:, number].ravel())[: self.load.local_size]
+            turn(vectors[-1], self.rotation)
+        return null_space(vectors)
 
     @cached_property
     def contact_axes(self) -> Array:
@@ -139,14 +146,6 @@ class System:
         turn(self.load, q)
         terms = tuple(self.frames.term(t) for t in self.problem.terms)
         return rotated, q, terms, tuple(self.frames.bounds(b) for b in self.problem.bounds)
-
-    def with_obstacle_at(self, way: float) -> System:
-        """The system where the obstacle that a force presses has moved; all matrices are shared. Collective.
-
-        Args:
-            way: along the force, in units of u0.
-        """
-        return self.with_obstacles_of(self.problem.with_obstacle_at(way))
 
     def with_obstacles_of(self, problem: Problem) -> System:
         """The system with the obstacles where another problem of the same body has them; all matrices are shared.
