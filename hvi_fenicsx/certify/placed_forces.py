@@ -11,8 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..effects import Place
-from ..problem import references
-from ..problem.contact_surface import Surface
+from ..problem.contact_surface import Surface, own_nodes
 from ..problem.problem import Problem
 from ..problem.vectors import NodalForces, nodal, nodal_values
 from ..typing import Array
@@ -97,7 +96,7 @@ def _on_bodies(problem: Problem, surface: Surface, own: Array) -> Iterator[tuple
     every = np.zeros((problem.space.dofmap.index_map.size_local, own.shape[1]))
     every[surface.blocks] = own
     acting, first = problem.on_bodies(every), np.zeros(len(every), dtype=bool)
-    first[references.vertices(problem, surface.facets)] = True
+    first[own_nodes(problem.space, surface.facets)] = True
     yield surface.part, NodalForces.of(np.where(first[:, None], acting, 0.0))
     yield f"{surface.part}{SECOND}", NodalForces.of(np.where(first[:, None], 0.0, acting))
 
@@ -119,7 +118,7 @@ def second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:
             areas[state.surface.blocks] = state.surface.weights[:, None]
             forces[state.surface.blocks] = traction(state) * state.surface.weights[:, None]
             covered, acting = -problem.on_bodies(areas), problem.on_bodies(forces)
-            here = references.vertices(problem, problem.domain.facets([interface.sides.second]))
+            here = own_nodes(problem.space, problem.domain.facets([interface.sides.second]))
             here = here[covered[here, 0] > 0.0]
             found[here] = acting[here] / covered[here]
     return found
