@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
-
-import numpy as np
 
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
@@ -35,51 +33,26 @@ class Move:
     Attributes:
         outcome: what ended it.
         point: which point, where one did.
-        tied: how many points reached an end at once.
     """
 
     outcome: StepEnd
     point: int | None = None
-    tied: int = 1
 
 
-@dataclass(frozen=True, kw_only=True)
-class Passage:
-    """A point has passed from one segment of its graph to the next.
-
-    Attributes:
-        point: which.
-        before: the segment that it left.
-        after: the one on which it goes on.
-    """
-
-    point: int
-    before: Segment
-    after: Segment
-
-    @property
-    def closes(self) -> bool:
-        """Whether a contact closes."""
-        return self.after.kind is SegmentKind.BOUND
-
-    @property
-    def opens(self) -> bool:
-        """Whether a contact opens."""
-        return self.before.kind is SegmentKind.BOUND
+Passage = tuple[int, Event]
+"""A point that has passed from one segment of its graph to the next, and what happened there."""
 
 
-def event_of(passages: Sequence[Passage], *, folds: bool) -> Event:
-    """The event of a state at which points pass.
+def event_between(before: Segment, after: Segment) -> Event:
+    """What happens where a point passes: its contact closes or opens, or a law has another piece.
 
     Args:
-        passages: at this state.
-        folds: whether the factor turns there.
+        before: the segment that it leaves.
+        after: the one on which it goes on.
     """
-    if folds:
-        return Event.FOLD
-    if any(p.closes for p in passages):
+    if after.kind is SegmentKind.BOUND:
         return Event.CONTACT
-    return Event.RELEASE if any(p.opens for p in passages) else Event.KINK
+    return Event.RELEASE if before.kind is SegmentKind.BOUND else Event.KINK
 
 
 class Refused(Exception):
@@ -98,7 +71,6 @@ class Branch(ABC):
     points: ContactPoints
     trend: int
     unstable: int
-    _largest_force: float = 0.0
 
     @property
     @abstractmethod
@@ -148,24 +120,30 @@ class Branch(ABC):
         """
 
     @abstractmethod
-    def set_out(self, sign: float, check: Callable[[], None]) -> None:
+    def resume(self, position: Position) -> None:
+        """Go on as the branch went.
+
+        Args:
+            position: where it was.
+        """
+
+    @abstractmethod
+    def set_out(self, sign: float) -> None:
         """Set out where the factor goes in a direction, and let the points pass that have to.
 
         Args:
             sign: 1 where the factor is to grow, -1 where it is to fall.
-            check: is called before each passage; it may raise an error to end them.
 
         Raises:
             Refused: there is no end of passing.
             numpy.linalg.LinAlgError: the factor stands along the branch.
         """
 
-    def set_out_as(self, other: Branch, check: Callable[[], None]) -> None:  # noqa: B027
+    def set_out_as(self, other: Branch) -> None:  # noqa: B027
         """Set out from the same state as another branch goes, and let the points pass that have to.
 
         Args:
             other: which one.
-            check: is called before each passage; it may raise an error to end them.
         """
 
     @abstractmethod
@@ -177,20 +155,11 @@ class Branch(ABC):
         """
 
     @abstractmethod
-    def driven(self, move: Move) -> float:
-        """What the loads that grow do in the last step: ∫ f1ᵀx dλ.
-
-        Args:
-            move: the step.
-        """
-
-    @abstractmethod
-    def pass_on(self, move: Move, check: Callable[[], None]) -> list[Passage]:
+    def pass_on(self, move: Move) -> list[Passage]:
         """Let the point go on that reached an end of its segment or turned back, and those that have to then.
 
         Args:
             move: the step in which it did.
-            check: is called before each passage; it may raise an error to end them.
 
         Raises:
             Refused: there is no end of passing.
@@ -214,17 +183,6 @@ class Branch(ABC):
             aim: the factor that is wanted.
         """
 
-    def at_rest(self, peak: float) -> bool:
-        """Whether loads and forces have gone back to nothing.
-
-        Args:
-            peak: the greatest factor so far.
-        """
-        values, none = self.values, self.points.thresholds.none
-        elastic, force = (float(np.max(np.abs(f), initial=0.0)) for f in (self.points.elastic @ values.x, values.force))
-        self._largest_force = max(self._largest_force, elastic, force)
-        return abs(self.factor) <= none * peak and force <= none * self._largest_force
-
     @abstractmethod
     def beyond(self) -> Array:
         """The coordinates a little farther on, (n,)."""
@@ -246,21 +204,20 @@ class Branch(ABC):
         return None
 
 
-def advancing(branch: Branch, aim: float, check: Callable[[], None], most: int) -> Iterator[Move]:
-    """The steps of a branch, from event to event; after each one that is an event the points pass.
+def advancing(branch: Branch, aim: float, most: int) -> Iterator[Move]:
+    """The steps of a branch, from event to event; at each one that is an event the points have passed.
 
     Args:
         branch: the branch; it has a direction.
         aim: the factor at which a step ends.
-        check: is called before each step and passage; it may raise an error to end them.
         most: steps at most.
 
     Raises:
         Refused: there is no end of passing.
     """
     for _ in range(most):
-        check()
+        branch.points.check()
         move = branch.advance(aim)
-        yield move
         if move.outcome in (StepEnd.END, StepEnd.TURNED):
-            branch.pass_on(move, check)
+            branch.pass_on(move)
+        yield move

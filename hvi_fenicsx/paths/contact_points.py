@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..laws import Mixity
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
-from .thresholds import DEFAULT, ROUNDING, FollowingThresholds
+from .thresholds import ROUNDING
 from .vertex_laws import VertexLaw, is_straight, vertex_laws
 
 
@@ -21,13 +21,13 @@ class PointLaws:
     Args:
         problem: the problem.
         remember: numbers of the problem's bonds that remember.
-        thresholds: of the path.
 
     Attributes:
-        thresholds: of the path.
+        check: is called before each step and passage; it may raise an error to end them.
         vertices: the laws at all vertices.
         one: the unknowns of points of one unknown, which come first, (m1,).
         vectors: the p points of laws on a length, which come next; then come the points of their openings, (q,).
+        unknowns: of each point.
         laws: of each point; those of openings have none.
         of_lengths: which of the points are those of lengths,
         of_openings: and of openings.
@@ -43,11 +43,10 @@ class PointLaws:
         InputError: a law on a length shares an unknown with another law or a bound.
     """
 
-    def __init__(
-        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: FollowingThresholds = DEFAULT
-    ) -> None:
+    def __init__(self, problem: CondensedProblem, remember: Collection[int] = ()) -> None:
         laws = vertex_laws(problem, remember)
-        self._problem, self.thresholds, self.vertices = problem, thresholds, laws
+        self.check: Callable[[], None] = lambda: None
+        self._problem, self.vertices = problem, laws
         kinds = {law.unknowns: (law.bonds.opens, law.bonds.mixity) for law in laws if law.bonds.radial}
         lengths = sorted(kinds)
         self.vectors = VectorPoints(
@@ -57,17 +56,18 @@ class PointLaws:
         by_unknowns: dict[tuple[int, ...], list[VertexLaw]] = {}
         for law in laws:
             by_unknowns.setdefault(law.unknowns, []).append(law)
-        keys = [*((int(i),) for i in self.one), *lengths]
         openings = self.vectors.opening_unknowns
-        self.laws = [*(by_unknowns.get(key, []) for key in keys), *([] for _ in openings)]
+        self.unknowns: list[Integers] = [*self.one[:, None], *self.vectors.groups, *openings[:, None]]
+        self.laws = [by_unknowns.get(tuple(group), []) for group in self.unknowns]
         refuse_shared(problem, self.vectors, laws)
         self.straight = is_straight(problem)
         self.scale, forces = units(problem, laws, self.vectors.groups)
         self.length, self.forces = (1.0, np.ones_like(forces)) if self.straight else (self.scale, forces)
-        self._force_units = self.forces[[*(key[0] for key in keys), *openings]]
+        firsts = [group[0] for group in self.unknowns]
+        self._force_units = self.forces[firsts]
         m1, last = len(self.one), len(self.one) + len(self.vectors)
         self.of_lengths, self.of_openings = slice(m1, last), slice(last, None)
-        self.order = _order(problem, [int(self.unknowns_of(k)[0]) for k in range(len(self))])
+        self.order = _order(problem, firsts)
         self.point_of = np.empty(problem.size, dtype=np.int64)
         self.point_of[self.one], self.point_of[self.vectors.flat] = np.arange(m1), m1 + self.vectors.owner
         rows, columns = (np.concatenate([self.one, self.vectors.flat[pair]]) for pair in self.vectors.pairs)
@@ -76,41 +76,18 @@ class PointLaws:
     def __len__(self) -> int:
         return len(self.laws)
 
-    def unknowns(self) -> list[Integers]:
-        """The unknowns of each point."""
-        return [self.unknowns_of(k) for k in range(len(self))]
-
-    def unknowns_of(self, k: int) -> Integers:
-        """The unknowns of a point."""
-        p, opening = self.radial(k), self.opening(k)
-        if p is not None:
-            return self.vectors.groups[p]
-        return self.one[k : k + 1] if opening is None else self.vectors.opening_unknowns[opening : opening + 1]
-
-    def columns(self, k: int) -> Integers:
-        """The unknowns whose equations depend on the segment of a point; of an opening, those of its length."""
-        opening = self.opening(k)
-        return self.unknowns_of(k) if opening is None else self.vectors.groups[self._length_of(opening)]
-
-    def _length_of(self, opening: int) -> int:
-        return int(self.vectors.owner[self.vectors.openings[opening]])
+    def owner(self, k: int) -> int:
+        """The point whose laws act on a point: itself; of an opening, that of its length."""
+        return int(self.point_of[self.unknowns[k][0]])
 
     def radial(self, k: int) -> int | None:
         """The number among the points of lengths of a point; None: it is none of these."""
         p = k - len(self.one)
         return p if 0 <= p < len(self.vectors) else None
 
-    def opening(self, k: int) -> int | None:
-        """The number among the openings of a point; None: it is none of these."""
-        number = k - len(self.one) - len(self.vectors)
-        return number if number >= 0 else None
-
-    def laws_at(self, k: int) -> list[VertexLaw]:
-        """The laws of a point; of an opening, those of its length."""
-        opening = self.opening(k)
-        if opening is None:
-            return self.laws[k]
-        return self.laws[len(self.one) + self._length_of(opening)]
+    def is_opening(self, k: int) -> bool:
+        """Whether a point is an opening."""
+        return k >= self.of_openings.start
 
 
 def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence[Integers]) -> tuple[float, Array]:
@@ -133,7 +110,7 @@ def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence
     return float(length), diagonal * float(length)
 
 
-def _order(problem: CondensedProblem, firsts: list[int]) -> Array:
+def _order(problem: CondensedProblem, firsts: Sequence[int]) -> Array:
     """Numbers that look like random ones, from the vertices of the first unknowns of points, (m,)."""
     scale = float(np.max(np.abs(problem.points), initial=0.0)) or 1.0
     places = np.round(problem.points[firsts] / scale, 6)
@@ -196,24 +173,8 @@ class VectorPoints:
         """How many unknowns of a point count."""
         return int(np.count_nonzero(self.counts[self.owner == p]))
 
-    def lengths(self, z: Array) -> Array:
-        """The lengths of the vectors, (p,).
-
-        Args:
-            z: all coordinates, (n,) or more.
-        """
-        return self.polar(z)[0]
-
-    def directions(self, z: Array) -> Array:
-        """Unit vectors, (N,); where the length is 0 the first unknown that counts.
-
-        Args:
-            z: all coordinates, (n,) or more.
-        """
-        return self.polar(z)[1]
-
     def polar(self, z: Array) -> tuple[Array, Array]:
-        """The lengths of the vectors, (p,), and their directions as above, (N,).
+        """The lengths of the vectors, (p,), and unit vectors, (N,): of the length 0 the first unknown that counts.
 
         Args:
             z: all coordinates, (n,) or more.

@@ -4,13 +4,12 @@ The predictor goes along the tangent of the equations in coordinates and factor;
 plane across it (Riks 1979; Wempner 1971), or with the condition of an event instead of the plane: that a coordinate is
 at the end of its segment, or that the factor has a wanted value. The equations on given segments are smooth
 (:mod:`.relations`), so Newton's method converges quadratically there. A step is refused and halved where the corrector
-does not converge or goes far, where the tangent turns by more than some degrees, or where the work along it is not what
-the energies say.
+does not converge or goes far, or where the tangent turns by more than some degrees.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -20,45 +19,37 @@ from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .branch import Branch, Move, Passage, Refused, StepEnd
 from .equations import CurvePoint
-from .events import Crossing, CurveStep, Events, displacement_rate, driven_work
+from .events import Crossing, CurveStep, Events, displacement_rate
 from .pivoting import StraightBranch
-from .relations import ContactPoints
+from .relations import ContactPoints, FreeMotions
 from .state import Position
+from .thresholds import DEFAULT
 
 
 class CurvedBranch(Events):
     """The curve from one of its points on.
 
     Args:
+        points: where all points are; changed.
         constant: the load at the factor 0, (n,).
         rate: how it grows with the factor, (n,).
-        points: where all points are; changed.
         z: their coordinates, (n,).
         factor: λ.
 
     Attributes:
         length: of the next step.
-        shortest: the shortest step that is tried.
-        disagreement: of the work along a step with the energies, 1 where it is as large as is allowed.
     """
 
-    def __init__(self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float) -> None:
-        super().__init__(constant, rate, points, z, factor)
-        self.length, self.shortest = 0.1, self.limits.standing
-        self._next, self._crossed = self.length, False
-        self.disagreement: Callable[[CurveStep], float] = lambda move: 0.0
-        self._size = self._extent()
-
-    def _extent(self) -> float:
-        values = self.here.values
-        ends = np.concatenate([self.points.low, self.points.high, values.s])
-        return float(np.max(np.abs(ends[np.isfinite(ends)]), initial=1.0))
+    def __init__(self, points: ContactPoints, constant: Array, rate: Array, z: Array, factor: float) -> None:
+        super().__init__(points, constant, rate, z, factor)
+        self.length = self._next = 0.1
+        self._far = DEFAULT.far * float(np.max(np.abs(self.here.values.s), initial=1.0))
 
     @override
     def advance(self, aim: float) -> CurveStep:
         if self._goes_on_for_ever(aim):
             return CurveStep(outcome=StepEnd.AWAY, before=self.here, after=self.here)
-        while self.length > self.shortest:
+        while self.length > DEFAULT.standing:
             try:
                 move = self._tried(aim)
             except (Refused, np.linalg.LinAlgError):
@@ -73,21 +64,9 @@ class CurvedBranch(Events):
     def _goes_on_for_ever(self, aim: float) -> bool:
         """Whether nothing ends the curve."""
         distances, _ = self._ends()
-        nearest = min(float(np.min(distances, initial=np.inf)), self._until(aim))
-        if not self.points.bent:
-            return not np.isfinite(nearest)
-        far = self.limits.far * self._size
-        if self.rising == 0.0 and nearest > far and self._is_straight(far):
-            return True
-        return not np.isfinite(nearest) and bool(np.max(np.abs(self.here.values.s), initial=0.0) > far)
-
-    def _is_straight(self, way: float) -> bool:
-        """Whether the equations stay satisfied so far along the tangent: a body slides on, and no force changes."""
-        y = self.here.y + way * self.here.tangent
-        load = self.points.stiffness @ self.here.values.x + self.here.values.force
-        size = 1.0 + float(np.max(np.abs(load / self.points.forces), initial=0.0))
-        allowed = 1e-9 * size + 4.0 * np.finfo(float).eps * way
-        return bool(np.max(np.abs(self.residual(y, self.points.values(y[:-1])))) <= allowed)
+        if np.isfinite(min(float(np.min(distances, initial=np.inf)), self._until(aim))):
+            return False
+        return not self.points.bent or float(np.max(np.abs(self.here.values.s), initial=0.0)) > self._far
 
     def _ends(self) -> tuple[Array, Array]:
         """Along the tangent, the ways of all points to the ends of their segments, and these ends, (m,) each."""
@@ -96,7 +75,7 @@ class CurvedBranch(Events):
         largest = float(np.max(np.abs(self.here.tangent)))
         ends = np.where(rates > 0.0, points.high, points.low)
         there = np.abs(ends - s) <= points.allowances(self.here.values, rates, largest)
-        rests = np.where((there & points.bent) | self.stood, self.limits.undecided, self.limits.standing)
+        rests = np.where((there & points.bent) | self.stood, DEFAULT.undecided, DEFAULT.standing)
         moves = np.abs(rates) > rests * largest
         found = np.full(len(points), np.inf)
         found[moves] = np.maximum((ends - s)[moves] / rates[moves], 0.0)
@@ -114,7 +93,7 @@ class CurvedBranch(Events):
         first, until, safe = float(np.min(ways, initial=np.inf)), self._until(aim), self._safe()
         way = min(first, until, safe)
         # what ends with the factor at its aim goes on from there, if at all
-        if until <= way * (1.0 + 0.1 * self.limits.reached):
+        if until <= way * (1.0 + 0.1 * DEFAULT.reached):
             way = until
             outcome, point, condition = StepEnd.FACTOR, None, self.at_factor(aim)
         elif way == first:
@@ -158,36 +137,31 @@ class CurvedBranch(Events):
             numbers=self.points.numbers.copy(),
             driver=driver,
             heading=1 if tangent[driver] > 0.0 else -1,
-            small=self.z.copy(),
+            z=self.z.copy(),
             step=self.length,
         )
 
+    @override
     def resume(self, position: Position) -> None:
-        """Go on as the branch went.
-
-        Args:
-            position: where it was.
-        """
         self.head(np.eye(1, len(self.here.y), position.driver)[0], position.heading)
         self.watch_folds()
         self.length = position.step
 
     @override
-    def set_out(self, sign: float, check: Callable[[], None]) -> None:
+    def set_out(self, sign: float) -> None:
         self.head_with_load(sign)
-        self._crossed = bool(Crossing(self, check).run())
+        Crossing(self).run()
 
     @override
     def watch_folds(self) -> None:
         self.trend = int(np.sign(self.rising)) or self.trend
-        if self._crossed:
-            self._crossed = False
-            self._settle_at_factor()
-            self.trend = int(np.sign(self.rising)) or self.trend
+        with suppress(Refused):  # points pass their ends a little before or after them: that leaves rounding
+            y = np.append(self.correct(self.here.y, self.plane(0.0))[:-1], self.here.y[-1])
+            self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
 
     @override
-    def pass_on(self, move: Move, check: Callable[[], None]) -> list[Passage]:
-        return Crossing(self, check).run(move)
+    def pass_on(self, move: Move) -> list[Passage]:
+        return Crossing(self).run(move)
 
     @override
     def note(self, move: Move) -> None:
@@ -196,7 +170,6 @@ class CurvedBranch(Events):
             self.unstable = self._beyond(move)
             return
         if move.outcome in (StepEnd.END, StepEnd.TURNED):
-            self._settle()
             self.watch_folds()
         self.unstable = self.points.unstable_directions(self.here.values)
 
@@ -207,22 +180,17 @@ class CurvedBranch(Events):
         return max(self.unstable + (1 if held < 0.0 else -1), 0)
 
     @override
-    def driven(self, move: Move) -> float:
-        assert isinstance(move, CurveStep)
-        return driven_work(move, self.points, self._rate, self.unit)
-
-    @override
     def must_leave(self, aim: float) -> bool:
         """Unstable, or away from the factor: a bond that turns back makes the path stable, and turn."""
         return self.unstable > 0 or (aim - self.factor) * self.trend < 0.0
 
     @override
     def leaving(self) -> Iterator[tuple[Array, int]]:
-        drops, motion, groups = self.points.on_drops(), self.motion, self.points.unknowns()
+        drops, motion, groups = self.points.on_drops(), self.motion, self.points.unknowns
+        free = self.points.motions(self.here.values)
         if drops:
-            found = [self._after_drops(drops), motion]
+            found = [self._after_drops(drops, free), motion]
         else:
-            free = self.points.motions(self.here.values)
             lowest = free.ways.T @ np.linalg.eigh(free.matrix)[1][:, 0] if len(free.slopes) else np.zeros_like(motion)
             lowest *= np.sign(self._into_cell(lowest) or float(lowest @ motion)) or 1.0
             found = [lowest, motion, -lowest]
@@ -230,22 +198,18 @@ class CurvedBranch(Events):
             for k in drops or [int(np.argmax([np.max(np.abs(one[group])) for group in groups]))]:
                 yield one, k
 
-    def _after_drops(self, drops: list[int]) -> Array:
+    def _after_drops(self, drops: list[int], free: FreeMotions) -> Array:
         """How a body moves when points on drops go on: these outwards, all others follow."""
-        found, directions, points = np.zeros_like(self.z), self.directions, self.points
+        found, directions = np.zeros_like(self.z), self.directions
         for k in drops:
-            unit = np.sign(directions[k]) or 1.0
-            found[points.unknowns_of(k)] = unit * self._gradient(self.here.y, k)[points.unknowns_of(k)]
-        free = points.motions(self.here.values)
-        if len(free.slopes):
-            found -= free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (points.stiffness @ found))[0]
-        return found
+            found += (np.sign(directions[k]) or 1.0) * self._gradient(self.here.y, k)
+        return found - free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (self.points.stiffness @ found))[0]
 
     def _into_cell(self, motion: Array) -> float:
         """How far a motion takes points at ends of their segments into these: many may be there at once."""
-        s, points, values = self.here.values.s, self.points, self.here.values
+        points, values = self.points, self.here.values
         allowed = points.allowances(values, self.directions, float(np.max(np.abs(self.here.tangent))))
-        low, high = (s <= points.low + allowed), (s >= points.high - allowed)
+        low, high = (values.s <= points.low + allowed), (values.s >= points.high - allowed)
         return float((values.moves > 0.0) * (low * 1.0 - high) @ points.along(values, motion))
 
     @property
@@ -256,34 +220,19 @@ class CurvedBranch(Events):
     @override
     def beyond(self) -> Array:
         ways, _ = self._ends()
-        return self.z + min(self.limits.near, float(np.min(ways, initial=np.inf))) * self.here.tangent[:-1]
+        return self.z + min(DEFAULT.near, float(np.min(ways, initial=np.inf))) * self.here.tangent[:-1]
 
     @override
-    def set_out_as(self, other: Branch, check: Callable[[], None]) -> None:
+    def set_out_as(self, other: Branch) -> None:
         assert isinstance(other, CurvedBranch)
         along = other.here.tangent.copy()
         along[-1] = 0.0
         self.head(along)
-        Crossing(self, check).run()
+        Crossing(self).run()
 
     @override
     def balanced(self, factor: float) -> Array:
         return self.correct(self.here.y, self.at_factor(factor))[:-1]
-
-    def _settle(self) -> None:
-        """Take out what rounding has left in the equations: points pass their ends a little before or after them."""
-        with suppress(Refused):
-            self._settle_at(self.correct(self.here.y, self.plane(0.0)))
-
-    def _settle_at_factor(self) -> None:
-        """The same with the factor as it is."""
-        with suppress(Refused):
-            standing = self.rising == 0.0  # then it fixes no point of the curve
-            y = self.correct(self.here.y, self.plane(0.0) if standing else self.at_factor(self.factor))
-            self._settle_at(np.append(y[:-1], self.here.y[-1]))
-
-    def _settle_at(self, y: Array) -> None:
-        self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
 
     def _turns_back(self, after: CurvePoint) -> bool:
         """Whether the tangent there leads back in units of the laws: a long spring beside them hides a fold."""
@@ -295,19 +244,10 @@ class CurvedBranch(Events):
         """The step, if it did not leave the curve."""
         if not self.points.bent:
             return move
-        short = way < 1e-7
-        if not short and float(self.here.tangent @ move.after.tangent) < self.limits.least_turn:
+        turns = float(self.here.tangent @ move.after.tangent) < DEFAULT.least_turn or self._turns_back(move.after)
+        if way >= 1e-7 and turns:
             raise Refused
-        if not short and self._turns_back(move.after):
-            raise Refused
-        disagreement = self.disagreement(move)
-        if not short and disagreement > 1.0:
-            self.length *= max(0.3, 1.6 * disagreement**-0.2)  # halved as well where it is refused
-            raise Refused
-        agreed = move.size * 0.8 * max(disagreement, 1e-4) ** -0.2
-        if move.outcome is not StepEnd.STEP:  # an event that is near says nothing of the next step's length
-            agreed = max(agreed, self.length)
-        self.length = min(self._next, agreed)
+        self.length = self._next
         return move
 
 
@@ -318,7 +258,6 @@ def branch_from(
     z: Array,
     factor: float,
     inverse: CellInverse | None = None,
-    heading: int = 1,
 ) -> Branch:
     """The branch from a state on: exactly from event to event, or by predictor and corrector where graphs are curved.
 
@@ -329,8 +268,7 @@ def branch_from(
         z: their coordinates, (n,).
         factor: λ.
         inverse: of the straight equations, where it is known.
-        heading: the direction in which the factor of a straight branch sets out, 1 or -1.
     """
     if points.straight:
-        return StraightBranch(points, constant, rate, z, factor, inverse=inverse, heading=heading)
-    return CurvedBranch(constant, rate, points, z.copy(), factor)
+        return StraightBranch(points, constant, rate, z, factor, inverse)
+    return CurvedBranch(points, constant, rate, z, factor)

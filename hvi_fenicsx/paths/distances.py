@@ -12,7 +12,7 @@ from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..typing import Array
 from .relations import ContactPoints
 from .state import PathState
-from .straight_state import StraightState, coordinates_at
+from .straight_state import StraightState
 from .thresholds import DEFAULT, ROUNDING
 from .vertex_laws import factors, multiplied
 
@@ -131,9 +131,8 @@ class StateOnGraphs:
 
     def __init__(self, problem: CondensedProblem, remember: Collection[int], state: PathState) -> None:
         self._factors = factors(problem)
-        known = multiplied(problem, self._factors)
-        self._points = ContactPoints(known, remember)
-        self._z = coordinates_at(known, self._points, state)
+        self._points = ContactPoints(multiplied(problem, self._factors), remember)
+        self._z = self._points.take(state)
         self._read()
 
     def _read(self) -> None:
@@ -150,7 +149,7 @@ class StateOnGraphs:
             numpy.linalg.LinAlgError: the equations are singular.
         """
         self._z = self._z + self._change(load / self._factors)
-        s = self._points.s(self._z)
+        s, _ = self._points.polar(self._z)
         for k in np.flatnonzero((s < self._points.low) | (s > self._points.high)):
             self._points.leave(self._z, int(k), forward=bool(s[k] > self._points.high[k]))
         self._read()

@@ -9,7 +9,9 @@ import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
-from .events import CurveStep, driven_work
+from .branch import Branch, Move
+from .curve import CurvedBranch
+from .events import CurveStep, displacement_rate
 from .relations import ContactPoints, Values
 from .vertex_laws import VertexLaw
 
@@ -23,8 +25,6 @@ class Stored:
         potential: <g, u>.
         constant: the part of the energy that x does not change.
         dissipated: lost in bonds with memory.
-        size: of the terms.
-        elastic: ½ a(u, u).
         lost: by each bond with memory, for 1 at its mode, (b,).
         scales: of the bonds' energies by mode, (b,).
     """
@@ -33,8 +33,6 @@ class Stored:
     potential: float
     constant: float
     dissipated: float
-    size: float
-    elastic: float
     lost: Array
     scales: Array
 
@@ -66,7 +64,6 @@ class EnergyBalance:
         dissipated: float = 0.0,
     ) -> None:
         self._problem, self._points, self.work = problem, points, work
-        self._size = sum(float(b.weights.sum()) * b.law.energy_scale for b in problem.bonds)
         remember = {law.group for law in points.vertices if law.laws.memory is not None}
         self._numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
         self._laws = [[law for law in points.vertices if law.group == n] for n in self._numbers]
@@ -86,34 +83,42 @@ class EnergyBalance:
         constant = problem.constant_at(factor)
         plain = sum(b.energy(x) for n, b in enumerate(problem.bonds) if n not in self._numbers)
         back, lost, scales = self._of_bonds(values)
-        all_lost = float(scales @ lost)
         return Stored(
             energy=elastic - load + constant + plain + back,
             potential=problem.potential(x, factor),
             constant=constant,
-            dissipated=all_lost if self._potential else self._lost,
-            size=abs(elastic) + abs(load) + abs(constant) + abs(plain) + abs(back) + all_lost,
-            elastic=elastic,
+            dissipated=float(scales @ lost) if self._potential else self._lost,
             lost=lost,
             scales=scales,
         )
 
-    def go(self, values: Values, factor: float, driven: float) -> None:
+    def go(self, branch: Branch, move: Move) -> None:
         """Along a step.
 
         Args:
-            values: of the points after it.
-            factor: λ after it.
-            driven: what the loads that grow did in it, ∫ f1ᵀx dλ.
+            branch: after it.
+            move: the step.
         """
-        before, after = self.stored, self.at(values, factor)
-        done = after.potential - before.potential + after.constant - before.constant - driven
-        self.work += done
+        before, after = self.stored, self.at(branch.values, branch.factor)
         if not self._potential:  # the bonds have no energy but the frozen one: what the work leaves is lost
-            self._lost += done - (after.energy + after.potential - before.energy - before.potential)
+            assert isinstance(branch, CurvedBranch)
+            assert isinstance(move, CurveStep)
+            driven = self._driven(branch, move)
+            self._lost += after.constant - before.constant - driven - (after.energy - before.energy)
             after = replace(after, dissipated=self._lost)
-        self._size = max(self._size, after.size)
+        self.work += after.energy + after.potential + after.dissipated
+        self.work -= before.energy + before.potential + before.dissipated
         self.stored = after
+
+    def _driven(self, branch: CurvedBranch, arc: CurveStep) -> float:
+        """∫ f1ᵀx dλ along a step, both as cubic polynomials of the arc length."""
+        rate, length = self._problem.force_rate, float(np.linalg.norm(arc.after.y - arc.before.y))
+        places = arc.before, arc.after
+        (x0, x1), (l0, l1) = ([float(rate @ p.values.x) for p in places], [branch.unit * p.y[-1] for p in places])
+        dx0, dx1 = (length * float(rate @ displacement_rate(self._points, p)) for p in places)
+        dl0, dl1 = (length * branch.unit * p.tangent[-1] for p in places)
+        ends = (dx0 - dx1) * (l1 - l0) - (dl0 - dl1) * (x1 - x0)
+        return float(0.5 * (x0 + x1) * (l1 - l0) + ends / 10.0 + (dx1 * dl0 - dx0 * dl1) / 60.0)
 
     def leap(self, values: Values, factor: float) -> float:
         """To another state at the same factor; returns the energy that is released.
@@ -131,27 +136,6 @@ class EnergyBalance:
         self.stored = after
         self.work += self.stored.potential - before.potential
         return before.energy + before.dissipated - self.stored.energy - self.stored.dissipated
-
-    def disagreement(self, arc: CurveStep, unit: float) -> float:
-        """By how much the work along a step misses what the energies say, 1 for all that is allowed.
-
-        Args:
-            arc: the step.
-            unit: of the factor.
-        """
-        if not self._potential:
-            return 0.0
-        before, after = (self.at(place.values, float(place.y[-1]) * unit) for place in (arc.before, arc.after))
-        change = self._strained(arc) + driven_work(arc, self._points, self._problem.force_rate, unit)
-        for sign, ends in ((-1.0, before), (1.0, after)):
-            change += sign * (ends.energy - ends.elastic + ends.dissipated - ends.constant)
-        size = max(self._size, before.size, after.size)
-        return abs(change) / (self._points.thresholds.agreed * size or 1.0)
-
-    def _strained(self, arc: CurveStep) -> float:
-        """The change of ½ xᵀ S x, without the rounding that large displacements leave in each of its ends."""
-        before, after = arc.before.values.x, arc.after.values.x
-        return 0.5 * float((before + after) @ (self._problem.stiffness @ (after - before)))
 
     def _of_bonds(self, values: Values) -> tuple[float, Array, Array]:
         """What bonds give back, what each has lost for 1 at its mode, and the scales by mode, (b,)."""

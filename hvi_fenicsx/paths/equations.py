@@ -14,7 +14,7 @@ from ..typing import Array, Integers
 from .branch import Branch, Refused
 from .relations import ContactPoints, Values
 from .rigid_motions import are_same
-from .thresholds import DEFAULT, FollowingThresholds
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,9 +42,9 @@ class CurveEquations(Branch):
     """S x + r = f0 + λ f1 in coordinates along the graphs, at one point of the curve and around it.
 
     Args:
+        points: where all points are.
         constant: the load at the factor 0, (n,).
         rate: how it grows with the factor, (n,).
-        points: where all points are.
         z: their coordinates, (n,).
         factor: λ.
 
@@ -52,15 +52,13 @@ class CurveEquations(Branch):
         points: where all points are.
         here: the present point.
         unit: of the factor; a power of 2, so that no factor is rounded.
-        limits: what is rounding, and how many corrections are made.
         stood: which points went to and fro at their ends when the last one passed, by rounding alone, (m,): while they
             are slow their rates say nothing.
     """
 
-    def __init__(self, constant: Array, rate: Array, points: ContactPoints, z: Array, factor: float) -> None:
+    def __init__(self, points: ContactPoints, constant: Array, rate: Array, z: Array, factor: float) -> None:
         self._rate, self.points = rate, points
         self.trend, self.unstable = 0, 0
-        self.limits = points.thresholds
         largest = float(np.max(np.abs(rate) / points.forces, initial=0.0))
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
@@ -108,7 +106,7 @@ class CurveEquations(Branch):
     @override
     def rising(self) -> float:
         rate, tangent = float(self.here.tangent[-1]), self.here.tangent
-        return rate if abs(rate) > self.limits.reached * float(np.max(np.abs(tangent))) else 0.0
+        return rate if abs(rate) > DEFAULT.reached * float(np.max(np.abs(tangent))) else 0.0
 
     def residual(self, y: Array, values: Values) -> Array:
         """What is left of the forces, in their units, (n,): what is left here, and how the forces change from here.
@@ -134,7 +132,7 @@ class CurveEquations(Branch):
         matrix[:n, n] = -self.unit * self._rate / self.points.forces
         matrix[n] = row
         self._factors = None
-        self._factors = Bordered(matrix, self.limits)
+        self._factors = Bordered(matrix)
         return self._factors
 
     def _resting(self, values: Values) -> Array:
@@ -165,7 +163,7 @@ class CurveEquations(Branch):
             numpy.linalg.LinAlgError: the function stands along the curve.
         """
         found = self._tangent(values, row, sign)
-        for _ in range(self.limits.corrections):
+        for _ in range(DEFAULT.corrections):
             setting_out = self.points.setting_out(values, found[:-1])
             if setting_out is None or np.allclose(setting_out.energies, values.energies, rtol=1e-14, atol=0.0):
                 break
@@ -186,10 +184,10 @@ class CurveEquations(Branch):
         """The direction in which the equations stay satisfied, by factors of a point nearby; None: they are too far."""
         found, last, size = factors.along, np.inf, float(np.max(np.abs(factors.along)))
         change_along = self._changes(values)
-        for _ in range(self.limits.corrections):
+        for _ in range(DEFAULT.corrections):
             step = factors.across(change_along(found))
             change = float(np.max(np.abs(step)))
-            if not change <= self.limits.near * last:
+            if not change <= DEFAULT.near * last:
                 return found if change <= 1e-13 * size else None
             found, last = found - step, change
             if change <= 1e-15 * size:
@@ -206,26 +204,26 @@ class CurveEquations(Branch):
         Raises:
             Refused: the method does not converge, or comes to a point whose equations are singular.
         """
-        (value, gradient), limits = condition, self.limits
+        value, gradient = condition
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
         length = float(np.max(np.abs(y - self.here.y)))
         noise = max(1e-10 * (1.0 + length), 1e-14 / self._sharpness(gradient(y)) * size)
-        expected = self.limits.near * length
-        for _ in range(limits.corrections):
+        expected = DEFAULT.near * length
+        for _ in range(DEFAULT.corrections):
             values = self.points.values(y[:-1])
             left, off = self.residual(y, values), value(y)
-            digits = float(np.max(np.abs(left))) <= limits.digits * size
-            if not self.points.bent and digits and abs(off) <= limits.digits * size:
+            digits = float(np.max(np.abs(left))) <= DEFAULT.digits * size
+            if not self.points.bent and digits and abs(off) <= DEFAULT.digits * size:
                 return y
             step = self._correction(values, left, gradient(y), off, expected)
             change = float(np.max(np.abs(step)))
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
             y = y - step
-            allowed = max(noise, limits.slow * length) if digits else noise
+            allowed = max(noise, DEFAULT.slow * length) if digits else noise
             if change <= 1e-14 * size or (change <= allowed and change >= 0.1 * last):
                 return y
-            last, expected = change, self.limits.near * change
+            last, expected = change, DEFAULT.near * change
         if last <= noise:
             return y
         raise Refused
@@ -264,16 +262,16 @@ class CurveEquations(Branch):
             k: the point.
             end: the s of that end.
         """
-        return lambda y: float(self.points.s(y[:-1])[k]) - end, lambda y: np.append(self._gradient(y, k), 0.0)
+        return lambda y: float(self.points.polar(y[:-1])[0][k]) - end, lambda y: np.append(self._gradient(y, k), 0.0)
 
     def _gradient(self, y: Array, k: int) -> Array:
         """How the s of a point changes with the coordinates, (n,)."""
         points, found = self.points, np.zeros(len(y) - 1)
         p = points.radial(k)
         if p is None:
-            found[points.unknowns_of(k)] = 1.0
+            found[points.unknowns[k]] = 1.0
         else:
-            found[points.vectors.groups[p]] = points.directions(y[:-1])[points.vectors.owner == p]
+            found[points.vectors.groups[p]] = points.polar(y[:-1])[1][points.vectors.owner == p]
         return found
 
     def row(self, k: int) -> Array:
@@ -301,7 +299,7 @@ class CurveEquations(Branch):
 
     def _exchanged(self, factors: Bordered, k: int) -> bool:
         """Exchange the columns of a point in the factors; whether that went well."""
-        columns, change_along = self.points.columns(k), self._changes(self.here.values)
+        columns, change_along = self.points.unknowns[self.points.owner(k)], self._changes(self.here.values)
         units = np.eye(len(self.here.y))[columns]
         return factors.exchange(columns, np.stack([change_along(unit) for unit in units], axis=1))
 
@@ -342,7 +340,6 @@ class Bordered:
 
     Args:
         matrix: the equations, n rows, and the row, (n + 1, n + 1); overwritten if its columns are contiguous.
-        thresholds: what costs digits.
 
     Attributes:
         along: the direction in which the equations stay satisfied, the row growing by 1, (n + 1,).
@@ -351,10 +348,10 @@ class Bordered:
         numpy.linalg.LinAlgError: the matrix is singular.
     """
 
-    def __init__(self, matrix: Array, thresholds: FollowingThresholds = DEFAULT) -> None:
-        self._thresholds, self._row = thresholds, matrix[-1].copy()
+    def __init__(self, matrix: Array) -> None:
+        self._row = matrix[-1].copy()
         factors, pivots, singular = dgetrf(matrix, overwrite_a=1)
-        self._inverse = ProductInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), thresholds.waits)
+        self._inverse = ProductInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), DEFAULT.waits)
         if singular or not self._has_tangent():
             raise np.linalg.LinAlgError("the equations have no tangent here")
 
@@ -373,7 +370,7 @@ class Bordered:
         """
         for place, value in zip(columns, values.T, strict=True):
             spread = self._inverse.solve(np.append(value, self._row[place]))
-            if self._inverse.is_long or not abs(spread[place]) > self._thresholds.small * np.max(np.abs(spread)):
+            if self._inverse.is_long or not abs(spread[place]) > DEFAULT.small * np.max(np.abs(spread)):
                 return False
             self._inverse.exchange(spread, int(place))
         return self._has_tangent() and self.takes(self._row)
@@ -392,7 +389,7 @@ class Bordered:
         Args:
             row: the row, (n + 1,).
         """
-        return abs(float(row @ self.along)) > self._thresholds.small * float(np.linalg.norm(row)) * self._length
+        return abs(float(row @ self.along)) > DEFAULT.small * float(np.linalg.norm(row)) * self._length
 
     def step(self, left: Array, row: Array, value: float) -> Array:
         """The change that takes out what is left of the equations and of another row, (n + 1,).

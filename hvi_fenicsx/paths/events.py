@@ -11,16 +11,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import toms748
 
 from ..typing import Array
-from .branch import Move, Passage, Refused, StepEnd
+from .branch import Move, Passage, Refused, StepEnd, event_between
 from .equations import CurveEquations, CurvePoint
 from .relations import ContactPoints
 from .segments import piece_at
-
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,24 +49,6 @@ def displacement_rate(points: ContactPoints, place: CurvePoint) -> Array:
     return points.moved(place.values) @ place.tangent[:-1]
 
 
-def driven_work(arc: CurveStep, points: ContactPoints, rate: Array, unit: float) -> float:
-    """∫ f1ᵀx dλ along a step, both as cubic polynomials of the arc length.
-
-    Args:
-        arc: the step.
-        points: the points.
-        rate: f1, (n,).
-        unit: of the factor.
-    """
-    length, ends, places = float(np.linalg.norm(arc.after.y - arc.before.y)), [0.0, 1.0], (arc.before, arc.after)
-    rates = [length * float(rate @ displacement_rate(points, place)) for place in places]
-    driven = CubicHermiteSpline(ends, [float(rate @ place.values.x) for place in places], rates)
-    factors = [unit * float(place.y[-1]) for place in places]
-    slopes = [unit * length * float(place.tangent[-1]) for place in places]
-    t = 0.5 * (1.0 + _NODES)
-    return float(0.5 * _WEIGHTS @ (driven(t) * CubicHermiteSpline(ends, factors, slopes)(t, nu=1)))
-
-
 class Events(CurveEquations):
     """The equations of a curve, and the events within a step from the present point."""
 
@@ -91,7 +71,7 @@ class Events(CurveEquations):
         shares = self._shares(move)
         rest = y[-1] - aim / self.unit
         over = rest * (start.y[-1] - aim / self.unit) < 0.0 and move.outcome is not StepEnd.FACTOR
-        beyond = abs(rest) / abs(y[-1] - start.y[-1]) if over and abs(rest) > self.limits.reached else 0.0
+        beyond = abs(rest) / abs(y[-1] - start.y[-1]) if over and abs(rest) > DEFAULT.reached else 0.0
         point = int(np.argmin(shares)) if shares.size else 0
         if over and abs(rest) > 1e-13 * (1.0 + abs(y[-1])) and 1.0 - beyond <= float(np.min(shares, initial=1.0)):
             guess = start.y + (1.0 - beyond) * (y - start.y)
@@ -110,14 +90,14 @@ class Events(CurveEquations):
         points, s0, s1 = self.points, move.before.values.s, move.after.values.s
         found, way = np.ones(len(points)), np.where(s1 != s0, s1 - s0, 1.0)
         allowed = points.allowances(move.after.values, s1 - s0, move.size)
-        allowed[self.stood & (np.abs(s1 - s0) <= self.limits.undecided * move.size)] = np.inf
+        allowed[self.stood & (np.abs(s1 - s0) <= DEFAULT.undecided * move.size)] = np.inf
         above, below = s1 > np.maximum(points.high + allowed, s0), s1 < np.minimum(points.low - allowed, s0)
         for ends, beyond in ((points.high, above), (points.low, below)):
             found[beyond] = np.clip((ends[beyond] - s0[beyond]) / way[beyond], 0.0, 1.0 - 1e-12)
         return found
 
     def _moved(self, outcome: StepEnd, point: int | None, y: Array) -> CurveStep:
-        if float(self.here.tangent @ (y - self.here.y)) < -self.limits.reached:
+        if float(self.here.tangent @ (y - self.here.y)) < -DEFAULT.reached:
             raise Refused
         move = CurveStep(outcome=outcome, point=point, before=self.here, after=self._after(y))
         if outcome is StepEnd.END and not self._arrives(move):
@@ -133,7 +113,7 @@ class Events(CurveEquations):
         rate = self._rate_of(StepEnd.TURNED, point)(self.here)
         beyond = move.after.values.s[point] - move.before.values.s[point]
         largest = float(np.max(np.abs(self.here.tangent)))
-        if rate * beyond < 0.0 and abs(rate) > self.limits.undecided * largest and not self.points.outward[point]:
+        if rate * beyond < 0.0 and abs(rate) > DEFAULT.undecided * largest and not self.points.outward[point]:
             raise Refused
         sets_out = rate * self.points.outward[point] > 0.0
         turned = self._up_to(move, StepEnd.TURNED, point) if sets_out else None
@@ -168,7 +148,7 @@ class Events(CurveEquations):
     def _up_to(self, move: CurveStep, outcome: StepEnd, point: int | None) -> CurveStep | None:
         """The step up to where a rate of the factor, now or in the mean, or of a point is 0; None: it is too short."""
         whole = float(self.here.tangent @ (move.after.y - self.here.y))
-        if whole <= self.limits.standing:
+        if whole <= DEFAULT.standing:
             return None
         rate = self._rate_of(outcome, point)
         if rate(self.here) * rate(move.after) >= 0.0:
@@ -179,7 +159,7 @@ class Events(CurveEquations):
             if way not in known:
                 known[way] = self._at(way, known)
             found = rate(known[way])
-            return found if abs(found) > self.limits.standing * float(np.max(np.abs(known[way].tangent))) else 0.0
+            return found if abs(found) > DEFAULT.standing * float(np.max(np.abs(known[way].tangent))) else 0.0
 
         root = toms748(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, k=1)
         rate_at(root)
@@ -187,10 +167,10 @@ class Events(CurveEquations):
 
     def _turned(self, after: CurvePoint) -> tuple[StepEnd, int | None] | None:
         largest = float(np.max(np.abs(after.tangent)))
-        if self.trend * after.tangent[-1] < -self.limits.undecided * largest:
+        if self.trend * after.tangent[-1] < -DEFAULT.undecided * largest:
             return StepEnd.FOLD, None
         rates = self.rates_at(after)
-        clear = np.abs(rates) > self.limits.undecided * largest
+        clear = np.abs(rates) > DEFAULT.undecided * largest
         back = np.flatnonzero(self.points.turning_back(after.values, rates) & clear)
         return (StepEnd.TURNED, int(back[0])) if back.size else None
 
@@ -226,11 +206,10 @@ class Crossing:
 
     Args:
         curve: the curve; its direction and its points' statuses are changed.
-        check: is called before each passage; it may raise an error to end them.
     """
 
-    def __init__(self, curve: CurveEquations, check: Callable[[], None]) -> None:
-        self._curve, self._points, self._check, self._limits = curve, curve.points, check, curve.limits
+    def __init__(self, curve: CurveEquations) -> None:
+        self._curve, self._points = curve, curve.points
         self._lag = self._points.order  # the ways, of the order ε, of the points to their ends
         self._left = self._lag.copy()
         self._cells: Counter[tuple[bytes, frozenset[int]]] = Counter()
@@ -256,8 +235,8 @@ class Crossing:
     def _passed(self, move: Move | None) -> list[Passage]:
         if move is not None and move.point is not None:
             self._pass_arrived(move.point, turned=move.outcome is StepEnd.TURNED)
-        for _ in range(self._limits.waits * (2 + len(self._points))):
-            self._check()
+        for _ in range(DEFAULT.waits * (2 + len(self._points))):
+            self._points.check()
             rates = self._rates()
             k = self._next(rates)
             if k is None:
@@ -282,7 +261,7 @@ class Crossing:
         """
         cell = self._points.numbers.tobytes(), frozenset(self._turned)
         self._cells[cell] += 1
-        if self._cells[cell] > self._limits.corrections:
+        if self._cells[cell] > DEFAULT.corrections:
             raise Refused
 
     def _outwards(self, k: int) -> float:
@@ -296,9 +275,9 @@ class Crossing:
 
         So does the one that arrived where its rate may have either sign: it was the step that took it out.
         """
-        rates, allowed = self._curve.directions.copy(), np.full(len(self._points), self._limits.standing)
+        rates, allowed = self._curve.directions.copy(), np.full(len(self._points), DEFAULT.standing)
         if self._arrived is not None and self._points.bent:
-            allowed[self._arrived] = self._limits.undecided
+            allowed[self._arrived] = DEFAULT.undecided
         rates[np.abs(rates) <= allowed * np.max(np.abs(self._curve.here.tangent))] = 0.0
         rates[self._rests] = 0.0
         return rates
@@ -334,8 +313,8 @@ class Crossing:
             points.enter_next(k, forward=forward)
         as_before = curve.place(y, curve.here.tangent, passed=k) and not slow
         curve.head(curve.row(k) if as_before else curve.here.tangent, 1.0 if forward or not as_before else -1.0)
-        self._rests[k] = slow and any(passage.point == k for passage in self.passages)
-        self.passages.append(Passage(point=k, before=before, after=points.segment(k)))
+        self._rests[k] = slow and any(point == k for point, _ in self.passages)
+        self.passages.append((k, event_between(before, points.segment(k))))
 
     def _is_slow(self, k: int) -> bool:
         """Whether a point stands but for rounding: beside all others neither it nor its force moves.
@@ -344,7 +323,7 @@ class Crossing:
         """
         values, stiffest = self._curve.here.values, float(np.max(np.diag(self._points.stiffness)))
         forces = (stiffest * np.abs(values.moves) + np.abs(values.rises)) * np.abs(self._curve.directions)
-        return bool(forces[k] <= self._limits.slow * np.max(forces))
+        return bool(forces[k] <= DEFAULT.slow * np.max(forces))
 
     def _turned_back(self, k: int, *, forward: bool) -> Array:
         """Coordinates and factor on the secant of where the bonds have been, (n + 1,)."""
@@ -352,7 +331,7 @@ class Crossing:
         x, force = float(values.lengths[k]), float(values.tractions[k])
         points.remember(k, x, force)
         self._turned.add(k)
-        points.enter(k, piece_at(points.chain(k), x, self._limits.standing, forward=forward))
+        points.enter(k, piece_at(points.chain(k), x, DEFAULT.standing, forward=forward))
         y = curve.here.y.copy()
         points.set(y, k, points.coordinate(k, x, force))
         return y

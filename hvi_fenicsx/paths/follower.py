@@ -10,15 +10,14 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
-from .branch import Branch, Move, Passage, Refused, StepEnd, event_of
-from .curve import CurvedBranch
+from .branch import Branch, Move, Passage, Refused, StepEnd
+from .curve import branch_from
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
 from .jumps import Jump
-from .pivoting import StraightBranch
 from .relations import ContactPoints
-from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped, place_of
-from .straight_state import coordinates_at
+from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped
+from .thresholds import DEFAULT
 from .vertex_laws import factors, multiplied
 
 
@@ -51,7 +50,8 @@ class Follower(LoadHistory):
         self._problem = problem = multiplied(problem, self._factors)
         self._resume, self._interrupted = resume, interrupted
         self._events, self._peak, self._adrift = 0, 0.0, False
-        self._points = ContactPoints(problem, options.remember, options.thresholds)
+        self._points = ContactPoints(problem, options.remember)
+        self._points.check = self._check
         self._empty_jumps = 0
         self._blocked = False
         self._last: PathState
@@ -146,12 +146,12 @@ class Follower(LoadHistory):
         return z
 
     def _at_no_load(self, z: Array, towards: float) -> Array | Nowhere:
-        held = self._is_held(self._options.thresholds.small * towards)
-        return settled(self._problem, self._points, z, towards, self._check, held=held)
+        held = self._is_held(DEFAULT.small * towards)
+        return settled(self._problem, self._points, z, towards, held=held)
 
     def _loaded(self, constant: CondensedProblem) -> Array | None:
         """From rest to the constant loads, as stable as it goes; where the points are then."""
-        options = PathOptions(remember=self._options.remember, thresholds=self._options.thresholds)
+        options = PathOptions(remember=self._options.remember)
         follower = Follower(constant, options, interrupted=self._interrupted)
         for _ in follower.states():
             pass
@@ -164,28 +164,15 @@ class Follower(LoadHistory):
         self._points = follower._points
         return follower._branch.z
 
-    def _follow_from(
-        self,
-        z: Array,
-        factor: float,
-        resumed: PathState | None = None,
-        inverse: CellInverse | None = None,
-    ) -> None:
-        problem, points = self._problem, self._points
-        position = None if resumed is None else resumed.position
-        if points.straight:
-            loads = problem.force, problem.force_rate
-            self._branch = StraightBranch(points, *loads, z, factor, position, inverse)
-            return
-        curve = CurvedBranch(problem.force, problem.force_rate, points, z.copy(), factor)
-        curve.disagreement = lambda move: self._balance.disagreement(move, curve.unit)
-        self._branch = curve
-        if resumed is not None and resumed.event not in (Event.START, Event.TURN):
-            curve.resume(resumed.position)
+    def _follow_from(self, z: Array, factor: float, inverse: CellInverse | None = None) -> None:
+        problem = self._problem
+        self._branch = branch_from(self._points, problem.force, problem.force_rate, z, factor, inverse)
 
     def _restore(self, state: PathState) -> None:
         """Go on after a state."""
-        self._follow_from(coordinates_at(self._problem, self._points, state), state.factor, state)
+        self._follow_from(self._points.take(state), state.factor)
+        if self._points.straight or state.event not in (Event.START, Event.TURN):
+            self._branch.resume(state.position)
         self._branch.unstable, self._leg, self._last = state.unstable, state.position.leg, state
         start = self._problem, self._points, self._branch.values, self.factor
         self._balance = EnergyBalance(*start, work=state.work, dissipated=state.dissipated)
@@ -195,7 +182,7 @@ class Follower(LoadHistory):
     def _towards(self, aim: float) -> Iterator[PathState]:
         """From event to event until the factor reaches its aim or the path ends."""
         self._orient(aim)
-        self._cycles = Cycles(self._x, self._options.thresholds.undecided)
+        self._cycles = Cycles(self._x)
         while self.end is None and self.factor != aim:
             if self._adrift or self._must_jump(aim):
                 yield from self._taken_up() if self._adrift else self._jump(aim)
@@ -205,7 +192,7 @@ class Follower(LoadHistory):
                 self._ended(move.outcome)
                 yield self._state(Event.END)
                 return
-            self._balance.go(self._branch.values, self.factor, self._branch.driven(move))
+            self._balance.go(self._branch, move)
             if move.outcome is not StepEnd.FACTOR or self.factor != aim:
                 yield self._noted(move)
             if self.end is None:
@@ -227,9 +214,11 @@ class Follower(LoadHistory):
 
     def _is_adrift(self) -> bool:
         """Whether the load is back at zero and nothing would resist the next; where that is borne, it takes up all."""
-        if self._peak == 0.0 or not len(self._points.rigid) or not self._branch.at_rest(self._peak):
+        values, rate, none = self._branch.values, self._problem.force_rate, DEFAULT.none * self._peak
+        rests = abs(self.factor) <= none and np.max(np.abs(values.force)) <= none * np.max(np.abs(rate))
+        if self._peak == 0.0 or not len(self._points.rigid) or not rests:
             return False
-        return bool(np.any(self._points.unresisted(self._branch.values, self._problem.force_rate).driven))
+        return bool(np.any(self._points.unresisted(values, rate).driven))
 
     def _must_jump(self, aim: float) -> bool:
         if self._blocked or self._options.follow is Follow.EXACT:
@@ -250,7 +239,7 @@ class Follower(LoadHistory):
         if resumed is not None and resumed.event not in (Event.START, Event.TURN):
             return
         try:
-            self._branch.set_out(1.0 if aim > self.factor else -1.0, self._check)
+            self._branch.set_out(1.0 if aim > self.factor else -1.0)
         except Refused:
             self._lose_among_ends()
         self._branch.watch_folds()
@@ -260,7 +249,7 @@ class Follower(LoadHistory):
         if move.outcome not in (StepEnd.END, StepEnd.TURNED):
             return []
         try:
-            return self._branch.pass_on(move, self._check)
+            return self._branch.pass_on(move)
         except Refused:
             self._lose_among_ends()
             return []
@@ -278,8 +267,10 @@ class Follower(LoadHistory):
         self._branch.note(move)
         if move.outcome in (StepEnd.STEP, StepEnd.FACTOR):
             return self._state(Event.STEP)
-        event = event_of(passages, folds=before * self._branch.trend < 0)
-        state = self._state(event, passages, bifurcation=event is Event.FOLD and max(move.tied, len(passages)) > 1)
+        event, events = Event.FOLD, [event for _, event in passages]
+        if before * self._branch.trend >= 0:
+            event = next((e for e in (Event.CONTACT, Event.RELEASE) if e in events), Event.KINK)
+        state = self._state(event, passages)
         if move.outcome is not StepEnd.FOLD:
             self._detect_cycle(state)
         return state
@@ -290,8 +281,9 @@ class Follower(LoadHistory):
         if straight and found is Cycle.BLOCKED and self._options.follow is Follow.STABLE:
             self._blocked = True
         elif found is Cycle.CLOSED or (found is not None and straight):
-            self._go_round(self.factor, found)
-        elif not straight and self._cycles.standing > self._options.thresholds.waits + 4 * len(self._points):
+            self.is_closed, where = found is Cycle.CLOSED, f"at the factor {self.factor:.6g}"
+            self._lose(self.factor, f"{where} the path comes back to where it was: {found.value}")
+        elif not straight and self._cycles.standing > DEFAULT.waits + 4 * len(self._points):
             self._lose(self.factor, f"at the factor {self.factor:.6g} bonds and contacts pass for ever at one place")
 
     def _ended(self, outcome: StepEnd) -> None:
@@ -309,7 +301,7 @@ class Follower(LoadHistory):
         """On to the next stable equilibrium at the same factor, or off."""
         factor = self.factor
         heading, held = (1 if aim > factor else -1), self._is_held(factor)
-        landing = Jump(self._problem, self._branch, heading, held=held, step=self._check).landing()
+        landing = Jump(self._problem, self._branch, heading, held=held).landing()
         if landing is not None and landing.z is not None:
             yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
             return
@@ -317,13 +309,13 @@ class Follower(LoadHistory):
             self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
         else:
             self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
-        yield replace(self._last, event=Event.END, place=None, released=0.0, bifurcation=False)
+        yield replace(self._last, event=Event.END, place=None, released=0.0)
 
     def _goes_on(self, landed: PathState) -> Iterator[PathState]:
         """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""
         yield landed
         self._empty_jumps = 0 if landed.released > 1e-12 * abs(landed.energy) else self._empty_jumps + 1
-        if self._empty_jumps > self._options.thresholds.waits:
+        if self._empty_jumps > DEFAULT.waits:
             self._lose(self.factor, f"at the factor {self.factor:.6g} jumps release no energy: rounding alone leads on")
             yield self._state(Event.END)
 
@@ -341,7 +333,7 @@ class Follower(LoadHistory):
 
     def _landed(self, z: Array, factor: float, aim: float, inverse: CellInverse | None = None) -> PathState:
         self._blocked = False
-        self._follow_from(z, factor, inverse=inverse)
+        self._follow_from(z, factor, inverse)
         released = self._balance.leap(self._branch.values, factor)
         if self._points.straight:
             self._branch.unstable = self._points.unstable_directions(self._branch.values)
@@ -350,32 +342,26 @@ class Follower(LoadHistory):
 
     # -- reports
 
-    def _state(
-        self,
-        event: Event,
-        passages: Sequence[Passage] = (),
-        place: EventPlace | None = None,
-        *,
-        bifurcation: bool = False,
-    ) -> PathState:
+    def _state(self, event: Event, passages: Sequence[Passage] = ()) -> PathState:
         """The present state."""
         stored = self._balance.stored
         self._last = PathState(
             factor=self.factor,
             event=event,
-            place=self._place(passages[0]) if passages else place,
+            place=self._place(*passages[0]) if passages else None,
             x=self._x,
             energy=stored.energy,
             work=self._balance.work,
             dissipated=stored.dissipated,
             unstable=self._branch.unstable,
             memory=self._points.memory,
-            bifurcation=bifurcation,
             position=self._branch.position(self._leg),
         )
         return self._last
 
-    def _place(self, passage: Passage) -> EventPlace:
-        laws = self._points.laws_at(passage.point)
-        group = laws[0].group if laws and not (passage.closes or passage.opens) else None
-        return place_of(self._problem, int(self._points.unknowns_of(passage.point)[0]), group)
+    def _place(self, k: int, event: Event) -> EventPlace:
+        """Where a point passed: at the part of its law or, where a contact closes or opens, of the contact."""
+        problem, i = self._problem, int(self._points.unknowns[k][0])
+        laws = self._points.laws[self._points.owner(k)] if event is Event.KINK else []
+        part = laws[0].bonds.part if laws else problem.parts[i]
+        return EventPlace(part=part, unknown=i, point=problem.points[i])

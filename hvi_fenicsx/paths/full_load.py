@@ -28,52 +28,30 @@ class FullLoad:
     borne: PathState | None = None
 
 
-_Follow = Callable[[Follow], "tuple[Follower, list[PathState]]"]
-
-
 def at_full_load(
     problem: CondensedProblem, options: PathOptions, interrupted: Callable[[], bool] = lambda: False
 ) -> FullLoad | None:
     """The equilibrium to which a path leads. None where this says nothing: the path is lost, or does not begin.
 
+    With piecewise linear laws it goes as stable as it can. Where a body comes off on the way, and with other laws,
+    whose jumps take longer than the whole curve, it goes along the curve, whose factor may rise to 1 again.
+
     Args:
         problem: the problem; its factor scales all loads.
-        options: how many events at most each path may have, and what tunes it.
+        options: how many events at most each path may have.
         interrupted: whether to stop.
     """
-
-    def followed(follow: Follow) -> tuple[Follower, list[PathState]]:
+    ended = None
+    for follow in (Follow.STABLE, Follow.EXACT) if is_straight(problem) else (Follow.EXACT,):
         follower = Follower(problem, replace(options, follow=follow), interrupted=interrupted)
-        return follower, list(follower.states())
-
-    return (_event_by_event if is_straight(problem) else _along_the_curve)(followed)
-
-
-def _event_by_event(followed: _Follow) -> FullLoad | None:
-    """Where piecewise linear laws lead: as stable as it goes, or else along the whole curve of equilibria.
-
-    Where a body comes off on the way, the curve is followed on, through the limit point, since its factor may rise to 1
-    again.
-    """
-    follower, states = followed(Follow.STABLE)
-    if follower.end is End.ESCAPES and _begins(states):
-        ended = FullLoad(x=None, reason=follower.reason, borne=_largest(states))
-        follower, states = followed(Follow.EXACT)
-        if follower.end not in (End.REACHED, End.INTERRUPTED):
-            return ended
-    return _reached(follower, states)
-
-
-def _along_the_curve(followed: _Follow) -> FullLoad | None:
-    """Where other laws lead: along the curve of equilibria, since a jump takes longer than the whole curve."""
-    follower, states = followed(Follow.EXACT)
-    if (follower.end is End.ESCAPES or follower.is_closed) and _begins(states):
-        largest, stable = _largest(states), list(itertools.takewhile(lambda state: state.stable, states))
-        first = len(stable) == len(states) or states[len(stable)].factor == largest.factor
-        back = "to no load" if follower.end is End.ESCAPES else "and form a closed curve"
-        reason = f"at the factor {largest.factor:.6g} the equilibria turn back {back}"
-        return FullLoad(x=None, reason=reason, borne=largest if first else None)
-    return _reached(follower, states)
+        states = list(follower.states())
+        if follower.end is End.REACHED and states:
+            return FullLoad(x=states[-1].x, reason="the whole load is reached")
+        off = follower.end is End.ESCAPES or (follower.is_closed and follow is Follow.EXACT)
+        if follower.end is End.INTERRUPTED or (ended is None and not (off and _begins(states))):
+            return None
+        ended = ended or _off(follower, states, follow)
+    return ended
 
 
 def _begins(states: Sequence[PathState]) -> bool:
@@ -84,12 +62,12 @@ def _begins(states: Sequence[PathState]) -> bool:
     return 0.0 < max((state.factor for state in states), default=0.0) <= 1.0
 
 
-def _largest(states: Sequence[PathState]) -> PathState:
-    """The state of the largest factor."""
-    return max(states, key=lambda one: one.factor)
-
-
-def _reached(follower: Follower, states: Sequence[PathState]) -> FullLoad | None:
-    if follower.end is not End.REACHED or not states:
-        return None
-    return FullLoad(x=states[-1].x, reason="the whole load is reached")
+def _off(follower: Follower, states: Sequence[PathState], follow: Follow) -> FullLoad:
+    """Where a body comes off or the curve turns back: the largest load, where no unstable state comes before it."""
+    largest, stable = max(states, key=lambda one: one.factor), list(itertools.takewhile(lambda s: s.stable, states))
+    if follow is Follow.STABLE:
+        return FullLoad(x=None, reason=follower.reason, borne=largest)
+    first = len(stable) == len(states) or states[len(stable)].factor == largest.factor
+    back = "to no load" if follower.end is End.ESCAPES else "and form a closed curve"
+    reason = f"at the factor {largest.factor:.6g} the equilibria turn back {back}"
+    return FullLoad(x=None, reason=reason, borne=largest if first else None)

@@ -5,7 +5,6 @@ Where nothing holds a body at rest, a small part of the loads takes it to where 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -18,7 +17,7 @@ from .curve import branch_from
 from .motion import OverdampedMotion
 from .relations import ContactPoints
 from .segments import Segment, SegmentKind
-from .thresholds import FollowingThresholds
+from .thresholds import DEFAULT
 
 
 class Nowhere(Enum):
@@ -57,7 +56,7 @@ def at_rest(problem: CondensedProblem, points: ContactPoints) -> Rest:
         i = int(points.one[k]) if k < len(points.one) else None
         at, wanted = (0.0, 0.0) if i is None else (float(x[i]), float(free[i]))
         number, s_force = _standing(points.chain(k), at, wanted)
-        if points.opening(k) is not None and points.chain(k)[number].kind is SegmentKind.PIECE:
+        if points.is_opening(k) and points.chain(k)[number].kind is SegmentKind.PIECE:
             number = len(points.chain(k)) - 1
         points.enter(k, number)
         if i is not None:
@@ -76,7 +75,7 @@ def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int,
 
 
 def settled(
-    problem: CondensedProblem, points: ContactPoints, z: Array, towards: float, step: Callable[[], None], *, held: bool
+    problem: CondensedProblem, points: ContactPoints, z: Array, towards: float, *, held: bool
 ) -> Array | Nowhere:
     """The coordinates at the factor 0, (n,), or why there are none.
 
@@ -87,20 +86,17 @@ def settled(
         points: where they are at rest; after it, where they are then.
         z: their coordinates at rest, (n,).
         towards: the factor of which a small part acts.
-        step: called before each step; it may raise an error to end the motion.
         held: whether there is an equilibrium at this factor, so that no way leads off.
     """
-    limits = points.thresholds
-    first = limits.small * towards
-    motion = OverdampedMotion(problem, points, z, problem.load(first), held=held, step=step)
+    first = DEFAULT.small * towards
+    motion = OverdampedMotion(problem, points, z, problem.load(first), held=held)
     if not motion.run(np.zeros(len(points))) or motion.escapes:
         return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
-    heading, most = -int(np.sign(first)), limits.waits * (1 + len(points))
+    heading, most = -int(np.sign(first)), DEFAULT.waits * (1 + len(points))
     try:
-        branch = branch_from(points, problem.force, problem.force_rate, motion.z, first, heading=heading)
-        branch.set_out(heading, step)
-        none = no_load(problem, branch.values.x, first, limits)
-        for move in advancing(branch, -heading * none, step, most):
+        branch = branch_from(points, problem.force, problem.force_rate, motion.z, first)
+        branch.set_out(heading)
+        for move in advancing(branch, DEFAULT.none * first, most):
             if move.outcome is StepEnd.FACTOR:
                 return branch.balanced(0.0)
             if move.outcome in (StepEnd.AWAY, StepEnd.STUCK):
@@ -108,21 +104,6 @@ def settled(
     except (Refused, np.linalg.LinAlgError):
         pass
     return Nowhere.UNKNOWN
-
-
-def no_load(problem: CondensedProblem, x: Array, first: float, limits: FollowingThresholds) -> float:
-    """A factor that is none: beside the first one, and beside the rounding of the elastic forces.
-
-    Args:
-        problem: the problem.
-        x: displacements, (n,).
-        first: a small factor.
-        limits: what is none.
-    """
-    stiffest = float(np.max(problem.elastic.diagonal, initial=0.0))
-    rounding = stiffest * float(np.max(np.abs(x), initial=0.0))
-    load = float(np.max(np.abs(problem.force_rate), initial=0.0)) or 1.0
-    return max(limits.none * abs(first), limits.digits * rounding / load)
 
 
 def constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> CondensedProblem | None:

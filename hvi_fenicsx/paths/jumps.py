@@ -10,7 +10,7 @@ equilibrium wherever it goes. Where no such branch leads to an end soon, the bod
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -23,6 +23,7 @@ from .branch import Branch, Refused, StepEnd, advancing
 from .curve import branch_from
 from .motion import OverdampedMotion
 from .relations import ContactPoints
+from .thresholds import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,14 +47,11 @@ class Jump:
         branch: it is at the state; after the jump its points are where they are then.
         heading: 1 where larger factors are wanted, -1 where smaller ones are.
         held: whether there is an equilibrium at these loads whatever the bonds remember, so that no way leads off.
-        step: called before each step; it may end the jump by an exception.
     """
 
-    def __init__(
-        self, problem: CondensedProblem, branch: Branch, heading: int, *, held: bool, step: Callable[[], None]
-    ) -> None:
+    def __init__(self, problem: CondensedProblem, branch: Branch, heading: int, *, held: bool) -> None:
         self._problem, self._branch, self._points = problem, branch, branch.points
-        self._load, self._heading, self._held, self._step = problem.load(branch.factor), heading, held, step
+        self._load, self._heading, self._held = problem.load(branch.factor), heading, held
         self._z, self._values, self._directions = branch.z.copy(), branch.values, branch.directions.copy()
 
     def landing(self) -> Landing | None:
@@ -68,7 +66,7 @@ class Jump:
 
     def _held_back(self) -> Landing | None:
         """The landing of the first restraint whose branch leads to an end soon."""
-        kept, ways = self._points.kept(), (False,) if self._points.straight else (False, True)
+        kept, ways = self._points.kept(), (True,) if self._points.straight else (False, True)
         for (restraint, k), against in itertools.product(_restraints(self._branch), ways):
             with suppress(Refused, np.linalg.LinAlgError):
                 found = self._restrained(restraint, k, against=against)
@@ -84,23 +82,23 @@ class Jump:
         """
         points, inverse = self._points, self._branch.inverse()
         restraint = points.unresisted(self._values, restraint).balanced * float(np.mean(points.forces))
-        branch = branch_from(points, self._load, restraint, self._z, 0.0, inverse, heading=-1)
+        branch = branch_from(points, self._load, restraint, self._z, 0.0, inverse)
         if against:
-            branch.set_out(-1.0, self._step)
+            branch.set_out(-1.0)
         else:
-            branch.set_out_as(self._branch, self._step)
+            branch.set_out_as(self._branch)
         back = points.straight and branch.directions[k] * self._directions[k] <= 0.0
-        if back or branch.rising > self._points.thresholds.undecided:
+        if back or branch.rising > DEFAULT.undecided:
             return None
         forces = self._load, self._values.force
         largest = max(float(np.max(np.abs(force), initial=0.0)) for force in forces)
-        none = points.thresholds.none * largest / float(np.max(np.abs(restraint)))
+        none = DEFAULT.none * largest / float(np.max(np.abs(restraint)))
         return self._at_its_end(branch, none)
 
     def _at_its_end(self, branch: Branch, none: float) -> Landing | None:
-        limits, standing, x = self._points.thresholds, 0, self._values.x
-        most = limits.waits * (2 + len(self._points) * self._points.straight)
-        for move in advancing(branch, 0.0, self._step, most):
+        standing, x = 0, self._values.x
+        most = DEFAULT.waits * (2 + len(self._points) * self._points.straight)
+        for move in advancing(branch, 0.0, most):
             stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
             standing, x = standing + 1 if stands else 0, branch.values.x
             anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
@@ -110,7 +108,8 @@ class Jump:
             if move.outcome is StepEnd.AWAY:
                 off = branch.stands and branch.factor < 0.0 and not self._held
                 return Landing(z=None) if off else None
-            if move.outcome is StepEnd.STUCK or branch.factor > none or standing > limits.waits + 4 * len(self._points):
+            lost = move.outcome is StepEnd.STUCK or branch.factor > none
+            if lost or standing > DEFAULT.waits + 4 * len(self._points):
                 return None
         return None
 
@@ -118,7 +117,7 @@ class Jump:
         """The landing at a stable equilibrium; None where it is the state itself, or a curve leads back from there."""
         x, before = self._points.values(z).x, self._values.x
         size = max(float(np.max(np.abs(x), initial=0.0)), float(np.max(np.abs(before), initial=0.0)))
-        if float(np.max(np.abs(x - before), initial=0.0)) <= self._points.thresholds.none * size:
+        if float(np.max(np.abs(x - before), initial=0.0)) <= DEFAULT.none * size:
             return None
         return Landing(z=z, inverse=inverse) if self._points.straight or self._leads_on(z) else None
 
@@ -127,7 +126,7 @@ class Jump:
         kept, rate, leads_on = self._points.kept(), self._heading * self._problem.force_rate, False
         onward = branch_from(self._points, self._load, rate, z, 0.0)
         with suppress(Refused, np.linalg.LinAlgError):
-            onward.set_out(1.0, self._step)
+            onward.set_out(1.0)
             leads_on = onward.rising >= 0.0 and not np.any(self._points.unresisted(onward.values, rate).driven)
         self._points.restore(kept)
         return leads_on
@@ -141,7 +140,7 @@ class Jump:
         return found if found is None or found.z is None else self._landed(found.z)
 
     def _relaxed(self, z: Array, load: Array) -> Landing | None:
-        relaxation = OverdampedMotion(self._problem, self._points, z, load, held=self._held, step=self._step)
+        relaxation = OverdampedMotion(self._problem, self._points, z, load, held=self._held)
         if not relaxation.run(self._directions):
             return None
         return Landing(z=None if relaxation.escapes else relaxation.z)
@@ -149,7 +148,7 @@ class Jump:
     def _pushed_off(self) -> Landing | None:
         """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
         rate = self._problem.force_rate
-        push = self._points.thresholds.slow * self._heading
+        push = DEFAULT.slow * self._heading
         push = push * np.max(np.abs(self._load)) / np.max(np.abs(rate), initial=1e-300)
         found = self._relaxed(self._z.copy(), self._load + push * rate)
         return found if found is None or found.z is None else self._come_to_rest(found.z)
@@ -165,11 +164,11 @@ def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:
         size = float(np.max(np.abs(motion), initial=0.0))
         if size == 0.0:
             continue
-        alone, group = np.zeros_like(motion), points.unknowns_of(k)
+        alone, group = np.zeros_like(motion), points.unknowns[k]
         alone[group] = motion[group]
         for force in (_evened(points, motion, size), motion, alone):
             found = np.asarray(force / (np.max(np.abs(force)) or 1.0))
-            known = any(np.allclose(found, other, rtol=0.0, atol=points.thresholds.slow) for other in seen)
+            known = any(np.allclose(found, other, rtol=0.0, atol=DEFAULT.slow) for other in seen)
             if np.any(found) and not known:
                 seen.append(found)
                 yield found, k
@@ -178,8 +177,8 @@ def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:
 def _evened(points: ContactPoints, motion: Array, size: float) -> Array:
     """Forces in the direction of a motion, of the size of each point's area."""
     found = np.zeros_like(motion)
-    for laws, unknowns in zip(points.laws, points.unknowns(), strict=True):
+    for laws, unknowns in zip(points.laws, points.unknowns, strict=True):
         own = float(np.linalg.norm(motion[unknowns]))
-        if laws and own > points.thresholds.slow * size:
+        if laws and own > DEFAULT.slow * size:
             found[unknowns] = sum(law.weight for law in laws) * motion[unknowns] / own
     return found

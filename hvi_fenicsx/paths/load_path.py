@@ -130,15 +130,9 @@ class LoadPath:
         """What happens after the largest factor."""
         if self.end in (End.LOST, End.INTERRUPTED):
             return f"the path is {self.end} at {self._shown(-1)}" + (f" ({self.reason})" if self.reason else "")
-        after = next((n for n in self.jumps if n > self.peak), None)
-        if after is not None and self._at_peak(self.rows[after].factor):
+        if self.peak + 1 in self.jumps:
             return f"there the body jumps to the next stable state, {self.ending}"
         return self.ending
-
-    def _at_peak(self, factor: float) -> bool:
-        """Whether a factor is the largest one but for rounding; both are negative where a path begins that way."""
-        peak = self.rows[self.peak].factor
-        return abs(factor - peak) <= DEFAULT.none * abs(peak)
 
     @property
     def ending(self) -> str:

@@ -7,7 +7,6 @@ energy falls all the way until equilibrium is reached or a body is out of all re
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum
 
@@ -16,9 +15,10 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CondensedStiffness, DenseStiffness
 from ..typing import Array
-from .branch import Branch, Refused, StepEnd
-from .curve import CurvedBranch, branch_from
+from .branch import Branch, Refused, StepEnd, advancing
+from .curve import branch_from
 from .relations import ContactPoints
+from .thresholds import DEFAULT
 
 
 class _Went(Enum):
@@ -39,7 +39,6 @@ class OverdampedMotion:
         z: their coordinates, (n,).
         load: f, (n,).
         held: whether no way leads off at these loads, however far the body goes.
-        step: called before each step; it may end the motion by an exception.
 
     Attributes:
         z: the coordinates now, (n,).
@@ -47,20 +46,10 @@ class OverdampedMotion:
         theta: what holds back in the next step, in units of the damping.
     """
 
-    def __init__(
-        self,
-        problem: CondensedProblem,
-        points: ContactPoints,
-        z: Array,
-        load: Array,
-        *,
-        held: bool,
-        step: Callable[[], None],
-    ) -> None:
-        self._problem, self._points, self._load, self._step = problem, points, load, step
-        self._limits = points.thresholds
+    def __init__(self, problem: CondensedProblem, points: ContactPoints, z: Array, load: Array, *, held: bool) -> None:
+        self._problem, self._points, self._load = problem, points, load
         self.z, self.escapes, self.theta = z.copy(), False, 1.0
-        self._infinite = np.inf if held else self._limits.far * (points.scale + self._extent())
+        self._infinite = np.inf if held else DEFAULT.far * (points.scale + self._extent())
 
     def run(self, directions: Array) -> bool:
         """Move to equilibrium; whether one was found, or the body escapes.
@@ -78,7 +67,7 @@ class OverdampedMotion:
             self._points.elastic = elastic
 
     def _moved(self) -> bool:
-        for _ in range(self._limits.waits**2 * (1 + len(self._points))):
+        for _ in range(DEFAULT.waits**2 * (1 + len(self._points))):
             if self._at_rest():
                 return self._settled()
             if self._is_out_of_reach():
@@ -114,7 +103,7 @@ class OverdampedMotion:
         self._points.elastic = self._problem.elastic
         z = branch_from(self._points, self._load, np.zeros_like(self._load), self.z, 0.0).balanced(0.0)
         values, low, high = self._points.values(z), self._points.low, self._points.high
-        allowed = self._points.thresholds.reached * (1.0 + np.abs(values.s))
+        allowed = DEFAULT.reached * (1.0 + np.abs(values.s))
         beyond = np.maximum(low - values.s, values.s - high) > allowed
         if np.any(beyond) or self._points.unstable_directions(values):
             return False
@@ -138,9 +127,7 @@ class OverdampedMotion:
         if points.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
             return _Went.NOWHERE
         branch = branch_from(points, points.elastic @ values.x + values.force, left, self.z, 0.0)
-        branch.set_out(1.0, self._step)
-        if isinstance(branch, CurvedBranch):
-            branch.shortest = self._limits.small
+        branch.set_out(1.0)
         went = self._followed(branch)
         self.z = branch.z.copy()
         if points.on_drops():
@@ -157,12 +144,8 @@ class OverdampedMotion:
 
     def _followed(self, branch: Branch) -> _Went:
         """Along the branch of one step, until all that was left of the forces is applied or a law drops."""
-        points = self._points
-        for _ in range(self._limits.waits * (2 + len(points))):
-            if branch.rising < 0.0 or points.on_drops():
-                break
-            self._step()
-            move = branch.advance(1.0)
+        moves = advancing(branch, 1.0, DEFAULT.waits * (2 + len(self._points)))
+        while branch.rising >= 0.0 and not self._points.on_drops() and (move := next(moves, None)):
             self.z = branch.z.copy()
             if move.outcome is StepEnd.FACTOR or self._is_out_of_reach():
                 return _Went.WELL
@@ -170,8 +153,6 @@ class OverdampedMotion:
                 return _Went.NOWHERE
             if move.outcome is StepEnd.STUCK:
                 break
-            if move.outcome in (StepEnd.END, StepEnd.TURNED):
-                branch.pass_on(move, self._step)
         return _Went.PARTLY if branch.factor > 0.0 else _Went.NOWHERE
 
     def _leave_drops(self, directions: Array) -> None:

@@ -12,19 +12,19 @@ random: each coordinate then has a part of the order ε as well, which says who 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
-from .branch import Branch, Move, Passage, StepEnd
+from .branch import Branch, Move, Passage, StepEnd, event_between
 from .relations import ContactPoints
-from .segments import Segment, SegmentKind, piece_at
+from .segments import piece_at
 from .state import Position
 from .straight_state import FACTOR, Basis, StraightState
-from .thresholds import ROUNDING
+from .thresholds import DEFAULT, ROUNDING
 
 
 class StraightBranch(Branch):
@@ -36,9 +36,7 @@ class StraightBranch(Branch):
         rate: f1, (n,).
         z: their coordinates, (n,).
         factor: λ.
-        position: where the branch goes on; by default it sets out with the factor.
         inverse: of the equations, where it is known and the factor drives.
-        heading: the direction in which the factor sets out, 1 or -1.
 
     Attributes:
         state: the coordinates.
@@ -59,26 +57,26 @@ class StraightBranch(Branch):
         rate: Array,
         z: Array,
         factor: float,
-        position: Position | None = None,
         inverse: CellInverse | None = None,
-        heading: int = 1,
     ) -> None:
-        self._thresholds, self._stiffness = points.thresholds, points.elastic
+        self._stiffness = points.elastic
         self.points, self.state = points, StraightState(points, z)
         self._constant, self.rate, self._factor = constant, rate, factor
-        self.heading, self.trend, self.unstable, self._driven = heading, 0, 0, 0.0
-        self._leader = 0
+        self.heading, self.trend, self.unstable, self._leader = 1, 0, 0, 0
         self._stiffest, self._live = _largest(self._stiffness.diagonal), _largest(rate)
-        self._perturb()
+        random = np.random.default_rng(0)
+        # coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them
+        self.small = random.uniform(0.5, 1.5, len(z)) * np.where(z == points.high, -1.0, 1.0)
+        self._lag = random.uniform(0.5, 1.5, len(z))
+        self._behind = self._lag.copy()
         self.state.hold(rate)
-        driver = FACTOR
-        if position is not None:
-            driver, self.heading, self.small = position.driver, position.heading, position.small.copy()
-        if driver == FACTOR:
-            driver = self._setting_out()
-        self._basis = Basis(self.state, rate, driver, inverse)
+        self._begin(FACTOR, inverse)
+
+    def _begin(self, driver: int, inverse: CellInverse | None = None) -> None:
+        """Set out with a variable that drives."""
+        driver = self._setting_out() if driver == FACTOR else driver
+        self._basis = Basis(self.state, self.rate, driver, inverse)
         self._find_direction()
-        self._told = self.values.x, factor
 
     def _setting_out(self) -> int:
         """What drives where the path sets out with the factor: along a motion that nothing resists, the body does."""
@@ -128,24 +126,25 @@ class StraightBranch(Branch):
 
     @override
     def position(self, leg: int) -> Position:
-        numbers, small = self.points.numbers.copy(), self.small.copy()
-        return Position(leg=leg, numbers=numbers, driver=self._basis.driver, heading=self.heading, small=small)
+        return Position(
+            leg=leg,
+            numbers=self.points.numbers.copy(),
+            driver=self._basis.driver,
+            heading=self.heading,
+            z=self.z.copy(),
+            small=self.small.copy(),
+        )
 
     @override
-    def set_out(self, sign: float, check: Callable[[], None]) -> None:
+    def resume(self, position: Position) -> None:
+        self.heading, self.small = position.heading, np.array(position.small)
+        self._begin(position.driver)
+
+    @override
+    def set_out(self, sign: float) -> None:
         if (self.trend or self.factor_rate) * sign < 0.0:
             self.heading, self.trend = -self.heading, -self.trend
             self._find_direction()
-
-    # -- the perturbation
-
-    def _perturb(self) -> None:
-        """Coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them."""
-        random = np.random.default_rng(0)
-        self.small = random.uniform(0.5, 1.5, len(self.z))
-        self.small[self.z == self.points.high] *= -1.0
-        self._lag = random.uniform(0.5, 1.5, len(self.z))
-        self._behind = self._lag.copy()
 
     # -- linear algebra
 
@@ -164,8 +163,7 @@ class StraightBranch(Branch):
             rates[driver] = self.heading
         held = self.state.held
         self.rates: Array = rates - held.T @ (held @ rates)
-        self._stands = self._factor_stands()
-        if not self._stands:
+        if not self.stands:
             self.trend = int(np.sign(self.factor_rate))
 
     def _residual(self) -> Array:
@@ -184,7 +182,7 @@ class StraightBranch(Branch):
             scale = _largest(self.motion) or 1.0
             along, rate, own = self.motion / scale, self.factor_rate / scale, float(change[driver])
             change[driver] = 0.0
-            slow = abs(self.rates[driver]) < self._thresholds.slow * scale
+            slow = abs(self.rates[driver]) < DEFAULT.slow * scale
             way = float(along @ change) / (float(along @ along) or 1.0) if slow else 0.0
             change -= way * self.rates / scale
             self._factor -= own - way * rate
@@ -202,31 +200,19 @@ class StraightBranch(Branch):
         chosen = self._first_end(aim)
         if chosen is None:
             return Move(outcome=StepEnd.AWAY)
-        variable, length, small, tied = chosen
-        self._go(length, small)
-        if variable == FACTOR:
-            self._factor = aim
-        before, factor = self._told  # not the state from which it went: that was refined since
-        self._told = self.values.x, self._factor
-        self._driven = 0.5 * float(self.rate @ (before + self.values.x)) * (self._factor - factor)
-        if variable == FACTOR:
-            return Move(outcome=StepEnd.FACTOR)
-        turns = self.rates[variable] * self.points.outward[variable] < 0.0
-        return Move(outcome=StepEnd.TURNED if turns else StepEnd.END, point=variable, tied=tied)
-
-    @override
-    def driven(self, move: Move) -> float:
-        return self._driven
-
-    def _go(self, length: float, small: float) -> None:
+        variable, length, small = chosen
         self.state.tau += length * self.rates
         self._factor += length * self.factor_rate
         self.small += small * self.rates
         inward = self.points.outward * self.rates < 0.0
         self._behind = np.where(inward, self._behind - small * np.abs(self.rates), self._lag)
+        if variable == FACTOR:
+            self._factor = aim
+            return Move(outcome=StepEnd.FACTOR)
+        return Move(outcome=StepEnd.TURNED if inward[variable] else StepEnd.END, point=variable)
 
-    def _first_end(self, aim: float) -> tuple[int, float, float, int] | None:
-        """Which variable reaches its end first, the way to there, that of the order ε, and how many tie."""
+    def _first_end(self, aim: float) -> tuple[int, float, float] | None:
+        """Which variable reaches its end first, the way to there, and that of the order ε."""
         numbers, slack, small, speed, allowed = self._ends()
         approaches = (aim - self._factor) * self.factor_rate > 0.0 and not self.stands
         if not numbers.size and not approaches:
@@ -234,53 +220,41 @@ class StraightBranch(Branch):
         if approaches:
             until = (aim - self._factor) / self.factor_rate
             if until <= float(np.min((slack + allowed) / speed, initial=np.inf)):
-                return FACTOR, max(until, 0.0), 0.0, 1
+                return FACTOR, max(until, 0.0), 0.0
         ways = slack / speed
         near = np.flatnonzero(ways <= np.min((slack + allowed) / speed))
         first = near[np.argmin(small[near] / speed[near])]
-        return int(numbers[first]), float(ways[first]), float(small[first] / speed[first]), len(near)
+        return int(numbers[first]), float(ways[first]), float(small[first] / speed[first])
 
     def _ends(self) -> tuple[Integers, Array, Array, Array, Array]:
         """The variables that approach an end: numbers, distances, those of the order ε, speeds, what may be passed."""
         points, rates, tau = self.points, self.rates, self.z
-        speed, size = np.abs(rates), self.sizes()
+        speed = np.abs(rates)
         inward = points.outward * rates < 0.0
         distance = np.where(rates > 0.0, points.high - tau, tau - points.low)
         small = np.where(rates > 0.0, -self.small, self.small)
         distance, small = np.where(inward, 0.0, distance), np.where(inward, self._behind, small)
-        steep = self._steepness()
-        rounding = self._thresholds.reached if self.stands else self._thresholds.standing
-        moves = speed * steep > rounding * self._fastest(speed)
+        # a short way on a steep piece is a large force; where a body moves as a whole, the speeds of forces are what
+        # rounding leaves of stiffness times displacement
+        steep = np.maximum(np.abs(points.slope) / (self._stiffest or np.inf), 1.0)
+        fastest, force = self._by_kind(speed)
+        rounding = DEFAULT.reached if self.stands else DEFAULT.standing
+        fastest = np.where(points.moving, fastest, max(force, 0.1 * self._stiffest * fastest))
+        moves = speed * steep > rounding * fastest
+        lengths = points.high - points.low
+        size = np.where(
+            points.moving, *self._by_kind(np.maximum(np.where(lengths < np.inf, lengths, 0.0), np.abs(tau)))
+        )
         at = np.flatnonzero(moves & np.isfinite(distance))
         slack, beyond = np.maximum(distance[at], 0.0), np.maximum(-distance[at], 0.0)
         return at, slack, small[at], speed[at], np.maximum(1e-11 * (size / steep)[at] - beyond, 0.0)
 
-    def _steepness(self) -> Array:
-        """The slopes of pieces over the largest stiffness, 1 at least, (n,): there a short way is a large force."""
-        return np.asarray(np.maximum(np.abs(self.points.slope) / (self._stiffest or np.inf), 1.0))
-
-    def _fastest(self, speed: Array) -> Array:
-        """The greatest speed of the same kind, of displacements or of forces, (n,).
-
-        Where a body moves as a whole, the forces' speeds are what rounding leaves of stiffness times displacement.
-        """
-        moving = self.points.moving
-        kinds = [float(np.max(speed[kind], initial=0.0)) for kind in (moving, ~moving)]
-        elastic = 0.1 * self._stiffest * kinds[0]
-        return np.asarray(np.where(moving, kinds[0], max(kinds[1], elastic)))
-
-    def sizes(self) -> Array:
-        """What coordinates are measured by: displacements or forces, (n,)."""
-        moving, lengths = self.points.moving, self.points.high - self.points.low
-        lengths = np.where(np.isfinite(lengths), lengths, 0.0)
-        kinds = [
-            max(float(np.max(lengths[kind], initial=0.0)), float(np.max(np.abs(self.z[kind]), initial=0.0)))
-            for kind in (moving, ~moving)
-        ]
-        return np.asarray(np.where(moving, kinds[0], kinds[1]))
+    def _by_kind(self, values: Array) -> tuple[float, float]:
+        """The largest value of coordinates that are displacements, and of forces."""
+        return _largest(values[self.points.moving]), _largest(values[~self.points.moving])
 
     @override
-    def pass_on(self, move: Move, check: Callable[[], None]) -> list[Passage]:
+    def pass_on(self, move: Move) -> list[Passage]:
         assert move.point is not None
         i, before, trend, stood = move.point, self.points.segment(move.point), self.trend, self.stands
         forward, held = bool(self.rates[i] > 0.0), self.state.held
@@ -291,12 +265,13 @@ class StraightBranch(Branch):
             segment = self.points.chain(i)[number]
             self._enter(i, number, segment.low if forward else segment.high)
         after = self.points.segment(i)
-        change = _change(before, after) if trend * self.trend < 0 else 0
+        softens = 1 if after.hold < before.hold else -1
+        change = softens if trend * self.trend < 0 else 0  # by the sign of the pivot
         neutral = stood or self.stands or self.state.held is not held
         self.unstable = self.points.unstable_directions(self.values) if neutral else self.unstable + change
         if change > 0 or neutral:
             self._leader = i
-        return [Passage(point=i, before=before, after=after)]
+        return [(i, event_between(before, after))]
 
     def _turn_back(self, i: int, *, forward: bool) -> None:
         """On to the secant of where the bonds have been."""
@@ -312,7 +287,7 @@ class StraightBranch(Branch):
         self.state.enter(i, number, coordinate)
         if self.state.hold(self.rate):  # other motions are held: set out anew with the factor, as it went
             self.heading = self.trend or 1
-            self._basis = Basis(self.state, self.rate, self._setting_out())
+            self._begin(FACTOR)
         else:
             self.heading = self._heading_on(i, direction)
         self.small[i], self._behind[i] = 0.0, self._lag[i]
@@ -333,19 +308,16 @@ class StraightBranch(Branch):
     @property
     @override
     def stands(self) -> bool:
-        return self._stands
-
-    def _factor_stands(self) -> bool:
         points, rates = self.points, self.rates
         forces = _largest(np.where(points.moving, points.slope, points.rise) * rates)
         size = self._stiffest * _largest(self.motion) + forces
-        return abs(self.factor_rate) * self._live < self._thresholds.reached * size
+        return abs(self.factor_rate) * self._live < DEFAULT.reached * size
 
     @override
     def beyond(self) -> Array:
         found = self._first_end(self._factor)
         length = self.points.scale / (_largest(self.rates) or 1.0) if found is None else found[1]
-        return self.z + self._thresholds.near * length * self.rates
+        return self.z + DEFAULT.near * length * self.rates
 
     @override
     def must_leave(self, aim: float) -> bool:
@@ -355,19 +327,6 @@ class StraightBranch(Branch):
         chosen = self._first_end(aim)
         numbers, slack, _, _, allowed = self._ends()
         return chosen is None or not np.any((slack <= allowed)[numbers == chosen[0]])
-
-
-def _change(before: Segment, after: Segment) -> int:
-    """How the number of unstable directions changes where the factor turns: by the sign of the pivot."""
-    if before.kind is SegmentKind.PIECE and after.kind is SegmentKind.PIECE:
-        return 1 if after.slope < before.slope else -1
-    if before.kind is SegmentKind.PIECE:
-        return 1 if _drops(after) else -1
-    return -1 if _drops(before) else 1
-
-
-def _drops(segment: Segment) -> bool:
-    return segment.kind is SegmentKind.JUMP and segment.rise < 0.0
 
 
 def _largest(values: Array) -> float:

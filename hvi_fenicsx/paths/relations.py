@@ -10,9 +10,9 @@ from scipy.sparse import csr_array
 from ..reduced.condensed_stiffness import ZERO, negative_directions, rounding_of
 from ..typing import Array, Mask
 from .contact_points import PointLaws
-from .rigid_motions import Unresisted, unresisted
+from .rigid_motions import Unresisted, without
 from .statuses import PointStatuses
-from .thresholds import ROUNDING
+from .thresholds import DEFAULT, ROUNDING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +108,7 @@ class ContactPoints(PointStatuses):
         rest = values.s[p] <= ROUNDING
         if not vectors.differ or not np.any(rest):
             return None
-        e = np.where(rest[vectors.owner], vectors.directions(direction), values.directions)
+        e = np.where(rest[vectors.owner], vectors.polar(direction)[1], values.directions)
         energies = values.energies.copy()
         energies[p] = vectors.energies(e)
         return replace(values, directions=e, energies=energies)
@@ -119,7 +119,7 @@ class ContactPoints(PointStatuses):
         Args:
             values: of the points.
         """
-        return np.asarray(np.abs(values.lengths) <= self.thresholds.reached * self.length)
+        return np.asarray(np.abs(values.lengths) <= DEFAULT.reached * self.length)
 
     def allowances(self, values: Values, rates: Array, fastest: float) -> Array:
         """How near to an end of its segment a point is there, (m,): on a steep segment a short way is a large force.
@@ -131,10 +131,10 @@ class ContactPoints(PointStatuses):
             rates: how fast s changes, (m,).
             fastest: how fast the fastest coordinate does.
         """
-        limits, size = self.thresholds, 1.0 + np.abs(values.s)
+        size = 1.0 + np.abs(values.s)
         steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
-        steep[np.abs(rates) <= limits.undecided * fastest] = 1.0
-        return np.asarray(np.maximum(limits.reached / steep, limits.digits) * size)
+        steep[np.abs(rates) <= DEFAULT.undecided * fastest] = 1.0
+        return np.asarray(np.maximum(DEFAULT.reached / steep, DEFAULT.digits) * size)
 
     def turning_back(self, values: Values, rates: Array) -> Mask:
         """Which bonds with memory go back, (m,); a vector that has not left 0 passes it instead.
@@ -210,13 +210,10 @@ class ContactPoints(PointStatuses):
             rate: the load that grows, (n,).
         """
         if not len(self.rigid) or self.elastic is not self._problem.elastic:
-            return Unresisted.none(rate)
-        if self.straight:
-            resists = ~self.moving | (np.abs(self.slope) > ZERO * self.stiffest)
-            return unresisted(self.rigid, self.rigid[:, resists], rate)
-        none = self.thresholds.none * self.stiffest
-        stiff = np.flatnonzero(~(np.abs(self._slopes(values)) <= none))  # nan where nothing moves
-        return unresisted(self.rigid, (self._axes(values.directions).sparse[stiff] @ self.rigid.T).T, rate)
+            return Unresisted(motions=self.rigid[:0], rate=rate)
+        stiff = np.flatnonzero(~(np.abs(self._slopes(values)) <= DEFAULT.none * self.stiffest))  # nan: it stands
+        parts = self._axes(values.directions).sparse[stiff] @ self.rigid.T
+        return Unresisted(motions=without(self.rigid, parts.T, DEFAULT.none), rate=rate)
 
     def held_stiffness(self, held: Array | None) -> Array:
         """The stiffness with springs against motions that are as stiff as the body, (n, n).
@@ -245,13 +242,8 @@ class ContactPoints(PointStatuses):
             values: at the point.
             motion: by unknown, (n,).
         """
-        return np.concatenate(
-            [
-                motion[self.one],
-                self.vectors.along(values.directions, motion),
-                motion[self.vectors.opening_unknowns],
-            ]
-        )
+        along = self.vectors.along(values.directions, motion)
+        return np.concatenate([motion[self.one], along, motion[self.vectors.opening_unknowns]])
 
     def bond_forces(self, values: Values) -> Array:
         """The forces of the laws of each point alone, without those of bounds, (m,).
@@ -323,7 +315,7 @@ class ContactPoints(PointStatuses):
 
     def reach(self, values: Values) -> Array:
         """How far the curved points may move in one step, in units of s, (m,); infinite for the others."""
-        return np.asarray(self._deviations.reach(values.lengths, self.thresholds.reach) / self.length)
+        return np.asarray(self._deviations.reach(values.lengths, DEFAULT.reach) / self.length)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,6 @@ the solution is one without them. They belong to one cell: in the next one somet
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Self
 
 import numpy as np
 from scipy.linalg import qr
@@ -32,47 +30,32 @@ class Unresisted:
     motions: Array
     rate: Array
 
-    @classmethod
-    def none(cls, rate: Array) -> Self:
-        """There are none."""
-        return cls(motions=np.empty((0, len(rate))), rate=rate)
-
     @property
     def balanced(self) -> Array:
         """The part of the load that works on none of the motions, (n,)."""
         return np.asarray(self.rate - (self.motions @ self.rate) @ self.motions)
 
     @property
-    def _works(self) -> Array:
-        """What the load does on the motions, (k,); 0 where that is rounding."""
-        works = self.motions @ self.rate
-        none = DEFAULT.none * float(np.linalg.norm(self.rate))
-        return np.asarray(np.where(np.linalg.norm(works) > none, works, 0.0))
-
-    @cached_property
     def driven(self) -> Array:
-        """The motion along which the load drives the body, (n,); 0 where it drives it along none."""
-        return np.asarray(self._works @ self.motions)
+        """The motion along which the load drives the body, (n,); 0 where it drives it along none but for rounding."""
+        found = (self.motions @ self.rate) @ self.motions
+        none = np.linalg.norm(found) <= DEFAULT.none * np.linalg.norm(self.rate)
+        return np.zeros_like(found) if none else found
 
-    @cached_property
+    @property
     def held(self) -> Array:
         """The motions along which no load drives the body, as orthonormal rows, (d, n)."""
-        return _without(self.motions, self._works[:, None], 0.0)
+        return without(self.motions, (self.motions @ self.driven)[:, None], 0.0)
 
 
-def unresisted(rigid: Array, resisted: Array, rate: Array) -> Unresisted:
-    """The rigid motions that nothing resists.
+def without(motions: Array, parts: Array, none: float) -> Array:
+    """The combinations of motions whose parts are none.
 
     Args:
-        rigid: the displacements that elasticity does not resist, as orthonormal rows, (k, n).
-        resisted: their parts where laws or bounds resist, (k, m).
-        rate: the load that grows, (n,).
+        motions: orthonormal rows, (k, n).
+        parts: of each, (k, m).
+        none: what is none.
     """
-    return Unresisted(motions=_without(rigid, resisted, DEFAULT.none), rate=rate)
-
-
-def _without(motions: Array, parts: Array, none: float) -> Array:
-    """The combinations of motions whose parts are none."""
     if not len(motions) or not parts.size:
         return motions
     left, values, _ = np.linalg.svd(parts)

@@ -87,18 +87,6 @@ class Segment:
             return 2, 0.0
         return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
 
-    def distance(self, x: float, force: float, stiffness: float) -> float:
-        """How far a point is from the segment, in units of force.
-
-        Args:
-            x: its displacement.
-            force: its force.
-            stiffness: force for one unit of displacement.
-        """
-        at = self.coordinate(x, force)
-        on = self.force + (self.rise or self.slope) * at
-        return abs(on - force) + stiffness * abs(self.displacement(at) - x)
-
 
 def piece_at(chain: Sequence[Segment], x: float, rounding: float, *, forward: bool) -> int:
     """The number of the piece on which a displacement is or, but for rounding, at an end; of two the next one.

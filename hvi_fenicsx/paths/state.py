@@ -8,9 +8,8 @@ from enum import Enum, StrEnum
 
 import numpy as np
 
-from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
-from .thresholds import DEFAULT, FollowingThresholds
+from .thresholds import DEFAULT
 
 
 class Event(StrEnum):
@@ -65,18 +64,6 @@ class EventPlace:
     point: Array
 
 
-def place_of(problem: CondensedProblem, unknown: int, group: int | None) -> EventPlace:
-    """Where an event happened at an unknown: at the part of a law or, where a contact closes or opens, of the contact.
-
-    Args:
-        problem: the problem.
-        unknown: its number.
-        group: number of the problem's bonds; None: a contact.
-    """
-    part = problem.parts[unknown] if group is None else problem.bonds[group].part
-    return EventPlace(part=part, unknown=unknown, point=problem.points[unknown])
-
-
 @dataclass(frozen=True, kw_only=True)
 class Position:
     """Where on its curve a path is: with factor, unknowns and memory all that it needs to go on.
@@ -86,16 +73,17 @@ class Position:
         numbers: of the segments on which the unknowns are, (n,).
         driver: the variable that drives.
         heading: its direction, 1 or -1.
-        small: parts of the order ε of the coordinates, which say who comes first where several come at once, (n,);
-            on a curve that is not straight its coordinates.
-        step: length of the next step on such a curve.
+        z: the coordinates of the points, (n,).
+        small: parts of the order ε of them, which say who comes first where several come at once, (n,).
+        step: length of the next step on a curve that is not straight, which has no such parts.
     """
 
     leg: int
     numbers: Integers
     driver: int
     heading: int
-    small: Array
+    z: Array
+    small: Array | None = None
     step: float = 0.0
 
 
@@ -114,7 +102,6 @@ class PathState:
         released: at a jump, what the body has lost in motion.
         unstable: number of directions in which the energy falls.
         memory: what the bonds remember, (bonds, 4) as :attr:`.BondTable.memory`; None without memory.
-        bifurcation: several vertices reached an end at once, and not all of them went on: there are other branches.
         position: where on its curve the path is.
     """
 
@@ -128,7 +115,6 @@ class PathState:
     released: float = 0.0
     unstable: int
     memory: Array | None
-    bifurcation: bool = False
     position: Position
 
     @property
@@ -149,7 +135,6 @@ class PathOptions:
         borne: the least and the largest factor with which there may be an equilibrium, where these are known.
         held: between these factors there is one, whatever the bonds remember; as far as that is known.
         stops: factors at which a path that is not straight has a state, each time it comes to one.
-        thresholds: the numbers that tune how it is followed.
     """
 
     programme: Sequence[float] = (1.0,)
@@ -159,7 +144,6 @@ class PathOptions:
     borne: tuple[float, float] = (-float("inf"), float("inf"))
     held: tuple[float, float] = (0.0, 0.0)
     stops: Sequence[float] = ()
-    thresholds: FollowingThresholds = DEFAULT
 
 
 class Stopped(Exception):
@@ -186,7 +170,7 @@ class LoadHistory:
     @property
     def _small(self) -> float:
         """A difference of factors that does not count."""
-        return self._options.thresholds.slow * max(map(abs, self._options.programme))
+        return DEFAULT.slow * max(map(abs, self._options.programme))
 
     def _limit(self, factor: float) -> float:
         """The last factor that may be borne, from one on towards the aim of the present leg."""
@@ -199,11 +183,6 @@ class LoadHistory:
         side = "but" if high - low <= self._small else "above" if limit == high else "below"
         shown = 0.0 if abs(limit) <= self._small else limit
         return f"no factor {side} {shown:.6g} is borne by any equilibrium: a body comes off"
-
-    def _go_round(self, factor: float, found: Cycle) -> None:
-        """End where the path has come back to where it was."""
-        self.is_closed = found is Cycle.CLOSED
-        self._lose(factor, f"at the factor {factor:.6g} the path comes back to where it was: {found.value}")
 
     def _finish(self, end: End, reason: str) -> None:
         self.end, self.reason = end, reason
@@ -241,17 +220,14 @@ class Cycles:
 
     Args:
         x: the displacements where the leg begins, (n,).
-        same_place: a difference of displacements that does not count, relative.
 
     Attributes:
-        came: the last change of the displacements, (n,).
         standing: events in a row at one place and factor.
     """
 
-    def __init__(self, x: Array, same_place: float) -> None:
-        self._same_place = same_place
+    def __init__(self, x: Array) -> None:
         self._known: dict[int, tuple[float, float, float]] = {}
-        self._x, self.came = x, np.zeros_like(x)
+        self._x = x
         self._weights = np.random.default_rng(0).uniform(0.5, 1.5, len(x))
         self._way, self._factor, self.standing = 0.0, np.inf, 0
 
@@ -261,25 +237,18 @@ class Cycles:
         Args:
             state: of an event.
         """
-        step, size = state.x - self._x, float(np.max(np.abs(state.x), initial=0.0))
-        length = float(np.max(np.abs(step), initial=0.0))
-        if length > 1e-9 * size:
-            self.came = step
+        size, length = (float(np.max(np.abs(x), initial=0.0)) for x in (state.x, state.x - self._x))
         self._way += length
         stands = length <= 1e-9 * size and abs(state.factor - self._factor) <= 1e-9 * (1.0 + abs(state.factor))
         self._factor, self.standing = state.factor, self.standing + 1 if stands else 0
-        self._x, key = state.x, _key(state)
+        position, memory = state.position, b"" if state.memory is None else state.memory.tobytes()
+        key = hash((position.numbers.tobytes(), position.driver, position.heading, memory))
+        self._x = state.x
         factor, way, place = self._known.get(key, (np.inf, 0.0, 0.0))
         here = float(self._weights @ state.x)
         self._known[key] = state.factor, self._way, here
         if abs(factor - state.factor) > 1e-9 * (1.0 + abs(state.factor)):
             return None
-        if abs(place - here) > self._same_place * float(self._weights @ np.abs(state.x)):
+        if abs(place - here) > DEFAULT.undecided * float(self._weights @ np.abs(state.x)):
             return None  # what slides bears the same load
         return Cycle.CLOSED if self._way - way > 1e-9 * size else Cycle.BLOCKED
-
-
-def _key(state: PathState) -> int:
-    position = state.position
-    memory = b"" if state.memory is None else state.memory.tobytes()
-    return hash((position.numbers.tobytes(), position.driver, position.heading, memory))

@@ -18,7 +18,8 @@ from ..typing import Array, Integers, Mask
 from .contact_points import PointLaws
 from .curved_laws import Deviations
 from .segments import Segment, SegmentKind, beside_opening, chain, from_zero
-from .thresholds import DEFAULT, ROUNDING, FollowingThresholds
+from .state import PathState
+from .thresholds import ROUNDING
 from .vertex_laws import shares
 
 Kept = tuple[Integers, Array]
@@ -31,7 +32,6 @@ class PointStatuses(PointLaws):
     Args:
         problem: the problem.
         remember: numbers of the problem's bonds that remember.
-        thresholds: of the path.
 
     Attributes:
         numbers: of the segments on which the points are, (m,).
@@ -45,10 +45,8 @@ class PointStatuses(PointLaws):
         InputError: a law on a length shares an unknown with another law or a bound.
     """
 
-    def __init__(
-        self, problem: CondensedProblem, remember: Collection[int] = (), thresholds: FollowingThresholds = DEFAULT
-    ) -> None:
-        super().__init__(problem, remember, thresholds)
+    def __init__(self, problem: CondensedProblem, remember: Collection[int] = ()) -> None:
+        super().__init__(problem, remember)
         self.elastic, self.rigid = problem.elastic, problem.elastic.rigid
         self._groups = list({law.group: law.laws for law in self.vertices}.values())
         self._ends = np.cumsum([len(laws.weights) for laws in self._groups])[:-1]
@@ -81,13 +79,11 @@ class PointStatuses(PointLaws):
         return self.elastic.array
 
     def _segments(self, k: int) -> tuple[Segment, ...]:
-        problem, opening = self._problem, self.opening(k)
-        if opening is not None:
-            return beside_opening(float(problem.lower[self.vectors.opening_unknowns[opening]]))
         if self.radial(k) is not None:
             return from_zero(chain(self.laws[k], 0.0, np.inf))
-        i = int(self.one[k])
-        return chain(self.laws[k], float(problem.lower[i]), float(problem.upper[i]))
+        i = self.unknowns[k][0]
+        low, high = float(self._problem.lower[i]), float(self._problem.upper[i])
+        return beside_opening(low) if self.is_opening(k) else chain(self.laws[k], low, high)
 
     def _based(self, k: int) -> Array:
         """Where s is at the coordinate 0 of each segment."""
@@ -101,7 +97,7 @@ class PointStatuses(PointLaws):
                 at += (segment.high - segment.low) / unit
             else:
                 found[number] = -segment.high / unit if np.isfinite(segment.high) else 0.0
-        return found if self.opening(k) is None else found - found[-1]
+        return found - found[-1] if self.is_opening(k) else found
 
     def unit(self, k: int, segment: Segment) -> float:
         """The unit of a segment's own coordinate.
@@ -140,16 +136,10 @@ class PointStatuses(PointLaws):
         self.outward[k] = segment.outward
         self._curved[k] = self._deviations.enter(k, segment)
         self._bent[k] = self._curved[k] or self._turns(k)
-        self._count(k, counts=number == len(self._chains[k]) - 1)
-
-    def _count(self, k: int, *, counts: bool) -> None:
-        """Let the opening that a point is count in its length, or not."""
-        opening = self.opening(k)
-        if opening is None:
-            return
-        self.vectors.counts[self.vectors.openings[opening]] = counts
-        of = len(self.one) + int(self.vectors.owner[self.vectors.openings[opening]])
-        self._bent[of] = self._curved[of] or self._turns(of)
+        if self.is_opening(k):  # it counts in its length, or not
+            self.vectors.counts[self.vectors.flat == self.unknowns[k]] = number == len(self._chains[k]) - 1
+            of = self.owner(k)
+            self._bent[of] = self._curved[of] or self._turns(of)
 
     def _turns(self, k: int) -> bool:
         """Whether a point's vector may turn without its force being a multiple of it."""
@@ -205,11 +195,11 @@ class PointStatuses(PointLaws):
         """
         p = self.radial(k)
         if p is None:
-            z[self.unknowns_of(k)] = s
+            z[self.unknowns[k]] = s
         else:
             here = self.vectors.owner == p
             group = self.vectors.groups[p]
-            z[group] = np.where(self.vectors.counts[here], s * self.directions(z)[here], z[group])
+            z[group] = np.where(self.vectors.counts[here], s * self.polar(z)[1][here], z[group])
 
     def polar(self, z: Array) -> tuple[Array, Array]:
         """The coordinates along the graphs, (m,), and the unit vectors of the points of lengths, (N,).
@@ -219,14 +209,6 @@ class PointStatuses(PointLaws):
         """
         lengths, directions = self.vectors.polar(z)
         return np.concatenate([z[self.one], lengths, z[self.vectors.opening_unknowns]]), directions
-
-    def s(self, z: Array) -> Array:
-        """The coordinates along the graphs, (m,)."""
-        return self.polar(z)[0]
-
-    def directions(self, z: Array) -> Array:
-        """Unit vectors of the points of lengths, (N,)."""
-        return self.vectors.directions(z)
 
     def rates(self, z: Array, direction: Array) -> Array:
         """How s changes along a direction of the coordinates, (m,); a length of 0, but for rounding, grows in each.
@@ -238,7 +220,7 @@ class PointStatuses(PointLaws):
         vectors = self.vectors
         lengths, directions = vectors.polar(z)
         moved = lengths > ROUNDING
-        along = np.where(moved, vectors.along(directions, direction), vectors.lengths(direction))
+        along = np.where(moved, vectors.along(directions, direction), vectors.polar(direction)[0])
         return np.concatenate([direction[self.one], along, direction[vectors.opening_unknowns]])
 
     @property
@@ -301,6 +283,15 @@ class PointStatuses(PointLaws):
             self.rebuild(int(k))
         for k, number in enumerate(numbers):
             self.enter(k, int(number))
+
+    def take(self, state: PathState) -> Array:
+        """Put all points where they were at a state of a path; their coordinates, (n,).
+
+        Args:
+            state: the state.
+        """
+        self.restore((state.position.numbers, self._remembered if state.memory is None else state.memory))
+        return state.position.z.copy()
 
     def remember(self, k: int, x: float, traction: float) -> float:
         """Let a point's laws note where they have been, and take its segments anew.

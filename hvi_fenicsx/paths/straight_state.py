@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellColumns, CellInverse
 from ..typing import Array
 from .relations import ContactPoints, Values
 from .rigid_motions import are_same, pins
-from .state import PathState
-from .thresholds import ROUNDING
+from .thresholds import DEFAULT
 
 
 class StraightState:
@@ -125,39 +125,9 @@ class StraightState:
         if free.size < 2 or not np.any(begin):
             return found
         operator = LinearOperator((free.size, free.size), matvec=response, dtype=np.float64)
-        try:
-            accuracy = self.points.thresholds.none
-            found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=accuracy)[1][:, 0]
-        except ArpackNoConvergence:
-            pass
+        with suppress(ArpackNoConvergence):
+            found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=DEFAULT.none)[1][:, 0]
         return found
-
-
-def coordinates_at(problem: CondensedProblem, points: ContactPoints, state: PathState) -> Array:
-    """The coordinates of a state of a path; the points are put where they were, (n,).
-
-    Args:
-        problem: the problem.
-        points: its points.
-        state: the state.
-    """
-    points.restore((state.position.numbers, points.kept()[1] if state.memory is None else state.memory))
-    if not points.straight:
-        return state.position.small.copy()
-    return _coordinates(points, state.x, problem.load(state.factor) - problem.elastic @ state.x)
-
-
-def _coordinates(points: ContactPoints, x: Array, force: Array) -> Array:
-    """The coordinates of displacements and forces along the present segments; ends where they are that, (n,)."""
-    found = np.zeros(len(x))
-    for i in range(len(x)):
-        segment = points.segment(i)
-        found[i] = segment.coordinate(float(x[i]), float(force[i]))
-        length = segment.high - segment.low
-        for end in (segment.low, segment.high):
-            if abs(found[i] - end) <= ROUNDING * (length if np.isfinite(length) else abs(found[i])):
-                found[i] = end
-    return found
 
 
 FACTOR = -1
@@ -182,7 +152,6 @@ class Basis:
     """
 
     def __init__(self, state: StraightState, rate: Array, driver: int, inverse: CellInverse | None = None) -> None:
-        self._thresholds = state.points.thresholds
         self._state, self._rate, self.driver = state, rate, driver
         if inverse is None or driver != FACTOR:
             self._factorise()
@@ -204,7 +173,7 @@ class Basis:
         """The values that the basis takes to a column, (n,); factorised anew where the inverse has lost digits."""
         found = self.roughly(right)
         left = right - self._product(found, self.driver)
-        if not np.max(np.abs(left), initial=0.0) <= self._thresholds.slow * np.max(np.abs(right), initial=0.0):
+        if not np.max(np.abs(left), initial=0.0) <= DEFAULT.slow * np.max(np.abs(right), initial=0.0):
             self._factorise()
             found = self.roughly(right)
             left = right - self._product(found, self.driver)
@@ -236,10 +205,10 @@ class Basis:
             0 where that, or an exchange, costs no fewer digits: nothing is done; else the direction in which the
             driving variable goes on, relative to before, for the coordinate to go on as it did.
         """
-        if _strength(self.column, changed) >= self._thresholds.small:
+        if _strength(self.column, changed) >= DEFAULT.small:
             return 0
         spread = self.roughly(self._state.column(changed))
-        if _strength(spread, changed) < self._thresholds.small:
+        if _strength(spread, changed) < DEFAULT.small:
             return 0
         self._inverse.exchange(spread, changed)
         return 1 if spread[changed] > 0.0 else -1
@@ -262,7 +231,7 @@ class Basis:
             if self.driver != FACTOR:
                 found.exchange(self.column, self.driver)
             left = self._product(found.solve(self._rate), FACTOR) - self._rate
-            allowed = self._thresholds.slow * np.max(np.abs(self._rate), initial=0.0)
+            allowed = DEFAULT.slow * np.max(np.abs(self._rate), initial=0.0)
             known = bool(np.max(np.abs(left), initial=0.0) <= allowed)
         return found if known else None
 

@@ -24,7 +24,6 @@ class FollowingThresholds:
             the shortest step in a motion in time.
         near: factors of a point nearby serve while corrections fall by this; a step beyond a state along the path.
         digits: the last digits of coordinates, and what they make of forces.
-        agreed: by how much the work along a step may miss what the energies say.
         least_turn: least cosine of the angle between the tangents at both ends of a step.
         reach: a step changes the argument of a curved law by this part of its length scale and of the argument at most.
         far: a displacement that is infinite, in units of those where the body was.
@@ -41,7 +40,6 @@ class FollowingThresholds:
     small: float = 1e-3
     near: float = 1e-2
     digits: float = 2e-14
-    agreed: float = 3e-10
     least_turn: float = 0.9
     reach: float = 0.25
     far: float = 1e4

@@ -162,7 +162,8 @@ def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential, mixity: Mix
     given = replace(given, bonds=(replace(given.bonds[0], mixity=mixity),))
     options: dict[str, Any] = {"programme": (3.0,), "follow": Follow.EXACT, "remember": (0,)}
     _, states = path(given, **options)
-    _, finer = path(given, **options, thresholds=FINER)
+    with FINER:
+        _, finer = path(given, **options)
     assert events(finer) == events(states)
     assert folds(finer) == pytest.approx(folds(states), rel=1e-8)
     assert states[-1].x == pytest.approx(finer[-1].x, abs=1e-8)

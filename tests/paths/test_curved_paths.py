@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,7 @@ from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]
 DROP = [(0, 0), (1, 1), (1, 0.4)]
-FINER = FollowingThresholds(reach=0.025)
+FINER = patch("hvi_fenicsx.paths.relations.DEFAULT", FollowingThresholds(reach=0.025))
 SMOOTHED = create("quadratic", graph(DROP), epsilon=1e-2)
 
 
@@ -365,7 +366,8 @@ def test_loading_and_unloading_in_the_plane_with_memory(law: Superpotential) -> 
 def test_a_tenth_of_the_step_is_the_same_branch(law: Superpotential) -> None:
     given = oblique(law)
     _, states = path(given, programme=(1.5,), follow=Follow.EXACT)
-    _, finer = path(given, programme=(1.5,), follow=Follow.EXACT, thresholds=FINER)
+    with FINER:
+        _, finer = path(given, programme=(1.5,), follow=Follow.EXACT)
     assert len(finer) >= len(states)
     assert events(finer) == events(states)
     for one, other in zip(folds(states), folds(finer), strict=True):
