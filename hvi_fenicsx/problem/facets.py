@@ -90,7 +90,7 @@ def slopes(nodes: Array, barycentric: Array) -> Array:
     d = barycentric.shape[1]
     if nodes.shape[1] == d:
         return nodes[:, 1:] - nodes[:, :1]
-    functions = spaces.transformed(_KINDS[d].name, 0.0).tabulate(1, barycentric[:, 1:])[1:]
+    functions = spaces.quadratic_functions(1, barycentric)[1:]
     return np.einsum("jpn,pnk->pjk", functions, nodes)
 
 

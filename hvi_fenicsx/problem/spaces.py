@@ -158,10 +158,20 @@ def simplex_functions(degree: int, barycentric: Array, share: float = 0.0) -> Ar
         barycentric: the points, (q, corners).
         share: of an edge's function that goes to each of its ends (:func:`edge_share`); by default Lagrange's basis.
     """
-    if degree == 1:
-        return barycentric
+    return barycentric if degree == 1 else quadratic_functions(0, barycentric, share)[0]
+
+
+def quadratic_functions(order: int, barycentric: Array, share: float = 0.0) -> Array:
+    """Those of degree 2, and their derivatives by all coordinates but the first up to an order, (k, q, nodes).
+
+    Args:
+        order: 0 or 1.
+        barycentric: the points, (q, corners).
+        share: as for :func:`simplex_functions`.
+    """
     kind = {2: "interval", 3: "triangle", 4: "tetrahedron"}[barycentric.shape[1]]
-    return transformed(kind, share).tabulate(0, barycentric[:, 1:])[0]
+    points = np.pad(barycentric[:, 1:], ((0, 1), (0, 0)))  # a corner more: basix takes one point at least
+    return transformed(kind, share).tabulate(order, points)[:, :-1]
 
 
 @functools.cache
