@@ -59,21 +59,6 @@ def _sum(arcs: Iterable[Arc], lo: float, hi: float) -> Arc:
     return Arc(lo, hi, a, sum(c.at(a) for c in arcs), sum(c.rate(a) for c in arcs), sum(c.slope for c in arcs))
 
 
-def on_interval(arcs: Chain, low: float, high: float) -> list[Arc]:
-    """The part of a chain on an interval; a single point where low == high.
-
-    Args:
-        arcs: the chain.
-        low: begin of the interval.
-        high: end of the interval.
-    """
-    inside = [a for a in arcs if a.low < high and a.high > low]
-    if not inside or low == high:
-        a = next(a for a in arcs if a.low <= low <= a.high)
-        return [Arc(low, low, low, a.at(low), a.rate(low), 0.0)]
-    return [a._replace(low=max(a.low, low), high=min(a.high, high)) for a in inside]
-
-
 def arcs_of(rows: Array) -> list[Arc]:
     """A chain that is an array of its arcs.
 

@@ -18,12 +18,11 @@ from scipy.optimize import linprog
 
 from ..typing import Array, Integers, Mask
 from . import stationarity
-from .arcs import on_interval
 from .balance_programme import BalanceTest
 from .convex_programme import envelopes, minimise
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
-from .scalar_problem import Box, ScalarProblem, clipped
+from .scalar_problem import Box, ScalarProblem
 from .stationarity import PointList, StationaryPoint
 from .thresholds import LIMITS
 from .weighed_balance import ForceIntervals, clipped_again, shorter
@@ -49,8 +48,8 @@ class Enumeration:
 
     def __post_init__(self) -> None:
         self.points = PointList(LIMITS.same)
-        self._laws, self._balance = PolylineCells(self.problem), RigidBalance(self.problem)
-        self._forces, self._weighed = ForceIntervals(self.problem), BalanceTest(Relaxation(self.problem))
+        self._balance, self._forces = RigidBalance(self.problem), ForceIntervals(self.problem)
+        self._weighed = BalanceTest(Relaxation(self.problem))
 
     def start(self) -> None:
         """Begin with a cell that is far larger than the problem's displacements."""
@@ -73,22 +72,23 @@ class Enumeration:
             report(self)
         return True
 
-    def enter(self, x: Array) -> None:
+    def enter(self, x: Array, *, isolated: bool = True) -> None:
         """Keep the stationary point at a place, if there is one and it is new.
 
         Args:
             x: the place, (n,).
+            isolated: False where it is one of a continuum.
         """
-        self.points.add(self._laws.point(x))
+        problem = self.problem
+        x = np.clip(x, problem.lower, problem.upper)
+        if stationarity.imbalance(problem, x) <= LIMITS.accuracy:
+            kind = stationarity.kind(problem, x)
+            self.points.add(StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated))
 
     def _divide(self, cell: Box) -> None:
         """Test a cell, keep its point, and put the parts of what is left on the stack."""
         left = self._smaller(cell)
-        if left is None:
-            return
-        verdict = self._laws.verdict(left)
-        self.points.add(verdict.point)
-        if not verdict.decided:
+        if left is not None and not self._decided(left):
             self.waiting += _far(self.problem, self._balance.pivots, left) or _any(self.problem, left)
 
     def _smaller(self, cell: Box) -> Box | None:
@@ -105,101 +105,51 @@ class Enumeration:
     def _tightened(self, cell: Box) -> Box | None:
         """The cell made smaller by balances of forces; None if no stationary point is in it."""
         ends = clipped_again(self._balanced, cell.low, cell.high)
-        return None if ends is None else settled(self.problem, Box.around(*ends, cell.x))
+        return None if ends is None else Box.around(*ends, cell.x)
 
     def _balanced(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         ends = self._forces.tightened(low, high)
         return None if ends is None else self._balance.tightened(*ends)
 
-
-@dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """What is known of a cell.
-
-    Attributes:
-        point: a stationary point in the cell; None where none is found.
-        decided: whether there is no other one.
-    """
-
-    point: StationaryPoint | None = None
-    decided: bool = True
-
-
-OPEN = Verdict(decided=False)
-"""What is known of a cell that is to be divided."""
-
-
-class PolylineCells:
-    """Cells of laws whose tractions are polylines.
-
-    Args:
-        problem: the problem.
-    """
-
-    def __init__(self, problem: ScalarProblem) -> None:
-        self._problem = problem
-
-    def verdict(self, cell: Box) -> Verdict:
-        """What is known of a cell.
-
-        Args:
-            cell: the cell.
-        """
-        arcs, problem = self._problem.arcs, self._problem
+    def _decided(self, cell: Box) -> bool:
+        """Whether a cell has one stationary point at most, or one that stands for all; it is kept."""
+        arcs, problem = self.problem.arcs, self.problem
         fixed = cell.low == cell.high
         free = np.flatnonzero(~fixed)
         if not free.size:
-            return self._done(cell.low)
+            self.enter(cell.low)
+            return True
         if np.any(arcs.drops(cell.low, cell.high) > 0.0):
-            return OPEN
+            return False
         slopes = arcs.least_slope(cell.low, cell.high)
         matrix = problem.stiffness[np.ix_(free, free)] + np.diag(slopes[free])
         if _positive(matrix):
-            return self._done(self._minimum(cell, np.where(fixed, 0.0, -np.minimum(slopes, 0.0))))
+            added = np.where(fixed, 0.0, -np.minimum(slopes, 0.0))  # the energy is convex: falls are less than S
+            chains = envelopes(problem, cell.low, cell.high, added)
+            self.enter(minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x).x)
+            return True
         if np.any(arcs.meets(cell.low, cell.high)[free].sum(axis=1) > 1) or np.any(at_bounds(problem, cell)[free]):
-            return OPEN
-        return self._linear(cell, free, matrix)
+            return False
+        self._enter_linear(cell, free, matrix)
+        return True
 
-    def point(self, x: Array, *, isolated: bool = True) -> StationaryPoint | None:
-        """The stationary point at a place; None where there is none.
-
-        Args:
-            x: the place, (n,).
-            isolated: False where it is one of a continuum.
-        """
-        problem = self._problem
-        x = np.clip(x, problem.lower, problem.upper)
-        if stationarity.imbalance(problem, x) > LIMITS.accuracy:
-            return None
-        kind = stationarity.kind(problem, x)
-        return StationaryPoint(x=x, energy=problem.energy(x), kind=kind, isolated=isolated)
-
-    def _done(self, x: Array, *, isolated: bool = True) -> Verdict:
-        """Nothing is left of a cell but perhaps this point."""
-        return Verdict(point=self.point(x, isolated=isolated))
-
-    def _minimum(self, cell: Box, added: Array) -> Array:
-        """The minimiser of a cell on which the energy is convex, the falls of its laws being less than S."""
-        problem, chains = self._problem, envelopes(self._problem, cell.low, cell.high, added)
-        return minimise(problem.stiffness - np.diag(added), problem.force, chains, cell.x).x
-
-    def _linear(self, cell: Box, free: Integers, matrix: Array) -> Verdict:
-        """The solutions of a cell in which every law is on one arc."""
-        problem, arcs, rows = self._problem, self._problem.arcs, np.arange(self._problem.size)
+    def _enter_linear(self, cell: Box, free: Integers, matrix: Array) -> None:
+        """Keep the solution of a cell in which every law is on one arc, or one of them."""
+        problem, arcs, rows = self.problem, self.problem.arcs, np.arange(self.problem.size)
         k = np.argmax(arcs.meets(cell.low, cell.high), axis=1)
         offset = arcs.tractions[rows, k] - arcs.slopes[rows, k] * arcs.anchors[rows, k]
         held = np.setdiff1d(rows, free)
         right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
         x, low, high = cell.low.copy(), cell.low[free], cell.high[free]
-        if np.linalg.cond(matrix) < 1.0 / LIMITS.rounding:
+        regular = bool(np.linalg.cond(matrix) < 1.0 / LIMITS.rounding)
+        if regular:
             x[free] = np.linalg.solve(matrix, right)
             near = LIMITS.same * (1.0 + np.abs(x[free]))
-            inside = np.all((x[free] >= low - near) & (x[free] <= high + near))
-            return self._done(x) if inside else Verdict()
-        if (inner := some_solution(matrix, right, np.column_stack([low, high]))) is None:
-            return Verdict()
-        x[free] = inner
-        return self._done(x, isolated=False)
+            inside = bool(np.all((x[free] >= low - near) & (x[free] <= high + near)))
+        elif inside := (some := some_solution(matrix, right, np.column_stack([low, high]))) is not None:
+            x[free] = some
+        if inside:
+            self.enter(x, isolated=regular)
 
 
 def _positive(matrix: Array) -> bool:
@@ -268,10 +218,12 @@ def _any(problem: ScalarProblem, cell: Box) -> list[Box]:
 
 def _middle_joint(problem: ScalarProblem, cell: Box, i: int, *, only_drops: bool) -> tuple[float, float]:
     """The middle one of the joints of a law inside a cell, and the rise of its traction there."""
-    inside = itertools.pairwise(on_interval(problem.chains[i], float(cell.low[i]), float(cell.high[i])))
-    joints = [(a.high, b.rate(b.low) - a.rate(a.high)) for a, b in inside]
-    chosen = [one for one in joints if not only_drops or one[1] < -problem.arcs.rounding[i]]
-    return chosen[len(chosen) // 2]
+    arcs = problem.arcs
+    at, rises = arcs.high[i, :-1], arcs.after[i, 1:] - arcs.before[i, :-1]
+    chosen = (at > cell.low[i]) & (at < cell.high[i]) & (~np.bool_(only_drops) | (rises < -arcs.rounding[i]))
+    k = np.flatnonzero(chosen)
+    k = k[len(k) // 2]
+    return float(at[k]), float(rises[k])
 
 
 def off_bound(problem: ScalarProblem, cell: Box, i: int) -> Iterator[Box]:
@@ -293,27 +245,3 @@ def _with(cell: Box, i: int, begin: float, end: float) -> Box:
     low, high = cell.low.copy(), cell.high.copy()
     low[i], high[i] = begin, end
     return replace(cell, low=low, high=high, x=np.clip(cell.x, low, high))
-
-
-def settled(problem: ScalarProblem, cell: Box) -> Box:
-    """The cell with such intervals made places.
-
-    Args:
-        problem: the problem.
-        cell: the cell.
-    """
-    n, arcs = problem.size, problem.arcs
-    low, high = cell.low[:n], cell.high[:n]
-    short = (low < high) & (high - low < LIMITS.rounding**2)
-    if not short.any():
-        return cell
-    at = arcs.high[:n, :-1]
-    jumps = np.abs(arcs.after[:n, 1:] - arcs.before[:n, :-1]) > arcs.rounding[:n, None]
-    inside = jumps & (at > low[:, None]) & (at < high[:, None])
-    places = np.where(inside, at, np.inf).min(axis=1, initial=np.inf)
-    places = np.where(low <= problem.lower, low, np.where(high >= problem.upper, high, places))
-    there = short & np.isfinite(places)
-    ends = [cell.low.copy(), cell.high.copy()]
-    for end in ends:
-        end[:n][there] = places[there]
-    return replace(cell, low=ends[0], high=ends[1], x=clipped(cell.x, *ends))

@@ -75,7 +75,7 @@ class LengthProgramme:
         x = self._admissible(start)
         value = self._value(x)
         for _ in range(LIMITS.most_steps):
-            found = self._better(x, value, near_zero=True) or self._better(x, value, near_zero=False)
+            found = self._better(x, value)
             if found is None or self.cut():
                 break
             x, value = found
@@ -87,7 +87,7 @@ class LengthProgramme:
         Args:
             x: where directions are taken from, (n,).
         """
-        return self._solved(x, self._frame(x, near_zero=False), bounding=True)
+        return self._solved(x, self._frame(x), bounding=True)
 
     def _value(self, x: Array) -> float:
         laws = self.laws.energy(self.problem.arguments(x)).sum()
@@ -95,9 +95,9 @@ class LengthProgramme:
         behind = np.where(lengths.opens, np.minimum(lengths.vectors(x)[:, 0], 0.0), 0.0)
         return float(0.5 * x @ (self.a @ x) - self.b @ x + laws + 0.5 * self.shut @ behind**2)
 
-    def _better(self, x: Array, value: float, *, near_zero: bool) -> tuple[Array, float] | None:
-        """A point of lower objective on the way to the solution in the frames; vectors may be held at zero already."""
-        goal = self._solved(x, self._frame(x, near_zero=near_zero), bounding=False).x
+    def _better(self, x: Array, value: float) -> tuple[Array, float] | None:
+        """A point of lower objective on the way to the solution in the frames; vectors near zero may be held there."""
+        goal = self._solved(x, self._frame(x), bounding=False).x
         least = LIMITS.rounding * (abs(value) + float(np.abs(self.b) @ np.abs(x)))
         for halvings in range(8):
             trial = self._admissible(x + 0.5**halvings * (goal - x))
@@ -118,14 +118,14 @@ class LengthProgramme:
         """The largest lengths that are allowed, (m,)."""
         return self.laws.last[len(self.b) :]
 
-    def _frame(self, x: Array, *, near_zero: bool) -> _Frame:
+    def _frame(self, x: Array) -> _Frame:
         lengths, n = self.problem.lengths, len(self.b)
         along = lengths.along(self.b - self.a @ x)
         out = left_out(lengths, x, along, self._ends)
         z, g = np.where(out, 0.0, lengths.vectors(x)), np.where(out, 0.0, along)
         size, start = np.linalg.norm(z, axis=1), self.laws.after[n:, 0]
-        step = z + g / self._stiffness[:, None] if near_zero else g / self._stiffness[:, None]
-        held = (start > 0.0) & (np.linalg.norm(step, axis=1) <= start / self._stiffness) & ((size == 0.0) | near_zero)
+        step = z + g / self._stiffness[:, None]
+        held = (start > 0.0) & (np.linalg.norm(step, axis=1) <= start / self._stiffness)
         force = np.divide((z * g).sum(axis=1), size, out=np.zeros_like(size), where=size > 0.0)
         least, most = self.laws.interval(np.concatenate([self.laws.low[:n, 0], np.minimum(size, self._radius)]))
         traction = np.clip(force, np.maximum(least[n:], 0.0), np.maximum(most[n:], 0.0))

@@ -159,7 +159,7 @@ class LowestSearch:
         found = None
         for _ in range(LIMITS.most_rounds):
             before = box.bound
-            found = self._relaxation.solve(box, LIMITS.worthwhile * (self.upper - before))
+            found = self._relaxation.solve(box)
             weights = 0.5 * (box.weights + found.spread) if box.weights.any() else found.spread
             box = replace(box, x=found.x, bound=max(before, found.bound), weights=weights)
             self._try(found.x)

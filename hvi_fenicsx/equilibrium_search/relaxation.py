@@ -4,9 +4,6 @@ With a diagonal D such that S - D is positive semidefinite, ½ xᵀSx + Σ φᵢ
 envelope of a sum is above the sum of the envelopes. A law whose steepest fall is less than its dᵢ becomes convex; of
 a drop c remains a gap of at most c²/(8 dᵢ), however wide the interval. Unknowns whose law only rises on their
 interval need no dᵢ, and their own least slope adds to S.
-
-A rigid motion costs no elastic energy, so no D > 0 of laws that it moves leaves S - D positive semidefinite. There
-½ σ s² can be lent, s = c·x being the motion's share, whose chord over the interval of s in a box is taken off.
 """
 
 from __future__ import annotations
@@ -18,11 +15,26 @@ from functools import cached_property
 import numpy as np
 
 from ..typing import Array, Integers, Mask
-from .arcs import FREE, ArcTable
+from .arcs import ArcTable
 from .convex_programme import Optimum, envelopes, minimise, never
 from .length_programme import LengthProgramme
 from .scalar_problem import Box, ScalarProblem
 from .thresholds import LIMITS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curvature:
+    """The diagonal D of one box.
+
+    Attributes:
+        added: d, which is negative where the law's own slope is given to S, (n + m,).
+        radii: half widths (n + m,) of what strong convexity allows for a gap of ½; inf where a rigid motion moves.
+        range_radii: the same of displacements without rigid motions.
+    """
+
+    added: Array
+    radii: Array
+    range_radii: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +70,7 @@ class Relaxation:
 
     def __init__(self, problem: ScalarProblem, cut: Callable[[], bool] = never) -> None:
         self.problem, self._cut = problem, cut
-        self._share = CurvatureShare(problem)
+        self._stiff = float(np.trace(problem.stiffness)) / problem.size or 1.0
 
     def undecided(self, low: Array, high: Array) -> Integers:
         """Arguments whose law is not convex on a box.
@@ -71,11 +83,6 @@ class Relaxation:
         wide = high > low
         return np.flatnonzero(wide & ((arcs.drops(low, high) > 0.0) | (arcs.least_slope(low, high) < 0.0)))
 
-    @property
-    def kernel(self) -> Array:
-        """Orthonormal columns of rigid motions, (n, k)."""
-        return self._share.kernel
-
     def diagonal(self, low: Array, high: Array) -> Array:
         """The diagonal D of a box, (n + m,).
 
@@ -83,39 +90,21 @@ class Relaxation:
             low: of the box, (n + m,).
             high: of the box, (n + m,).
         """
-        return self._share.share(low, high, self.undecided(low, high), np.zeros(len(low))).added
+        return self._curvature(low, high, np.zeros(len(low))).added
 
-    def solve(self, box: Box, lost: float = 0.0) -> Minimum:
+    def solve(self, box: Box) -> Minimum:
         """The minimum on a box.
 
         Args:
             box: the box, finite.
-            lost: energy that the chords of rigid motions may take off.
         """
-        low, high, undecided = box.low, box.high, self.undecided(box.low, box.high)
-        lent = self._lent(low, high) if undecided.size else None
-        if lent is not None and lent.cost > lost:
-            lent = None
-        curvature = self._share.share(low, high, undecided, box.weights, lend=lent is not None)
-        stack = envelopes(self.problem, low, high, curvature.added)
-        found = self._minimised(box, curvature, lent, stack)
-        return self._examined(box, found, stack, curvature, lent)
+        curvature = self._curvature(box.low, box.high, box.weights)
+        stack = envelopes(self.problem, box.low, box.high, curvature.added)
+        return self._examined(box, self._minimised(box, curvature, stack), stack, curvature)
 
-    def _lent(self, low: Array, high: Array) -> _Lent | None:
-        """The curvature along rigid motions, with the intervals of their shares in a box."""
-        shapes, n = self._share.shapes, self.problem.size
-        if not shapes.size:
-            return None
-        ends = np.sort(np.stack([shapes * low[:n, None], shapes * high[:n, None]]), axis=0)
-        slack = LIMITS.rounding * np.abs(ends).sum(axis=(0, 1))
-        first, last = ends.sum(axis=1)
-        return _Lent(shapes=shapes, stiffness=self._share.lent, low=first - slack, high=last + slack)
-
-    def _minimised(self, box: Box, curvature: Curvature, lent: _Lent | None, stack: ArcTable) -> Optimum:
+    def _minimised(self, box: Box, curvature: Curvature, stack: ArcTable) -> Optimum:
         problem = self.problem
-        a, b, constant = problem.stiffness - np.diag(problem.diagonal(curvature.added)), problem.force, problem.constant
-        if lent is not None:
-            a, b, constant = a + lent.matrix, b + lent.force, constant + lent.constant
+        a, b = problem.stiffness - np.diag(problem.diagonal(curvature.added)), problem.force
         if len(problem.lengths):
             shut = curvature.added[problem.size :]
             programme = LengthProgramme(
@@ -124,10 +113,10 @@ class Relaxation:
             found = programme.bound(programme.minimiser(box.x))
         else:
             found = minimise(a, b, stack, box.x, self._cut)
-        return Optimum(x=found.x, bound=found.bound + constant)
+        return Optimum(x=found.x, bound=found.bound + problem.constant)
 
-    def _examined(self, box: Box, found: Optimum, stack: ArcTable, curvature: Curvature, lent: _Lent | None) -> Minimum:
-        """Where envelopes are not tight, and chords take something off."""
+    def _examined(self, box: Box, found: Optimum, stack: ArcTable, curvature: Curvature) -> Minimum:
+        """Where envelopes are not tight."""
         problem, x, at = self.problem, found.x, self.problem.arguments(found.x)
         tight = LIMITS.rounding * problem.energy_size(x)
         gaps = problem.arcs.energy(at) + 0.5 * curvature.added * at * at - stack.energy(at)
@@ -136,9 +125,6 @@ class Relaxation:
         begin, end = stack.around(at)
         spread = np.where(gaps > 0.0, 0.5 * (at - begin) * (end - at), 0.0)
         place, gap = self._place(i, float(begin[i]), float(end[i]), float(at[i])), float(gaps[i])
-        if lent is not None and (off := lent.gap(x)) > max(gap, tight):
-            i, gap = int(np.argmax(np.abs(lent.shapes).max(axis=1) * (box.high - box.low)[: problem.size])), off
-            place = 0.5 * float(box.low[i] + box.high[i])
         return Minimum(x=x, bound=found.bound, curvature=curvature, spread=spread, gap=gap, argument=i, place=place)
 
     def _place(self, i: int, begin: float, end: float, at: float) -> float:
@@ -147,99 +133,16 @@ class Relaxation:
         inside = joints[(joints > begin) & (joints < end)]
         return float(inside[np.argmin(np.abs(inside - at))]) if inside.size else at
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Lent:
-    """Curvature σ along the shapes of rigid motions, (n, k), less its chords over the intervals of their shares."""
-
-    shapes: Array
-    stiffness: float
-    low: Array
-    high: Array
-
-    @cached_property
-    def cost(self) -> float:
-        """What the chords take off at most."""
-        return float(self.stiffness * ((self.high - self.low) ** 2).sum() / 8.0)
-
-    @property
-    def matrix(self) -> Array:
-        """What is added to S, (n, n)."""
-        return np.asarray(self.stiffness * self.shapes @ self.shapes.T)
-
-    @property
-    def force(self) -> Array:
-        """What the chords add to f, (n,)."""
-        return np.asarray(self.shapes @ (self.stiffness * 0.5 * (self.low + self.high)))
-
-    @property
-    def constant(self) -> float:
-        """What the chords add to the energy, less its rounding."""
-        parts = 0.5 * self.stiffness * self.low * self.high
-        return float(parts.sum() - np.finfo(float).eps * len(self.shapes) * np.abs(parts).sum())
-
-    def gap(self, x: Array) -> float:
-        """What the chords take off at a point, (n,)."""
-        s = self.shapes.T @ x
-        return float(0.5 * self.stiffness * np.maximum((s - self.low) * (self.high - s), 0.0).sum())
-
-
-@dataclass(frozen=True, kw_only=True)
-class Curvature:
-    """The diagonal D of one box.
-
-    Attributes:
-        added: d, which is negative where the law's own slope is given to S, (n + m,).
-        radii: half widths (n + m,) of what strong convexity allows for a gap of ½; inf where a rigid motion moves.
-        range_radii: the same of displacements without rigid motions.
-    """
-
-    added: Array
-    radii: Array
-    range_radii: Array
-
-
-class CurvatureShare:
-    """Shares of the curvature of S.
-
-    Args:
-        problem: the problem.
-
-    Attributes:
-        lent: σ, as stiff as S.
-    """
-
-    def __init__(self, problem: ScalarProblem) -> None:
-        self._problem = problem
-        self.lent = float(np.trace(problem.stiffness)) / problem.size or 1.0
-
     @cached_property
     def kernel(self) -> Array:
         """Orthonormal columns that S maps to zero, (n, k)."""
-        values, vectors = np.linalg.eigh(self._problem.stiffness)
+        values, vectors = np.linalg.eigh(self.problem.stiffness)
         zero = LIMITS.zero * max(float(values[-1]), 0.0)
         return np.asarray(vectors[:, values <= zero])
 
-    @cached_property
-    def shapes(self) -> Array:
-        """Orthonormal columns: how rigid motions move the unknowns with laws, (n, k)."""
-        problem = self._problem
-        with_law = np.array([c != FREE for c in problem.chains[: problem.size]], dtype=np.bool_)
-        with_law[problem.lengths.members] = True
-        columns, sizes, _ = np.linalg.svd(np.where(with_law[:, None], self.kernel, 0.0), full_matrices=False)
-        return np.asarray(columns[:, sizes > LIMITS.accuracy])
-
-    def share(self, low: Array, high: Array, undecided: Integers, seen: Array, *, lend: bool = False) -> Curvature:
-        """D on a box.
-
-        Args:
-            low: of the box, (n + m,).
-            high: of the box, (n + m,).
-            undecided: arguments whose law is not convex on the box.
-            seen: where envelopes were not tight, (n + m,); all zero where nothing is known.
-            lend: whether curvature is lent along rigid motions.
-        """
-        problem = self._problem
+    def _curvature(self, low: Array, high: Array, seen: Array) -> Curvature:
+        """D on a box; ``seen``: where envelopes were not tight, (n + m,), all zero where nothing is known."""
+        problem, undecided = self.problem, self.undecided(low, high)
         slope, drops = problem.arcs.least_slope(low, high), problem.arcs.drops(low, high)
         own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
         own[problem.size :] = 0.0
@@ -249,8 +152,6 @@ class CurvatureShare:
         )
         need = np.where(drops > 0.0, np.inf, np.maximum(-slope, 0.0))
         matrix = problem.stiffness + np.diag(problem.diagonal(own))
-        if lend:
-            matrix += self.lent * self.shapes @ self.shapes.T
         free = self._free_motions(matrix)
         added = self._given(matrix, free, undecided, strength[undecided], need)
         radii = self._radii(self._inverse(matrix - np.diag(problem.diagonal(added)), free))
@@ -262,7 +163,7 @@ class CurvatureShare:
         fixed = self._moved(free)[undecided]
         left, weights = undecided[~fixed], np.maximum(weights[~fixed], 1e-12)
         while left.size:
-            inverse = self._inverse(matrix - np.diag(self._problem.diagonal(added)), free)
+            inverse = self._inverse(matrix - np.diag(self.problem.diagonal(added)), free)
             given = LIMITS.part / self._largest(inverse, left, weights) * weights
             enough = given >= need[left]
             if not enough.any():
@@ -274,17 +175,17 @@ class CurvatureShare:
 
     def _inverse(self, matrix: Array, motions: Array) -> Array:
         """The inverse of a matrix that is made regular along rigid motions."""
-        return np.asarray(np.linalg.inv(matrix + self.lent * motions @ motions.T), dtype=np.float64)
+        return np.asarray(np.linalg.inv(matrix + self._stiff * motions @ motions.T), dtype=np.float64)
 
     def _moved(self, motions: Array) -> Mask:
         """Which arguments a rigid motion moves, (n + m,)."""
-        lengths = self._problem.lengths
+        lengths = self.problem.lengths
         unknowns = np.any(np.abs(motions) > LIMITS.accuracy, axis=1)
         return np.concatenate([unknowns, np.any(unknowns[lengths.unknowns] & lengths.there, axis=1)])
 
     def _largest(self, inverse: Array, left: Integers, weights: Array) -> float:
         """The largest share θ has θ times this eigenvalue = 1: of S⁻¹ on the weighted components of some arguments."""
-        lengths, n = self._problem.lengths, self._problem.size
+        lengths, n = self.problem.lengths, self.problem.size
         vectors, q = left[left >= n] - n, np.sqrt(weights)
         there = lengths.there[vectors]
         rows = np.concatenate([left[left < n], lengths.unknowns[vectors][there]])
@@ -293,7 +194,7 @@ class CurvatureShare:
         return float(np.linalg.eigvalsh(scale[:, None] * inverse[np.ix_(rows, rows)] * scale)[-1])
 
     def _radii(self, inverse: Array) -> Array:
-        lengths = self._problem.lengths
+        lengths = self.problem.lengths
         blocks = inverse[lengths.unknowns[:, :, None], lengths.unknowns[:, None, :]]
         blocks = lengths.factors[:, :, None] * blocks * lengths.factors[:, None, :]
         squares = np.concatenate([np.diag(inverse), np.linalg.eigvalsh(blocks)[:, -1]])
@@ -305,4 +206,4 @@ class CurvatureShare:
         if not rigid.shape[1]:
             return rigid
         values, vectors = np.linalg.eigh(rigid.T @ along @ rigid)
-        return np.asarray(rigid @ vectors[:, values <= LIMITS.zero * self.lent])
+        return np.asarray(rigid @ vectors[:, values <= LIMITS.zero * self._stiff])
