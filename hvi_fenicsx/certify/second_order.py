@@ -191,7 +191,7 @@ class _Collector:
         near = term.reach(self.near[term.surface.blocks])
         x = _on_kink(term.law, term.argument(self.u), near)
         left, right = w * term.law.left(x), w * term.law.right(x)
-        before, after = (w / term.stretch * _second(term.law, x + step) for step in (-2 * near, 2 * near))
+        before, after = (w / term.stretch * term.law.derivatives(x + step)[1] for step in (-2 * near, 2 * near))
         ahead = sign > 0
         np.add.at(self.up, dofs, np.where(ahead, right, -left))
         np.add.at(self.down, dofs, np.where(ahead, -left, right))
@@ -216,7 +216,7 @@ class _Collector:
         left, right = np.where(moving, term.law.left(x), 0.0), term.law.right(x)
         force = np.einsum("m,mk,mkd->md", w * (left + right) / 2, unit, term.directions)
         across = np.where(moving, np.minimum(left, right) / size, np.inf)
-        sides = [_second(term.law, x + step) for step in (np.where(moving, -2, 2) * near, 2 * near)]
+        sides = [term.law.derivatives(x + step)[1] for step in (np.where(moving, -2, 2) * near, 2 * near)]
         curvature = w / term.stretch * np.minimum(np.minimum(*sides), across)
         touched = np.any(term.directions != 0.0, axis=1)
         dofs = term.surface.dofs
@@ -283,10 +283,6 @@ def _on_kink(law: Superpotential, x: Array, near: Array) -> Array:
         return x
     nearest = law.kinks[np.argmin(np.abs(x[:, None] - law.kinks), axis=1)]
     return np.where(np.abs(x - nearest) <= near, nearest, x)
-
-
-def _second(law: Superpotential, x: Array) -> Array:
-    return law.convex.second(x) - law.concave.second(x)
 
 
 _DIRECTIONS = 256

@@ -54,7 +54,7 @@ def needed_falls(state: LawState) -> Array | None:
     x = _on_breaks(graph, state.argument, state.near)
     falls: Array = np.zeros(len(x))
     energy, rounding = graph.primitive(x), DEFAULT.near * state.scale
-    for arc in (a for a in graph.arcs() if not state.term.radial or a.low >= 0.0):
+    for arc in (a for a in map(Arc._make, graph.table.tolist()) if not state.term.radial or a.low >= 0.0):
         falls = np.maximum(falls, _needed(arc, x, energy, traction, rounding))
     falls[falls <= DEFAULT.near * float(np.max(np.abs(graph.slopes)))] = 0.0
     falls /= state.term.stretch

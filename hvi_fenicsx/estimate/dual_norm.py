@@ -134,7 +134,7 @@ def _rising(comm: MPI.Comm, term: LawTerm, u: Array) -> Array:
     """The rising part of a law's tangent; where it is flat everywhere, a foundation in its place. Collective."""
     argument = term.argument(u)
     convex = term.law.convex
-    second = np.maximum(convex.second(argument) - term.law.concave.second(argument), 0.0)
+    second = np.maximum(term.law.derivatives(argument)[1], 0.0)
     if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
         second = np.full_like(second, SYSTEM.foundation)
         return term.rate(u, second * argument * term.stretch, second * term.stretch)

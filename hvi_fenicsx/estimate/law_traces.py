@@ -202,7 +202,7 @@ class LawTraces:
         solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
         flat, length = slip.reshape(-1, slip.shape[2]), law.term.length
         argument = flat[:, 0] if length is None else length.of(flat)
-        second = np.maximum(asked.convex.second(argument) - asked.concave.second(argument), 0.0)
+        second = np.maximum(asked.derivatives(argument)[1], 0.0)
         rates = second[:, None]
         if length is not None:  # alike along and across the displacement
             rates = np.einsum("mkk->mk", length.hessian(flat, second * argument, second))

@@ -71,8 +71,8 @@ def _yielding(problem: Problem, part: str, states: Sequence[ContactState]) -> tu
             weights = np.where(law.on_convex_kink(), 0.0, state.surface.weights)
             vectors = np.einsum("mk,mkd->md", law.carried, law.term.directions)
             np.subtract.at(forces, state.surface.blocks, weights[:, None] * vectors)
-            rising = law.term.law.convex.second(law.argument) - law.term.law.concave.second(law.argument)
-            rising = weights * law.term.multiplier * np.maximum(rising, 0.0) / law.term.stretch
+            rising = np.maximum(law.term.law.derivatives(law.argument)[1], 0.0)
+            rising *= weights * law.term.multiplier / law.term.stretch
             np.add.at(rates, state.surface.blocks, rising[:, None] * np.sum(law.term.directions**2, axis=1))
     return forces, rates
 

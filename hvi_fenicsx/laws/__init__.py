@@ -1,7 +1,7 @@
 """Nonmonotone laws: superpotentials as objects, the catalogue, and base classes of your own laws (docs/laws.md)."""
 
 from ..class_registry import load_modules
-from .base import ConvexPart, DifferentiablePart, Directional, LawThresholds, Superpotential
+from .base import ConvexPart, DifferentiablePart, Directional, Superpotential
 from .catalogue import (
     Exponential,
     Graph,
@@ -13,7 +13,7 @@ from .catalogue import (
     WeakeningLaw,
 )
 from .lengths import BenzeggaghKenane, Length, Mixity, PowerLaw, mixities
-from .polyline import PolylineLaw, PolylinePart, SampledLaw, sample_traction
+from .polyline import PolylineLaw, PolylinePart, SampledLaw
 from .registry import available, create, describe
 from .traction_graph import TractionGraph
 from .vertex_laws import VertexLaws

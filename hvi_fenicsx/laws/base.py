@@ -442,7 +442,7 @@ class ScaledLaw(Superpotential, register=False):
         return self.law.piece(x * self.length)
 
 
-def extremes(law: Superpotential, thresholds: LawThresholds = DEFAULT) -> tuple[Directional, float]:
+def extremes(law: Superpotential) -> tuple[Directional, float]:
     """The largest resistance and c4 of a law known only by its split j = H - G: bounds from above by bisection.
 
     On an interval (a, b) the traction j' = H' - G' lies in [H'(a+) - G'(b-), H'(b-) - G'(a+)], since H' and G'
@@ -451,41 +451,32 @@ def extremes(law: Superpotential, thresholds: LawThresholds = DEFAULT) -> tuple[
 
     Args:
         law: by its split.
-        thresholds: how sharp, and how far out.
     """
-    unit, kinks = law.length_scale, np.abs(law.kinks)
-    ends = thresholds.resolution * unit, thresholds.resolution**-2 * max(unit, 1.0, *kinks)
-    ahead = np.unique(np.concatenate([[0.0], kinks, np.geomspace(*ends, thresholds.samples)]))
+    unit, kinks, parts = law.length_scale, np.abs(law.kinks), (law.convex, law.concave)
+    ends = DEFAULT.resolution * unit, DEFAULT.resolution**-2 * max(unit, 1.0, *kinks)
+    ahead = np.unique(np.concatenate([[0.0], kinks, np.geomspace(*ends, DEFAULT.samples)]))
     (low,), (high,) = law.interval(np.zeros(1))
-    plus, against = (_supremum(law, ahead, sign, thresholds) for sign in (1.0, -1.0))
-    along, minus = (_supremum(law, -ahead[::-1], sign, thresholds) for sign in (1.0, -1.0))
+    plus, against = _supremum(*parts, ahead), _supremum(*parts[::-1], ahead)
+    along, minus = _supremum(*parts, -ahead[::-1]), _supremum(*parts[::-1], -ahead[::-1])
     peak = Directional(max(law.growth.minus, -low, against, minus), max(law.growth.plus, high, plus, along))
     return peak, max(0.0, against, along)
 
 
-def _supremum(law: Superpotential, grid: Array, sign: float, thresholds: LawThresholds) -> float:
-    """A bound from above of the traction, times a sign, over the range of the grid but for 0."""
-    a, b, off = grid[:-1], grid[1:], grid[grid != 0.0]
-    best = _sample(law, off, sign)
-    tolerance = thresholds.resolution * max(abs(best), float(np.abs(law.interval(off)).max()))
-    while (undecided := (bound := _bound(law, a, b, sign)) > best + tolerance).any():
+def _supremum(up: ConvexPart, down: ConvexPart, grid: Array) -> float:
+    """A bound from above of the derivative of one part less another, over the range of the grid but for 0."""
+
+    def sampled(x: Array) -> Array:
+        return np.stack([up.left(x) - down.left(x), up.right(x) - down.right(x)])
+
+    a, b, values = grid[:-1], grid[1:], sampled(grid[grid != 0.0])
+    best, tolerance = float(values.max()), DEFAULT.resolution * float(np.abs(values).max())
+    while (undecided := (bound := up.left(b) - down.right(a)) > best + tolerance).any():
         a, b = a[undecided], b[undecided]
         middle = 0.5 * (a + b)
-        if a.size > thresholds.samples**2 or np.any((middle == a) | (middle == b)):
+        if a.size > DEFAULT.samples**2 or np.any((middle == a) | (middle == b)):
             break
-        best = max(best, _sample(law, middle, sign))
+        best = max(best, float(sampled(middle).max()))
         a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
     if undecided.any():
         return float(bound.max())
     return best + tolerance if best > 0 else best
-
-
-def _sample(law: Superpotential, x: Array, sign: float) -> float:
-    return float((sign * np.stack(law.interval(x))).max())
-
-
-def _bound(law: Superpotential, a: Array, b: Array, sign: float) -> Array:
-    """A bound of the traction, times a sign, on the open intervals (a, b)."""
-    if sign > 0.0:
-        return law.convex.left(b) - law.concave.right(a)
-    return law.concave.left(b) - law.convex.right(a)

@@ -5,8 +5,6 @@ Displacements in m, tractions in N/m² (or any consistent units); `name` is the 
 
 from __future__ import annotations
 
-import itertools
-import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -185,44 +183,30 @@ class Graph(PolylineLaw):
 
 def _checked_points(owner: str, points: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
     """The points as pairs of floats; InputError where they are not the graph of a law."""
-    if isinstance(points, str) or not isinstance(points, Sequence | np.ndarray):
-        raise InputError(f"{owner}: points = {points!r} is not a list of pairs [displacement, traction]")
-    for point in points:
-        if isinstance(point, str) or not isinstance(point, Sequence | np.ndarray) or len(point) != 2:
-            raise InputError(f"{owner}: point {point!r} is not a pair [displacement, traction]")
-        require_number(owner, displacement=point[0], traction=point[1])
-    pairs = tuple((float(x), float(t)) for x, t in points)
-    if not pairs or pairs[0][0] != 0.0:
+    try:
+        pairs = tuple((x, t) for x, t in points)
+    except (TypeError, ValueError):
+        raise InputError(f"{owner}: points = {points!r} is not a list of pairs [displacement, traction]") from None
+    for x, t in pairs:
+        require_number(owner, displacement=x, traction=t)
+    table = np.array(pairs, dtype=float).reshape(-1, 2)
+    places, tractions = table.T
+    if not pairs or places[0] != 0.0:
         raise InputError(f"{owner}: the first point must have the displacement 0, for example [0, 0]")
-    for before, after in itertools.pairwise(pairs):
-        _check_segment(owner, before, after)
-    _check_jumps(owner, pairs)
-    return pairs
-
-
-def _check_segment(owner: str, before: tuple[float, float], after: tuple[float, float]) -> None:
-    step = after[0] - before[0]
-    if step < 0.0:
-        raise InputError(f"{owner}: the displacement falls from {before[0]!r} to {after[0]!r}; order the points")
-    if step > 0.0 and not math.isfinite((after[1] - before[1]) / step):
-        raise InputError(
-            f"{owner}: the segment from {before!r} to {after!r} is too steep for a float; "
-            f"make it vertical, which is a jump"
-        )
-
-
-def _check_jumps(owner: str, pairs: tuple[tuple[float, float], ...]) -> None:
-    for first, _, third in zip(pairs, pairs[1:], pairs[2:], strict=False):
-        if first[0] == third[0]:
-            raise InputError(
-                f"{owner}: three points at the displacement {first[0]!r}; a jump has two ends, "
-                f"leave out the one in between"
-            )
-    if len(pairs) > 1 and pairs[1][0] == 0.0 and pairs[0][1] != 0.0:
-        raise InputError(
-            f"{owner}: two points at the displacement 0, the first with traction {pairs[0][1]!r}; "
-            f"a jump at 0 starts at [0, 0]"
-        )
+    steps, rises = np.diff(places), np.diff(tractions)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        steep = (steps > 0.0) & ~np.isfinite(rises / steps)
+    jumps = steps == 0.0
+    for wrong, why in (
+        (steps < 0.0, "the displacement falls; order the points"),
+        (steep, "the segment is too steep for a float; make it vertical, which is a jump"),
+        (jumps & np.append(jumps[1:], False), "three points at one displacement; leave out the one in between"),
+        (jumps & (places[:-1] == 0.0) & (tractions[:-1] != 0.0), "a jump at the displacement 0 starts at [0, 0]"),
+    ):
+        if np.any(wrong):
+            i = int(np.argmax(wrong))
+            raise InputError(f"{owner}: from {list(pairs[i])} to {list(pairs[i + 1])}: {why}")
+    return tuple((float(x), float(t)) for x, t in pairs)
 
 
 @dataclass(frozen=True)

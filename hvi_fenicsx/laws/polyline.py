@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -245,7 +244,7 @@ class SampledLaw(PolylineLaw):
 
     @override
     def build(self) -> TractionGraph:
-        return TractionGraph.from_points(sample_traction(self.traction, self.ends(), self.samples), self.one_sided)
+        return TractionGraph.from_points(_sampled(self.traction, self.ends(), self.samples), self.one_sided)
 
     def piece(self, x: Array) -> Integers:
         """Number (m,) of ends between 0 and x."""
@@ -259,43 +258,20 @@ class SampledLaw(PolylineLaw):
         return np.asarray(self.ends(), dtype=np.float64)
 
 
-def sample_traction(
-    traction: Callable[[Array], Array], ends: Sequence[float], samples: int = 200
-) -> tuple[tuple[float, float], ...]:
-    """Points (displacement, traction) of a graph law from a function.
-
-    Args:
-        traction: the traction (m,) at displacements (m,) > 0, smooth between 0 and the ends.
-        ends: ascending, > 0.
-        samples: intervals between two ends.
-
-    Raises:
-        InputError: ends or samples are of no use, or a traction is not finite.
-    """
+def _sampled(traction: Callable[[Array], Array], ends: Sequence[float], samples: int) -> Array:
+    """Points (displacement, traction) of the pieces between 0 and the ends, (k, 2); at a jump there are two."""
     stops = np.append(0.0, np.asarray(ends, dtype=float))
-    if stops.size < 2 or not np.all(np.isfinite(stops)) or np.any(np.diff(stops) <= 0.0) or samples < 1:
-        raise InputError(
-            f"ends = {list(ends)!r}, samples = {samples!r}: give ascending finite ends > 0 and samples >= 1"
-        )
-    pieces = [_sample_piece(traction, a, b, samples) for a, b in itertools.pairwise(stops)]
-    size = max(float(np.abs(t).max()) for _, t in pieces)
-    points = [(0.0, float(pieces[0][1][0]) if abs(pieces[0][1][0]) > DEFAULT.resolution * size else 0.0)]
-    for (x, t), follower in zip(pieces, [*pieces[1:], None], strict=True):
-        points += [(float(a), float(b)) for a, b in zip(x[1:], t[1:], strict=True)]
-        if follower is not None and abs(follower[1][0] - t[-1]) > DEFAULT.resolution * size:
-            points.append((float(x[-1]), float(follower[1][0])))
-    return tuple(points)
-
-
-def _sample_piece(traction: Callable[[Array], Array], a: float, b: float, samples: int) -> tuple[Array, Array]:
-    """Abscissae and tractions of a piece; at its ends those just inside, for the one-sided limits."""
-    x: Array = np.linspace(a, b, samples + 1, dtype=np.float64)
-    inside = x.copy()
-    inside[0], inside[-1] = np.nextafter(a, b), np.nextafter(b, a)
-    values = np.asarray(traction(inside), dtype=np.float64)
-    if values.shape != x.shape or not np.all(np.isfinite(values)):
-        raise InputError(
-            f"the traction function must return one finite value for each displacement; between {a!r} and "
-            f"{b!r} it returned {values!r}"
-        )
-    return x, values
+    if stops.size < 2 or not np.all(np.isfinite(stops)) or np.any(np.diff(stops) <= 0.0):
+        raise InputError(f"ends = {list(ends)!r}: give ascending finite ends > 0")
+    x = np.linspace(stops[:-1], stops[1:], samples + 1, axis=1)
+    inside = x.copy()  # at the ends of pieces the one-sided limits
+    inside[:, 0], inside[:, -1] = np.nextafter(x[:, 0], x[:, -1]), np.nextafter(x[:, -1], x[:, 0])
+    values = np.asarray(traction(inside.ravel()), dtype=np.float64)
+    if values.shape != (x.size,) or not np.all(np.isfinite(values)):
+        raise InputError(f"the traction function must return one finite value for each displacement, not {values!r}")
+    values, kept = values.reshape(x.shape), np.ones(x.shape, dtype=bool)
+    before = np.append(0.0, values[:-1, -1])
+    joined = np.abs(values[:, 0] - before) <= DEFAULT.resolution * np.max(np.abs(values))
+    values[0, 0] *= not joined[0]
+    kept[1:, 0] = ~joined[1:]
+    return np.column_stack([x[kept], values[kept]])

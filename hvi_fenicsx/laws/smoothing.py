@@ -22,7 +22,6 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -34,6 +33,7 @@ from ..typing import Array, Integers
 from .base import ConvexPart, DifferentiablePart, Directional, Superpotential, quotient
 from .catalogue import QuadraticLinear
 from .polyline import PolylinePart
+from .registry import require_positive
 from .traction_graph import TractionGraph
 
 _LARGEST = float(np.finfo(np.float64).max)
@@ -80,17 +80,13 @@ class Smoothing(ABC):
         Raises:
             InputError: as for :meth:`smooth`.
         """
-        return self.smooth(law, _width("epsilon", epsilon) * law.energy_scale)
+        require_positive("smoothing", epsilon=epsilon)
+        return self.smooth(law, epsilon * law.energy_scale)
 
 
 def registered() -> dict[str, type[Smoothing]]:
     """All smoothings by their names, sorted; the user's own among them."""
     return dict(sorted(_REGISTRY.items()))
-
-
-def available() -> tuple[str, ...]:
-    """Names of all smoothings, the user's own among them."""
-    return tuple(registered())
 
 
 def create(
@@ -110,26 +106,15 @@ def create(
     """
     kind = registered().get(name)
     if kind is None:
-        names = available()
-        raise InputError(f"unknown smoothing {name!r}{hint(name, names)}; available: {', '.join(names)}")
+        raise InputError(f"unknown smoothing {name!r}{hint(name, registered())}; available: {', '.join(registered())}")
     if epsilon is not None and epsilon_absolute is None:
         return kind().relative(law, epsilon)
     if epsilon_absolute is not None and epsilon is None:
-        return kind().smooth(law, _width("epsilon_absolute", epsilon_absolute))
+        return kind().smooth(law, epsilon_absolute)
     raise InputError(
         "smoothing: give either epsilon (relative to the law's energy scale, for example 0.01) "
         "or epsilon_absolute (in N/m)"
     )
-
-
-def _width(key: str, epsilon: Any) -> float:
-    """A width ε; refused where it is no finite number > 0."""
-    if isinstance(epsilon, bool) or not isinstance(epsilon, Real) or not 0.0 < float(epsilon) <= _LARGEST:
-        raise InputError(
-            f"smoothing: {key} = {epsilon!r} must be a finite number > 0; "
-            f"for the unsmoothed law leave smoothing and {key} away"
-        )
-    return float(epsilon)
 
 
 @dataclass(frozen=True)
@@ -140,12 +125,7 @@ class SmoothedLaw(Superpotential, register=False):
     epsilon_absolute: float
 
     def __post_init__(self) -> None:
-        _width("epsilon_absolute", self.epsilon_absolute)
-
-    @property
-    @abstractmethod
-    def bound(self) -> float:
-        """Bound of |S - j|, N/m."""
+        require_positive("smoothing", epsilon_absolute=self.epsilon_absolute)
 
     @property
     @override
@@ -174,15 +154,13 @@ class SmoothedLaw(Superpotential, register=False):
 
 @dataclass(frozen=True)
 class PlusFunction(Smoothing):
-    """One smoothing of max(t, 0), and of laws by it: a subclass gives a name, κ and the profile.
+    """One smoothing of max(t, 0), and of laws by it: a subclass gives a name and the profile.
 
     Class attributes:
-        kappa: the constant of |p(t; e) - max(t, 0)| ≤ κ e; it is attained at t = 0.
         bands: distances |t|/e between which D changes little in shape; beyond the last one it is next to nothing.
         parabolic: whether D is a parabola up to the only band, and zero beyond it.
     """
 
-    kappa: ClassVar[float]
     bands: ClassVar[tuple[float, ...]] = (1.0, 4.0, 16.0, 64.0)
     parabolic: ClassVar[bool] = False
 
@@ -258,16 +236,6 @@ class PlusSmoothedLaw(SmoothedLaw, register=False):
     name = "smoothed"
     plus: PlusFunction
 
-    @property
-    @override
-    def bound(self) -> float:
-        """Bound of |S - j|, N/m: κ ε times the number of upward or of downward jumps, whichever is larger.
-
-        Upward ones only raise the energy and downward ones only lower it, so the two do not add.
-        """
-        kinks = max(self.law.convex.kinks.size, self.law.concave.kinks.size)
-        return self.plus.kappa * self.epsilon_absolute * kinks
-
     @override
     @cached_property
     def breaks(self) -> Array:
@@ -332,7 +300,6 @@ class Quadratic(PlusFunction):
     """
 
     name = "quadratic"
-    kappa = 1.0 / 8.0
     bands = (0.5,)
     parabolic = True
 
@@ -350,7 +317,6 @@ class Chks(PlusFunction):
     """
 
     name = "chks"
-    kappa = 1.0
 
     @override
     def profile(self, z: Array) -> tuple[Array, Array, Array]:
@@ -368,7 +334,6 @@ class LogExp(PlusFunction):
     """
 
     name = "log_exp"
-    kappa = math.log(2.0)
     bands = (2.0, 8.0, 32.0)
 
     @override
@@ -407,12 +372,6 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
 
     name = "paper_smoothing"
     law: QuadraticLinear
-
-    @property
-    @override
-    def bound(self) -> float:
-        """Bound of |S + j|, N/m: ε/8, attained at x = 0 and δ."""
-        return QUADRATIC.kappa * self.epsilon_absolute
 
     @override
     def value(self, x: Array) -> Array:

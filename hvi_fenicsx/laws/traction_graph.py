@@ -5,12 +5,12 @@ The rows of a table have their breaks at 0 in one column; a row with fewer break
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, TypeVar, cast
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from ..typing import Array, Integers, Mask
 
@@ -54,7 +54,7 @@ class TractionGraph:
     slopes: Array
 
     @staticmethod
-    def from_points(points: Sequence[Sequence[float]], one_sided: bool = False) -> TractionGraph:
+    def from_points(points: npt.ArrayLike, one_sided: bool = False) -> TractionGraph:
         """Graph through points (displacement, traction) from displacement 0 on, constant after the last one.
 
         Args:
@@ -136,9 +136,9 @@ class TractionGraph:
     def _beyond(self, end: Array, traction: Array) -> _HalfLine:
         """The half-line x ≥ 0: up to the end a secant, then the graph, (m, k + 1)."""
         places, near, far, after = self._ahead
-        been, at_end = end > 0.0, np.where(end > 0.0, end, np.inf)
+        been, start = end > 0.0, np.where(end > 0.0, end, 0.0)
         secant = np.divide(traction, end, out=np.zeros_like(end), where=been)
-        there = self.traction(np.where(been, end, 0.0), "right"), self._after(np.where(been, end, 0.0))
+        there = self.traction(start, "right"), _taken(self.slopes, self._pieces(start)[1])
         first = (
             np.zeros_like(end),
             np.zeros_like(end),
@@ -146,8 +146,10 @@ class TractionGraph:
             np.where(been, secant, after[:, 0]),
         )
         rest = np.where(places[:, 1:] > end[:, None], places[:, 1:], np.inf), near[:, 1:], far[:, 1:], after[:, 1:]
-        columns = zip(first, (at_end, traction, *there), rest, strict=True)
-        return _HalfLine(*(np.column_stack(column) for column in columns)).ordered()
+        columns = zip(first, (np.where(been, end, np.inf), traction, *there), rest, strict=True)
+        found = [np.column_stack(column) for column in columns]
+        order = np.argsort(found[0], axis=1, kind="stable")  # breaks that are left out, at inf, last
+        return _HalfLine(*(np.take_along_axis(part, order, axis=1) for part in found))
 
     def row(self, i: int) -> TractionGraph:
         """The graph of one vertex.
@@ -207,22 +209,7 @@ class TractionGraph:
             x: displacements (m,).
             side: "left" or "right".
         """
-        return self._limit(x, *self._pieces(x), side)
-
-    def _pieces(self, x: Array) -> tuple[Integers, Integers]:
-        """The pieces before and behind x, (m,) each; off the breaks they are one."""
-        if self.breaks.ndim == 1:
-            return self.breaks.searchsorted(x), self.breaks.searchsorted(x, side="right")
-        return np.sum(self.breaks < x[:, None], axis=1), np.sum(self.breaks <= x[:, None], axis=1)
-
-    def _steeper(self, before: Integers, behind: Integers) -> Array:
-        return np.asarray(np.maximum(_taken(self.slopes, before), _taken(self.slopes, behind)))
-
-    def _after(self, x: Array) -> Array:
-        """Slope right of x, (m,)."""
-        return _taken(self.slopes, self._pieces(x)[1])
-
-    def _limit(self, x: Array, next_break: Integers, passed: Integers, side: str) -> Array:
+        next_break, passed = self._pieces(x)
         piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
         with np.errstate(over="ignore"):
             distance = x - _taken(self.breaks, self._anchor[piece])
@@ -230,9 +217,16 @@ class TractionGraph:
         last = limits.shape[-1] - 1
         return np.where(passed > next_break, _taken(limits, np.minimum(next_break, last)), inside)
 
+    def _pieces(self, x: Array) -> tuple[Integers, Integers]:
+        """The pieces before and behind x, (m,) each; off the breaks they are one."""
+        if self.breaks.ndim == 1:
+            return self.breaks.searchsorted(x), self.breaks.searchsorted(x, side="right")
+        return np.sum(self.breaks < x[:, None], axis=1), np.sum(self.breaks <= x[:, None], axis=1)
+
     def slope(self, x: Array) -> Array:
         """Slope (m,) at x; at a break the larger of the two."""
-        return self._steeper(*self._pieces(x))
+        before, behind = self._pieces(x)
+        return np.maximum(_taken(self.slopes, before), _taken(self.slopes, behind))
 
     def primitive(self, x: Array) -> Array:
         """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""
@@ -245,13 +239,9 @@ class TractionGraph:
         with np.errstate(over="ignore"):
             return np.asarray(_taken(self._energy, anchor) + (start + half * d) * d)
 
-    def arcs(self) -> Iterator[Arc]:
-        """The pieces of the primitive."""
-        yield from map(Arc._make, cast("list[list[float]]", self.table.tolist()))
-
     @cached_property
     def table(self) -> Array:
-        """The same as an array, (k+1, 6)."""
+        """The pieces of the primitive as rows of an :class:`Arc`, (k+1, 6)."""
         ends = np.concatenate([[-np.inf], self.breaks, [np.inf]])
         anchors = self.breaks[self._anchor]
         columns = (ends[:-1], ends[1:], anchors, self.primitive(anchors), self._start, self.slopes)
@@ -277,11 +267,6 @@ class _HalfLine(NamedTuple):
     near: Array
     far: Array
     after: Array
-
-    def ordered(self) -> _HalfLine:
-        """The same with breaks that are left out, at inf, last."""
-        order = np.argsort(self.places, axis=1, kind="stable")
-        return _HalfLine(*(np.take_along_axis(part, order, axis=1) for part in self))
 
 
 def _joined(behind: _HalfLine, ahead: _HalfLine) -> TractionGraph:

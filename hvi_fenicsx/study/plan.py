@@ -155,7 +155,7 @@ def _default(scene: Model) -> Iterator[Values]:
     yield {**meshes, **widths}
     if scene.laws():
         yield {"epsilon": ("1", "0.001")}
-        yield {**widths, "smoothing": smoothing.available()}
+        yield {**widths, "smoothing": tuple(smoothing.registered())}
     yield {"method": method.available()}
     yield {**exact, "tolerance": ("1e-4", "1e-10")}
     yield {**exact, "linear_solver": ("lu", "gamg")}

@@ -85,7 +85,7 @@ def test_error_and_decay_of_the_plus_functions(plus: PlusFunction, t: float, e: 
         slope = plus.derivative(np.array([t]), e)[0]
         assert np.isfinite(profiles(plus, t, e)[1] / e)
     rounding = 1e-15 * abs(t)
-    assert -rounding <= error <= plus.kappa * e * (1 + 1e-12) + rounding
+    assert -rounding <= error <= profiles(plus, 0.0, e)[0] * e * (1 + 1e-12) + rounding
     assert 0.0 <= slope <= 1.0
     z = abs(t) / e
     decay = {
@@ -106,7 +106,8 @@ def test_error_bound_at_random(law: Superpotential, plus: PlusFunction, exponent
     smooth = plus.relative(law, 10.0**exponent)
     x = np.append(place * law.length_scale, law.kinks + place * 10.0**exponent * law.length_scale)
     error = np.abs(smooth.value(x) - law.value(x))
-    assert np.all(error <= smooth.bound * (1 + 1e-12) + 1e-15 * np.abs(law.value(x)))
+    bound = profiles(plus, 0.0, 1.0)[0] * smooth.epsilon_absolute * max(law.convex.kinks.size, law.concave.kinks.size)
+    assert np.all(error <= bound * (1 + 1e-12) + 1e-15 * np.abs(law.value(x)))
 
 
 @each_law
@@ -193,7 +194,7 @@ def test_papers_smoothing_is_the_papers_formula(epsilon: float) -> None:
     x = np.linspace(-4 * DELTA, 4 * DELTA, 2001)
     expected = -np.array([papers_s(float(v), epsilon) for v in x])
     np.testing.assert_allclose(law.value(x), expected, rtol=1e-10, atol=1e-12 * law.energy_scale)
-    assert np.all(np.abs(law.value(x) - MODEL.value(x)) <= law.bound * (1 + 1e-12) + 1e-16)
+    assert np.all(np.abs(law.value(x) - MODEL.value(x)) <= epsilon / 8 * (1 + 1e-12) + 1e-16)
     h = 1e-6 * DELTA
     away = np.abs(x) > 2 * h
     quotient = (law.value(x + h) - law.value(x - h)) / (2 * h)
