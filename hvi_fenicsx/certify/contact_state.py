@@ -267,7 +267,7 @@ class LawState:
         """
         term, kink = self.term, self.on_convex_kink()
         low, high = term.law.interval(self.argument)
-        second = term.law.convex.second(self.argument) - term.law.concave.second(self.argument)
+        second = term.law.derivatives(self.argument)[1]
         first, second = (np.where(kink, 0.0, values) for values in ((low + high) / 2, second / term.stretch))
         if term.length is None:
             return np.abs(second) * digits[:, 0]

@@ -10,9 +10,9 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import basix
 import basix.ufl
@@ -29,58 +29,23 @@ from ..problem.vectors import nodal
 from ..runtime import forms
 from ..typing import Array, Entities
 
-
-@dataclass(frozen=True)
-class BlockForces:
-    """Forces at some blocks of a space, zero at all others.
-
-    Attributes:
-        blocks: local numbers, ascending, each once, (k,).
-        values: the forces, (k, d).
-    """
-
-    blocks: Entities
-    values: Array
-
-    def __sub__(self, other: BlockForces) -> BlockForces:
-        return summed([(self.blocks, self.values), (other.blocks, -other.values)], self.values.shape[1])
-
-    def everywhere(self, count: int) -> Array:
-        """The forces at all of the first blocks, (count, d)."""
-        found = np.zeros((count, self.values.shape[1]))
-        found[self.blocks] = self.values
-        return found
+LocalForces = tuple[npt.NDArray[np.integer], Array]
+"""Local blocks of a space in any order, also several times, (k,), and the forces there, (k, d)."""
 
 
-def summed(parts: Sequence[tuple[npt.NDArray[np.integer], Array]], dimension: int) -> BlockForces:
-    """The sum of forces.
-
-    Args:
-        parts: blocks in any order, also several times, (k,), with the forces there, (k, d).
-        dimension: d.
-    """
-    every = np.concatenate([np.empty(0, np.int32), *(blocks for blocks, _ in parts)])
-    blocks, numbers = np.unique(every, return_inverse=True)
-    values = np.zeros((len(blocks), dimension))
-    np.add.at(values, numbers, np.concatenate([np.empty((0, dimension)), *(forces for _, forces in parts)]))
-    return BlockForces(blocks.astype(np.int32), values)
-
-
-def gathered(space: fem.FunctionSpace, forces: BlockForces) -> BlockForces:
-    """What all ranks give, at the owned blocks. Collective.
+def collected(space: fem.FunctionSpace, parts: Iterable[LocalForces]) -> Array:
+    """The sum of forces of all ranks at the owned blocks, (n, d). Collective.
 
     Args:
         space: of the blocks.
-        forces: of this rank, at owned blocks and ghosts.
+        parts: of this rank, at owned blocks and ghosts.
     """
-    if space.mesh.comm.size == 1:
-        return forces
-    field, owned = fem.Function(space), space.dofmap.index_map.size_local
-    everywhere = field.x.array.reshape(-1, forces.values.shape[1])
-    everywhere[forces.blocks] = forces.values
+    field = fem.Function(space)
+    forces = field.x.array.reshape(-1, space.dofmap.index_map_bs)
+    for blocks, values in parts:
+        np.add.at(forces, blocks, values)
     field.x.scatter_reverse(la.InsertMode.add)
-    blocks = np.flatnonzero(np.any(everywhere[:owned], axis=1)).astype(np.int32)
-    return BlockForces(blocks, everywhere[blocks])
+    return np.array(forces[: space.dofmap.index_map.size_local])
 
 
 Index = tuple[int, ...]
@@ -141,29 +106,18 @@ def _by_entity(degree: int, cell: str) -> list[list[list[Index]]]:
     return [[indices(degree, corners, len(topology)) for corners in entities] for entities in topology]
 
 
-def shape(index: Index, barycentric: Array) -> Array:
-    """The values of a bubble at points, (q,).
+def shape(index: Index, barycentric: Array, by: int | None = None) -> Array:
+    """The values of a bubble at points, or of its derivative by one of the barycentric coordinates, (q,).
 
     Args:
         index: of the bubble.
         barycentric: the points, (q, corners).
-    """
-    factors = (_factor(order, sum(index))(barycentric[:, corner]) for corner, order in enumerate(index))
-    return np.asarray(functools.reduce(np.multiply, factors))
-
-
-def slope(index: Index, corner: int, barycentric: Array) -> Array:
-    """The derivative of a bubble by one of the barycentric coordinates at points, (q,).
-
-    Args:
-        index: of the bubble.
-        corner: number of the coordinate.
-        barycentric: the points, (q, corners).
+        by: number of the coordinate.
     """
     factors = [_factor(order, sum(index)) for order in index]
-    factors[corner] = factors[corner].deriv()
-    values = (factor(barycentric[:, i]) for i, factor in enumerate(factors))
-    return np.asarray(functools.reduce(np.multiply, values))
+    if by is not None:
+        factors[by] = factors[by].deriv()
+    return np.prod([factor(barycentric[:, i]) for i, factor in enumerate(factors)], axis=0)
 
 
 @functools.cache
@@ -230,30 +184,6 @@ _WEAK = 0.05
 """Springs below this part of a bubble's own stiffness need not hold it."""
 
 
-class Held(Protocol):
-    """What holds bubbles at some blocks, as the bounds of a part do."""
-
-    def project(self, r: Array) -> None:
-        """Take out of r (n, d) what is held, in place."""
-        ...
-
-
-class Springs(Protocol):
-    """What holds bubbles elastically, as laws do."""
-
-    def diagonal(self) -> BlockForces:
-        """Forces for a unit of each bubble, at the owned blocks. Collective."""
-        ...
-
-    def times(self, e: fem.Function) -> BlockForces:
-        """Forces of bubbles, at the owned blocks. Collective.
-
-        Args:
-            e: the bubbles, ghosts updated.
-        """
-        ...
-
-
 class BubbleStiffness:
     """The elastic stiffness of the bubbles, nondimensional: its products and its diagonal. Creation is collective.
 
@@ -264,33 +194,34 @@ class BubbleStiffness:
         problem: whose elastic operator it is.
         space: the bubbles.
         comm: the ranks.
+        inverse: that of the diagonal, (n, d).
     """
 
     def __init__(self, problem: Problem, bubbles: fem.FunctionSpace) -> None:
         self.problem, self.space = problem, bubbles
         self.comm: MPI.Comm = bubbles.mesh.comm
-        self._inverse = diagonal(problem, bubbles)  # first: the vectors take the memory that it frees
-        np.reciprocal(self._inverse, out=self._inverse)
+        self.inverse = diagonal(problem, bubbles)  # first: the vectors take the memory that it frees
+        np.reciprocal(self.inverse, out=self.inverse)
         self._in, self._out = fem.Function(bubbles), fem.Function(bubbles)
         self._action = forms.compiled(problem.bulk.between(self._in, ufl.TestFunction(bubbles)))
-        self._springs: Springs | None = None
-        self._sprung: tuple[Entities, Array] = np.empty(0, np.int32), np.empty((0, self._inverse.shape[1]))
+        self._springs: Callable[[fem.Function], Array] | None = None
+        self._sprung: tuple[Entities, Array] = np.empty(0, np.int32), np.empty((0, self.inverse.shape[1]))
 
-    def hold(self, springs: Springs) -> bool:
+    def hold(self, rates: Array, springs: Callable[[fem.Function], Array]) -> bool:
         """Add springs to the stiffness, in the place of those before; say whether there are strong ones. Collective.
 
         Args:
-            springs: none are added where all are weaker than a twentieth of the bubbles that they hold.
+            rates: forces for a unit of each bubble, (n, d). None are added where all are weaker than a twentieth of
+                the bubbles that they hold.
+            springs: the forces of bubbles whose ghosts are updated, (n, d).
         """
         at, elastic = self._sprung
-        self._inverse[at] = elastic
-        rates = springs.diagonal()
-        matter = bool(np.any(rates.values * self._inverse[rates.blocks] > _WEAK))
-        strong = bool(self.comm.allreduce(matter, op=MPI.LOR))
+        self.inverse[at] = elastic
+        strong = bool(self.comm.allreduce(bool(np.any(rates * self.inverse > _WEAK)), op=MPI.LOR))
         self._springs = springs if strong else None
-        at = rates.blocks if strong else rates.blocks[:0]
-        self._sprung = at, self._inverse[at]
-        self._inverse[at] = 1.0 / (1.0 / self._inverse[at] + rates.values[: len(at)])
+        at = np.flatnonzero(np.any(rates, axis=1) & strong).astype(np.int32)
+        self._sprung = at, self.inverse[at]
+        self.inverse[at] = 1.0 / (1.0 / self.inverse[at] + rates[at])
         return strong
 
     def _product(self) -> Array:
@@ -301,47 +232,26 @@ class BubbleStiffness:
         self._out.x.scatter_reverse(la.InsertMode.add)
         result = self._owned(self._out)
         if self._springs is not None:
-            force = self._springs.times(self._in)
-            result[force.blocks] += force.values
+            result += self._springs(self._in)
         return result
 
     def _owned(self, field: fem.Function) -> Array:
         """The owned values of a field of bubbles, (n, d), in place."""
-        return np.asarray(field.x.array[: self._inverse.size].reshape(self._inverse.shape))
+        return np.asarray(field.x.array[: self.inverse.size].reshape(self.inverse.shape))
 
-    def work(self, e: Array, force: BlockForces) -> float:
-        """The work of a force on bubbles. Collective.
-
-        Args:
-            e: the bubbles, (n, d).
-            force: on them.
-        """
-        return self._dot(e[force.blocks], force.values)
-
-    def diagonal_solve(self, r: Array, at: Entities) -> Array:
-        """The diagonal's inverse times r at some blocks, (k, d).
-
-        Args:
-            r: there, (k, d).
-            at: the owned blocks, (k,).
-        """
-        return np.asarray(r * self._inverse[at])
-
-    def descent(self, r: Array, held: Sequence[Held], at: Entities) -> Array:
+    def descent(self, r: Array, project: Callable[[Array], None], at: Entities) -> Array:
         """P D⁻¹ P r, D being the diagonal and P taking out what is held; overwritten by the next product.
 
         Args:
             r: (n, d).
-            held: what is.
+            project: takes what is held out of a residual, in place.
             at: the blocks where something is, (k,).
         """
-        z = np.multiply(r, self._inverse, out=self._owned(self._out))
+        z = np.multiply(r, self.inverse, out=self._owned(self._out))
         z[at] = r[at]
-        for part in held:
-            part.project(z)
-        z[at] *= self._inverse[at]
-        for part in held:
-            part.project(z)
+        project(z)
+        z[at] *= self.inverse[at]
+        project(z)
         return z
 
     def move(self, r: Array, e: Array, at: Entities, step: Array) -> float:
@@ -362,23 +272,14 @@ class BubbleStiffness:
         p[:] = 0.0
         p[at] = step
         q = self._product()
-        return self._dot(p, q) + self._moved(r, e, 1.0, p, q)
+        return self.dot(p, q) + self._moved(r, e, 1.0, p, q)
 
     def _moved(self, r: Array, e: Array, alpha: float, p: Array, q: Array) -> float:
         """Add α p to e, and -α q to r, q being A p: 2 e·A (α p) before. Collective."""
-        mixed = 2 * alpha * self._dot(e, q)
+        mixed = 2 * alpha * self.dot(e, q)
         e += alpha * p
         r -= alpha * q
         return mixed
-
-    def square(self, r: Array, descent: Callable[[Array], Array]) -> float:
-        """The square of a residual's norm. Collective.
-
-        Args:
-            r: (n, d).
-            descent: as :meth:`descent`.
-        """
-        return self._dot(r, descent(r))
 
     def solve(self, r: Array, e: Array, descent: Callable[[Array], Array], *, goal: float, max_steps: int) -> float:
         """A e = load among e + the range of a symmetric projection, by conjugate gradients; in place. Collective.
@@ -396,16 +297,17 @@ class BubbleStiffness:
         p, rho, growth = self._owned(self._in), 0.0, 0.0  # in place: they are large
         for step in range(max_steps):
             z = descent(r)
-            rho, before = self._dot(r, z), rho
+            rho, before = self.dot(r, z), rho
             if rho <= goal:
                 break
             p[:] = z + rho / before * p if step else z
             q = self._product()
-            alpha = rho / self._dot(p, q)
+            alpha = rho / self.dot(p, q)
             growth += alpha * rho + self._moved(r, e, alpha, p, q)
         return growth
 
-    def _dot(self, a: Array, b: Array) -> float:
+    def dot(self, a: Array, b: Array) -> float:
+        """The product of vectors of all ranks, (n, d) each. Collective."""
         return float(self.comm.allreduce(float(np.vdot(a, b)), op=MPI.SUM))
 
 
@@ -488,7 +390,7 @@ def energy_shares(index: Index, cell: str) -> list[tuple[int, float]]:
         First of λ_a by a, then of λ_a + λ_b by pairs a < b; those that are zero are left out.
     """
     barycentric, weights = quadrature(cell, 4 * sum(index))
-    slopes = [slope(index, corner, barycentric) for corner in range(len(index))]
+    slopes = [shape(index, barycentric, corner) for corner in range(len(index))]
     mean = np.array([[np.sum(weights * a * b) for b in slopes] for a in slopes])
     pairs = itertools.combinations(range(len(index)), 2)
     shares = [2 * mean[a, a] - mean[a].sum() for a in range(len(index))] + [mean[a, b] for a, b in pairs]

@@ -20,7 +20,7 @@ from ..problem.problem import Bounds, Problem
 from ..problem.scaling import DEFAULT as composition
 from ..runtime import forms
 from ..typing import Array, Entities, Mask
-from .bubbles import DEFAULT, BubbleStiffness, Springs, of_cell
+from .bubbles import DEFAULT, BubbleStiffness, of_cell
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
 
@@ -241,7 +241,8 @@ class LeastEnergy:
         self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
         rough = DEFAULT.rough_tolerance[nodes.degree(stiffness.problem.space) - 1]
         tolerance = rough if self._begun else DEFAULT.tolerance
-        goal = max(tolerance**2 * stiffness.square(self.residual, self._descent), DEFAULT.rounding**2)
+        square = stiffness.dot(self.residual, self._descent(self.residual))
+        goal = max(tolerance**2 * square, DEFAULT.rounding**2)
         for _ in range(DEFAULT.rounds):
             self._put_on_bounds()
             steps = DEFAULT.bubble_steps
@@ -253,29 +254,28 @@ class LeastEnergy:
                 break
         self._bubbles.x.scatter_forward()
 
-    def find_beside(self, springs: Springs) -> None:
+    def find_beside(self, springs: LawSprings) -> None:
         """Find them while springs answer their growth; the residual and the energy stay those without. Collective.
 
         Args:
             springs: what answers.
         """
-        if not self._stiffness.hold(springs):
+        if not self._stiffness.hold(springs.diagonal(), springs.times):
             self.find()
             return
         before = springs.times(self._bubbles)
-        work = self._stiffness.work(self._e, before) if self._begun else 0.0
+        work = self._stiffness.dot(self._e, before) if self._begun else 0.0
         self.find()
         force = springs.times(self._bubbles)
-        grown = force - before if self._begun else force
-        self.residual[grown.blocks] += grown.values
-        self.energy += work - self._stiffness.work(self._e, force)
+        self.residual += force - before if self._begun else force
+        self.energy += work - self._stiffness.dot(self._e, force)
 
     def _guess(self, part: BubbleBounds) -> Array:
         """The bubbles of a part as they are, at first what the diagonal alone makes of the load, (k, d)."""
         at = part.blocks
         if self._begun:
             return self._e[at]
-        return np.where(self._under.free(at), self._stiffness.diagonal_solve(self.residual[at], at), self._e[at])
+        return np.where(self._under.free(at), self.residual[at] * self._stiffness.inverse[at], self._e[at])
 
     def _put_on_bounds(self) -> None:
         """Put the bubbles on the bounds that hold them; the residual follows, at first what is prescribed, too."""
@@ -288,7 +288,12 @@ class LeastEnergy:
         self.energy += self._stiffness.move(self.residual, self._e, self._special, step)
 
     def _descent(self, r: Array) -> Array:
-        return self._stiffness.descent(r, (*self._under.prescribed, *self._parts), self._special)
+        return self._stiffness.descent(r, self._project, self._special)
+
+    def _project(self, r: Array) -> None:
+        """Take out of r (n, d) what is held, in place."""
+        for part in (*self._under.prescribed, *self._parts):
+            part.project(r)
 
 
 class VertexStiffness(BubbleStiffness):
@@ -382,13 +387,13 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
     problem, u = traces.problem, traces.u
     stiffness = VertexStiffness(problem, traces.bubbles, inverse)
     load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
-    between, left = traces.tested()
-    load[between.blocks] -= between.values
-    unmet = left.everywhere(problem.space.dofmap.index_map.size_local)
+    between, unmet = traces.tested()
+    load -= between
     if problem.terms:
         load -= stiffness.on_bubbles(unmet)
     bubbles, under = fem.Function(traces.bubbles), constraints(problem, u, traces.bubbles)
-    stiffness.hold(LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles)))
+    springs = LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles))
+    stiffness.hold(springs.diagonal(), springs.times)
     LeastEnergy(bubbles, stiffness, under, load).find()
     stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(load)], unmet)
     shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import fem, la
+from dolfinx import fem
 from mpi4py import MPI
 
 from ..certify.certificate import Examination
@@ -23,7 +23,7 @@ from ..system.multigrid import Levels
 from ..system.system import System
 from ..typing import Array
 from . import data_errors, defect, dual_norm, part_ends
-from .bubbles import DEFAULT, BlockForces, BubbleStiffness, summed
+from .bubbles import DEFAULT, BubbleStiffness, collected
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
 from .traces import Trace
@@ -131,13 +131,12 @@ def _between_nodes(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffn
     problem, u = traces.problem, traces.u
     load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
     between, unmet = traces.tested()
-    load[between.blocks] -= between.values
+    load -= between
     bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
     defect.LeastEnergy(bubbles, stiffness, under, load).find()
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
-        owned = problem.space.dofmap.index_map.size_local
-        cells += problem.bulk.energy_by_cell(inverse.solve(unmet.everywhere(owned))[0])
+        cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
     return cells
 
 
@@ -208,15 +207,15 @@ class Coupled:
         self.error = ErrorField(fem.Function(problem.space), fem.Function(space))
         load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
         self._laws, _ = traces.tested()
-        load[self._laws.blocks] -= self._laws.values
+        load -= self._laws
         under = defect.constraints(problem, traces.u, space)
         self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load)
         self._moved = fem.Function(problem.space)
         self._of_moved = problem.bulk.force_in(space, self._moved)
         self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
         self._shared, self._strongest = 0.0, 0.0
-        self._answer = summed((), problem.scales.dimension)
         self._force: Array = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
+        self._answer = self._force
 
     @property
     def size(self) -> float:
@@ -240,10 +239,7 @@ class Coupled:
             _, laws = traces.tested(self.error)
             if self._settled(laws) and number > 0:
                 break
-            unmet = -asked
-            unmet -= self._force
-            unmet[laws.blocks] += laws.values
-            step, length = inverse.solve(unmet, DEFAULT.rough_tolerance[1])
+            step, length = inverse.solve(laws - asked - self._force, DEFAULT.rough_tolerance[1])
             nodes.x.array[:] += step.x.array
             self._force = inverse.force(nodes)
             self._longest = max(self._longest, length)
@@ -255,10 +251,10 @@ class Coupled:
         work = float(np.vdot(nodes.x.array[: of_bubbles.size], of_bubbles))
         self._shared = total(traces.problem.domain.mesh.comm, work)
 
-    def _settled(self, laws: BlockForces) -> bool:
+    def _settled(self, laws: Array) -> bool:
         """Whether the laws' force on the nodes is nearly the one before. Collective."""
         comm = self._traces.problem.domain.mesh.comm
-        changed = np.sqrt(total(comm, float(np.sum((laws - self._answer).values ** 2))))
+        changed = np.sqrt(total(comm, float(np.sum((laws - self._answer) ** 2))))
         self._answer, self._strongest = laws, max(self._strongest, changed)
         return bool(changed <= DEFAULT.coupled_change * self._strongest)
 
@@ -266,8 +262,7 @@ class Coupled:
         """Let the bubbles feel that nodes and laws have moved. Collective."""
         before = self._laws
         self._laws, _ = self._traces.tested(self.error)
-        fallen = before - self._laws
-        self._least.residual[fallen.blocks] += fallen.values
+        self._least.residual += before - self._laws
         self._least.residual -= self._of_moved.values()
 
 
@@ -368,17 +363,14 @@ def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
     The facets' places are independent of each other, so n of them add up to a root of n times the effect of one.
     """
     problem, count = traces.problem, 0
-    d, comm, force = problem.scales.dimension, problem.domain.mesh.comm, fem.Function(problem.space)
+    dropped = []
     for state in traces.states:
         for law in state.laws:
             points, tau = _drops(traces, state, law)
-            dropped = points.tested(tau)[1]
-            force.x.array.reshape(-1, d)[dropped.blocks] += dropped.values
+            dropped.append(points.with_nodes(tau))
             count += int(np.count_nonzero(np.any(tau, axis=(1, 2))))
-    force.x.scatter_reverse(la.InsertMode.add)
-    owned = problem.space.dofmap.index_map.size_local
-    field, _ = inverse.solve(force.x.array.reshape(-1, d)[:owned])
-    field.x.array[:] /= np.sqrt(max(comm.allreduce(count), 1))
+    field, _ = inverse.solve(collected(problem.space, dropped))
+    field.x.array[:] /= np.sqrt(max(problem.domain.mesh.comm.allreduce(count), 1))
     return field
 
 
@@ -407,11 +399,10 @@ def _friction(
     """∫ of the law's change against the interpolated nodal tractions, of its uncertainty, of those. Collective."""
     further = fem.Function(traces.problem.space)
     further.x.array[:] = error.nodes.x.array + uncertain.x.array
-    found = traces.of_law(state, law, error)
-    other = traces.of_law(state, law, ErrorField(further, error.bubbles))
-    fields = found.traction - found.nodal, other.traction - found.traction, found.nodal
+    solved, found = traces.of_u(state, law), traces.of_law(state, law, error)
+    fields = found - solved.nodal, traces.of_law(state, law, ErrorField(further, error.bubbles)) - found, solved.nodal
     tangents = state.slip.shape[1]
     known, unknown, carried = (
-        float(np.sum(found.points.weights * np.linalg.norm(values[:, :, -tangents:], axis=2))) for values in fields
+        float(np.sum(solved.points.weights * np.linalg.norm(values[:, :, -tangents:], axis=2))) for values in fields
     )
     return known, unknown, carried

@@ -20,9 +20,9 @@ from ..laws import Length, Superpotential
 from ..mesh import nodes
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
-from ..typing import Array, Entities, Mask
+from ..typing import Array, Mask
 from . import bubbles
-from .bubbles import DEFAULT, BlockForces, gathered, summed
+from .bubbles import DEFAULT, LocalForces, collected
 from .traces import InterfacePoints, PartPoints, Trace, frames
 
 
@@ -74,23 +74,8 @@ class ErrorField:
     bubbles: fem.Function
 
 
-@dataclass(frozen=True)
-class LawTrace:
-    """One law between the nodes, at the quadrature points of its part, (f, q, k) each.
-
-    Attributes:
-        points: the quadrature points.
-        nodal: the interpolated nodal tractions.
-        traction: those that the law allows nearest to them.
-    """
-
-    points: Trace
-    nodal: Array
-    traction: Array
-
-
 @dataclass(frozen=True, kw_only=True)
-class _Solved:
+class SolvedLaw:
     """What u_h gives one law between the nodes, (f, q, k) each; no error changes it. Slips are over the law's stretch.
 
     Attributes:
@@ -110,10 +95,6 @@ class _Solved:
     sticks: Mask
     nodewise: Array
     slip: Array
-
-    def slip_under(self, law: Superpotential) -> Array:
-        """The slip, (f, q, k): where the nodes around do not pass a convex kink it does not dip beyond that."""
-        return np.where(self.sticks, self.nodewise, stopped(law, self.nodewise, self.slip))
 
 
 class LawTraces:
@@ -141,7 +122,7 @@ class LawTraces:
         self.bubbles = bubbles.space(problem.space.mesh, self.degree)
         self._interfaces: dict[str, InterfacePoints] = {}
         self._traces: dict[int, tuple[Array, Trace]] = {}
-        self._solved: dict[int, tuple[LawState, _Solved]] = {}
+        self._solved: dict[int, tuple[LawState, SolvedLaw]] = {}
 
     def part(self, surface: Surface, directions: Array) -> Trace:
         """The quadrature points of a part, or of an interface. Collective.
@@ -163,8 +144,8 @@ class LawTraces:
             self._interfaces[interface.name] = InterfacePoints(problem, self.bubbles, interface, degree // 2)
         return Trace(problem, self._interfaces[interface.name], surface, directions)
 
-    def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> LawTrace:
-        """One law between the nodes. Collective.
+    def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> Array:
+        """The tractions of a law between the nodes: those that it allows nearest to the nodes', (f, q, k). Collective.
 
         Args:
             state: of its part.
@@ -172,17 +153,20 @@ class LawTraces:
             error: added to u_h before the law is evaluated; nothing is added where a whole part of a facet sticks (its
                 nodes on a convex kink), and elsewhere no slip passes a convex kink.
         """
-        solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
+        solved, (asked, slip) = self.of_u(state, law), self._asked(state, law, error)
         k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
         near = np.asarray(CERTIFICATE.near / solved.stretch, dtype=np.float64).ravel()
         traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), near)
-        return LawTrace(solved.points, solved.nodal, solved.multiplier * traction.reshape(slip.shape))
+        return np.asarray(solved.multiplier * traction.reshape(slip.shape))
 
     def _asked(self, state: ContactState, law: LawState, error: ErrorField | None) -> tuple[Superpotential, Array]:
-        """The law that an error meets, and the slip that it is asked at, over its stretch, (f, q, k). Collective."""
-        solved = self._of_u(state, law)
+        """The law that an error meets, and the slip that it is asked at, over its stretch, (f, q, k). Collective.
+
+        Where the nodes around do not pass a convex kink the slip does not dip beyond that.
+        """
+        solved = self.of_u(state, law)
         asked = law.term.exact if self.exact and error is not None else law.term.law
-        slip = solved.slip_under(asked)
+        slip = np.where(solved.sticks, solved.nodewise, stopped(asked, solved.nodewise, solved.slip))
         if error is not None:
             added = (solved.points.of_field(error.nodes) + solved.points.of_bubbles(error.bubbles)) / solved.stretch
             slip = stopped(asked, slip, slip + np.where(solved.sticks, 0.0, added))
@@ -199,7 +183,7 @@ class LawTraces:
         Returns:
             The quadrature points, and the rates along each direction.
         """
-        solved, (asked, slip) = self._of_u(state, law), self._asked(state, law, error)
+        solved, (asked, slip) = self.of_u(state, law), self._asked(state, law, error)
         flat, length = slip.reshape(-1, slip.shape[2]), law.term.length
         argument = flat[:, 0] if length is None else length.of(flat)
         second = np.maximum(asked.derivatives(argument)[1], 0.0)
@@ -209,13 +193,18 @@ class LawTraces:
         moves = solved.multiplier / solved.stretch * ~solved.sticks
         return solved.points, moves * rates.reshape(slip.shape)
 
-    def _of_u(self, state: ContactState, law: LawState) -> _Solved:
-        """What u_h gives a law. Collective."""
+    def of_u(self, state: ContactState, law: LawState) -> SolvedLaw:
+        """What u_h gives a law. Collective.
+
+        Args:
+            state: of its part.
+            law: one of the part's.
+        """
         if id(law) not in self._solved:
             points = self.part(state.surface, law.term.directions)
             on_kink = points.interpolated(law.on_convex_kink()[:, None].astype(float), "hats")
             stretch = points.interpolated(law.term.stretch[:, None], "hats")
-            solved = _Solved(
+            solved = SolvedLaw(
                 points=points,
                 multiplier=points.interpolated(law.term.multiplier[:, None]),
                 stretch=stretch,
@@ -227,29 +216,29 @@ class LawTraces:
             self._solved[id(law)] = law, solved
         return self._solved[id(law)][1]
 
-    def tested(self, error: ErrorField | None = None) -> tuple[BlockForces, BlockForces]:
+    def tested(self, error: ErrorField | None = None) -> tuple[Array, Array]:
         """∫ τ·v ds of all laws tested with bubbles; the nodal forces minus that with u_h's; owned blocks. Collective.
 
         ``error`` is added to u_h as in :meth:`of_law`. The bubbles of two bodies that meet feel what contact or glue
         carries, too.
         """
-        d, at_nodes, between = self.problem.scales.dimension, [], list(self._carried_between_bodies)
+        at_nodes, between = list[LocalForces](), list(self._carried_between_bodies)
         for state in self.states:
             for law in state.laws:
-                trace = self.of_law(state, law, error)
-                with_bubbles, with_nodes = trace.points.tested(trace.traction)
+                points, traction = self.of_u(state, law).points, self.of_law(state, law, error)
+                between += points.with_bubbles(traction)
+                blocks, forces = points.with_nodes(traction)
                 nodal = np.einsum("mk,mkd->md", law.given * law.term.weights[:, None], law.term.directions)
-                between.append((with_bubbles.blocks, with_bubbles.values))
-                at_nodes += [(with_nodes.blocks, -with_nodes.values), (state.surface.blocks, nodal)]
-        return gathered(self.bubbles, summed(between, d)), gathered(self.problem.space, summed(at_nodes, d))
+                at_nodes += [(blocks, -forces), (blocks, nodal)]
+        return collected(self.bubbles, between), collected(self.problem.space, at_nodes)
 
     @functools.cached_property
-    def _carried_between_bodies(self) -> list[tuple[Entities, Array]]:
-        """As :meth:`_carried`, of all interfaces, blocks and forces. Collective when first used."""
+    def _carried_between_bodies(self) -> list[LocalForces]:
+        """As :meth:`_carried`, of all interfaces. Collective when first used."""
         between = [state for state in self.states if self.problem.interface_of(state.surface) is not None]
-        return [(force.blocks, force.values) for force in map(self._carried, between)]
+        return [forces for state in between for forces in self._carried(state)]
 
-    def _carried(self, state: ContactState) -> BlockForces:
+    def _carried(self, state: ContactState) -> list[LocalForces]:
         """∫ τ·v ds of what bodies that meet put on each other without a law, tested with bubbles. Collective."""
         force = -traction(state)
         for law in state.laws:
@@ -258,7 +247,7 @@ class LawTraces:
         if (interface := self.problem.interface_of(state.surface)) is not None and interface.first.curved:
             axes = frames(state.surface)
         points = self.part(state.surface, axes)
-        return points.tested(points.interpolated(np.einsum("mkd,md->mk", axes, force), along=True))[0]
+        return points.with_bubbles(points.interpolated(np.einsum("mkd,md->mk", axes, force), along=True))
 
 
 class LawSprings:
@@ -273,19 +262,15 @@ class LawSprings:
         self._space = traces.bubbles
         self._rates = [traces.rising(state, law, error) for state in traces.states for law in state.laws]
 
-    def diagonal(self) -> BlockForces:
-        """Forces for a unit of each bubble, at the owned blocks. Collective."""
-        return self._summed([points.squared(rates) for points, rates in self._rates])
+    def diagonal(self) -> Array:
+        """Forces for a unit of each bubble, at the owned blocks, (n, d). Collective."""
+        return collected(self._space, [one for points, rates in self._rates for one in points.squared(rates)])
 
-    def times(self, e: fem.Function) -> BlockForces:
-        """Forces of bubbles, at the owned blocks. Collective.
+    def times(self, e: fem.Function) -> Array:
+        """Forces of bubbles, at the owned blocks, (n, d). Collective.
 
         Args:
             e: the bubbles, ghosts updated.
         """
-        return self._summed([points.tested(rates * points.of_bubbles(e))[0] for points, rates in self._rates])
-
-    def _summed(self, local: list[BlockForces]) -> BlockForces:
-        """Contributions at local blocks as one at the owned blocks. Collective."""
-        parts = [(force.blocks, force.values) for force in local]
-        return gathered(self._space, summed(parts, self._space.dofmap.bs))
+        forces = [points.with_bubbles(rates * points.of_bubbles(e)) for points, rates in self._rates]
+        return collected(self._space, [one for of_law in forces for one in of_law])

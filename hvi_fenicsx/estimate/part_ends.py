@@ -24,7 +24,7 @@ from ..problem.facets import function_integrals, outward
 from ..problem.problem import Problem
 from ..runtime.mpi import total
 from ..typing import Array, Entities, Mask
-from .bubbles import gathered, summed
+from .bubbles import collected
 from .data_errors import FacetModes, facet_modes
 from .dual_norm import DualNorm
 
@@ -255,7 +255,7 @@ def _of_loads(problem: Problem, inverse: DualNorm, parts: Sequence[_Part], lacki
     whole = total(comm, float(cells.sum()))
     if whole == 0.0:
         return cells
-    missing = gathered(problem.space, summed(forces, d)).everywhere(problem.space.dofmap.index_map.size_local)
+    missing = collected(problem.space, forces)
     energy = problem.bulk.energy_by_cell(inverse.solve(problem.combined(missing))[0])
     return np.asarray(total(comm, float(energy.sum())) * cells / whole)
 

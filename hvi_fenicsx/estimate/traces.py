@@ -23,7 +23,7 @@ from ..problem.interfaces import Interface
 from ..problem.problem import Problem
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers, Mask
-from .bubbles import BlockForces, of_cell, of_facet, quadrature, shape, summed
+from .bubbles import LocalForces, of_cell, of_facet, quadrature, shape
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,20 +186,19 @@ class Trace:
                 found += side.sign * values[:, :, None] * known[:, i, None]
         return np.asarray(np.einsum("fqkd,fqd->fqk", self._vectors, found))
 
-    def tested(self, tau: Array) -> tuple[BlockForces, BlockForces]:
-        """∫ τ·w ds of tractions (f, q, k), against the motion of the first side: with bubbles and at nodes. Collective.
+    def with_bubbles(self, tau: Array) -> list[LocalForces]:
+        """∫ τ·w ds of tractions (f, q, k), against the motion of the first side, tested with bubbles. Collective."""
+        return self._with_bubbles(np.einsum("fqk,fqkd->fqd", self.weights[:, :, None] * tau, self._vectors), 1)
 
-        The bubbles are those at local blocks, the nodes owned ones.
-        """
-        scaled = self.weights[:, :, None] * tau
-        found = self._with_bubbles(np.einsum("fqk,fqkd->fqd", scaled, self._vectors), 1)
+    def with_nodes(self, tau: Array) -> LocalForces:
+        """The same tested with the functions of u_h, at owned blocks. Collective."""
         on_facets = np.zeros(self._rotations.shape[:3])
-        np.add.at(on_facets, self._points.facets, np.einsum("fqk,fqn->fnk", scaled, self._points.functions))
-        carried = self._points.summed(turned_back(self._rotations, on_facets))
-        at_nodes = np.einsum("mk,mkd->md", carried, self._directions)
-        return found, summed([(self._surface.blocks, at_nodes)], at_nodes.shape[1])
+        forces = np.einsum("fqk,fqn->fnk", self.weights[:, :, None] * tau, self._points.functions)
+        np.add.at(on_facets, self._points.facets, forces)
+        carried = self._points.summed(np.einsum("fnkl,fnl->fnk", self._rotations, on_facets))
+        return self._surface.blocks, np.einsum("mk,mkd->md", carried, self._directions)
 
-    def squared(self, rates: Array) -> BlockForces:
+    def squared(self, rates: Array) -> list[LocalForces]:
         """∫ Σ rate (v·direction)² ds, v being each bubble; local blocks. Collective.
 
         Args:
@@ -207,13 +206,13 @@ class Trace:
         """
         return self._with_bubbles(np.einsum("fqk,fqkd->fqd", self.weights[:, :, None] * rates, self._vectors**2), 2)
 
-    def _with_bubbles(self, vectors: Array, power: int) -> BlockForces:
+    def _with_bubbles(self, vectors: Array, power: int) -> list[LocalForces]:
         """Sums of vectors (f, q, d) times powers of all bubbles, local blocks. Collective."""
         found = []
         for side in self._points.sides:
             each = [np.einsum("fq,fqd->fd", (side.sign * values) ** power, vectors) for values in side.shapes]
             found.append(side.collected(np.stack(each, axis=1)))
-        return summed(found, vectors.shape[2])
+        return found
 
 
 def rotations(directions: Array, reference: Integers | int = 0) -> Array:
@@ -244,16 +243,6 @@ def turned(rotations: Array, values: Array) -> Array:
         values: the components along each node's own directions, or these directions, (f, n, k, ...).
     """
     return np.asarray(np.einsum("fnkl,fnk...->fnl...", rotations, values))
-
-
-def turned_back(rotations: Array, values: Array) -> Array:
-    """The components along each node's own directions, (f, n, k).
-
-    Args:
-        rotations: R, (f, n, k, k).
-        values: the components along the directions of one node of each facet, (f, n, k).
-    """
-    return np.asarray(np.einsum("fnkl,fnl->fnk", rotations, values))
 
 
 def frames(surface: Surface) -> Array:
