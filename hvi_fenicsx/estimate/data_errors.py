@@ -29,7 +29,7 @@ from ..problem.scaling import DEFAULT as composition
 from ..runtime.mpi import total
 from ..typing import Array, Entities
 from .bubbles import DEFAULT, of_facet, quadrature, shape
-from .traces import ContactFacets, PartPoints, contact_facets
+from .traces import ContactFacets, contact_facets, part_points
 
 
 def varies(value: SpatialValue | None) -> bool:
@@ -339,10 +339,10 @@ def _moved_pressure(
     comm = problem.domain.mesh.comm
     if comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) <= CERTIFICATE.near:
         return np.zeros(len(within))
-    at = PartPoints(problem, bubbles, surface, 1)
-    normals = at.of_nodes(surface.normals).mean(axis=1)
+    spread = part_points(problem, bubbles, surface, 1).spread
+    normals = spread.of_carriers(surface.normals).mean(axis=1)
     compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
-    pushes, gaps = (on.interpolated(at.of_nodes(np.maximum(values, 0.0)[:, None])[:, :, 0]) for values in nodal)
+    pushes, gaps = (on.interpolated(spread.of_carriers(np.maximum(values, 0.0))) for values in nodal)
     free = not _is_supported(problem, surface.normals)
     moved, before = (
         redistributed(comm, on, pushes, gaps + more, compliance, free=free) for more in (within, np.zeros_like(within))

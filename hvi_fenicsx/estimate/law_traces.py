@@ -23,7 +23,7 @@ from ..problem.problem import Problem
 from ..typing import Array, Mask
 from . import bubbles
 from .bubbles import DEFAULT, LocalForces, collected
-from .traces import InterfacePoints, PartPoints, Trace, frames
+from .traces import FacetPoints, Trace, frames, interface_points, part_points
 
 
 def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
@@ -120,29 +120,32 @@ class LawTraces:
         self.problem, self.u, self.states, self.exact = problem, u, states, exact
         self.degree = nodes.degree(problem.space)
         self.bubbles = bubbles.space(problem.space.mesh, self.degree)
-        self._interfaces: dict[str, InterfacePoints] = {}
-        self._traces: dict[int, tuple[Array, Trace]] = {}
-        self._solved: dict[int, tuple[LawState, SolvedLaw]] = {}
+        self._known: dict[str, FacetPoints] = {}
+        self._traces: dict[int, Trace] = {}
+        self._solved: dict[int, SolvedLaw] = {}
 
     def part(self, surface: Surface, directions: Array) -> Trace:
         """The quadrature points of a part, or of an interface. Collective.
 
         Args:
             surface: the part.
-            directions: along which displacements are looked at, (m, k, d).
+            directions: along which displacements are looked at, those of a law or the surface's tangents, (m, k, d).
         """
-        known = self._traces.get(id(directions))
-        if known is None:
-            known = self._traces[id(directions)] = directions, self._new_part(surface, directions)
-        return known[1]
+        key = id(directions)
+        if key not in self._traces:
+            self._traces[key] = Trace(self.problem, self._points(surface), surface, directions)
+        return self._traces[key]
 
-    def _new_part(self, surface: Surface, directions: Array) -> Trace:
-        problem, degree = self.problem, DEFAULT.facet_degree[self.degree - 1]
-        if (interface := problem.interface_of(surface)) is None:
-            return Trace(problem, PartPoints(problem, self.bubbles, surface, degree), surface, directions)
-        if interface.name not in self._interfaces:
-            self._interfaces[interface.name] = InterfacePoints(problem, self.bubbles, interface, degree // 2)
-        return Trace(problem, self._interfaces[interface.name], surface, directions)
+    def _points(self, surface: Surface) -> FacetPoints:
+        degree = DEFAULT.facet_degree[self.degree - 1]
+        if surface.part not in self._known:
+            interface = self.problem.interface_of(surface)
+            self._known[surface.part] = (
+                part_points(self.problem, self.bubbles, surface, degree)
+                if interface is None
+                else interface_points(self.problem, self.bubbles, interface, degree // 2)
+            )
+        return self._known[surface.part]
 
     def of_law(self, state: ContactState, law: LawState, error: ErrorField | None = None) -> Array:
         """The tractions of a law between the nodes: those that it allows nearest to the nodes', (f, q, k). Collective.
@@ -204,7 +207,7 @@ class LawTraces:
             points = self.part(state.surface, law.term.directions)
             on_kink = points.interpolated(law.on_convex_kink()[:, None].astype(float), "hats")
             stretch = points.interpolated(law.term.stretch[:, None], "hats")
-            solved = SolvedLaw(
+            self._solved[id(law)] = SolvedLaw(
                 points=points,
                 multiplier=points.interpolated(law.term.multiplier[:, None]),
                 stretch=stretch,
@@ -213,8 +216,7 @@ class LawTraces:
                 nodewise=points.of_field(self.u, "hats") / stretch,
                 slip=points.of_field(self.u) / stretch,
             )
-            self._solved[id(law)] = law, solved
-        return self._solved[id(law)][1]
+        return self._solved[id(law)]
 
     def tested(self, error: ErrorField | None = None) -> tuple[Array, Array]:
         """∫ τ·v ds of all laws tested with bubbles; the nodal forces minus that with u_h's; owned blocks. Collective.
@@ -246,7 +248,7 @@ class LawTraces:
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
         if (interface := self.problem.interface_of(state.surface)) is not None and interface.first.curved:
             axes = frames(state.surface)
-        points = self.part(state.surface, axes)
+        points = Trace(self.problem, self._points(state.surface), state.surface, axes)
         return points.with_bubbles(points.interpolated(np.einsum("mkd,md->mk", axes, force), along=True))
 
 

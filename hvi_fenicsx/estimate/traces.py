@@ -7,12 +7,13 @@ that carries nothing has the mean of its neighbours, and what is said of bubbles
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from dolfinx import fem, la
+from dolfinx import fem
 from mpi4py import MPI
 
 from ..mesh import facets, nodes
@@ -24,88 +25,6 @@ from ..problem.problem import Problem
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers, Mask
 from .bubbles import LocalForces, of_cell, of_facet, quadrature, shape
-
-
-@dataclass(frozen=True, kw_only=True)
-class BoundaryBubbles:
-    """The bubbles of a part's facets (f).
-
-    Attributes:
-        shapes: the values of each bubble of a facet at the points, (f, q) each.
-        blocks: of the bubbles, local, (f, k).
-    """
-
-    shapes: list[Array]
-    blocks: Entities
-    sign = 1.0
-
-    def values(self, e: fem.Function, dimension: int) -> Array:
-        """The bubbles of each facet, (f, k, d).
-
-        Args:
-            e: all bubbles.
-            dimension: of the space.
-        """
-        return np.asarray(e.x.array.reshape(-1, dimension)[self.blocks])
-
-    def collected(self, sums: Array) -> tuple[Integers, Array]:
-        """Forces (f, k, d) on them as those at local blocks."""
-        return np.asarray(self.blocks.ravel(), dtype=np.int64), np.asarray(sums.reshape(-1, sums.shape[2]))
-
-
-class PartPoints:
-    """Quadrature points (q) on the facets (f) of a part of the boundary whose cells this rank owns.
-
-    Args:
-        problem: what was solved.
-        bubbles: the space of bubbles.
-        surface: the part.
-        degree: of the quadrature.
-
-    Attributes:
-        weights: as of :class:`.InterfacePoints`; so are all further ones.
-    """
-
-    normals, reference = None, 0
-
-    def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, degree: int) -> None:
-        self._field, self._surface, d = fem.Function(problem.space), surface, problem.scales.dimension
-        on = contact_facets(problem, bubbles, surface.facets)
-        at, weights = quadrature("interval" if d == 2 else "triangle", degree)
-        count, functions = on.nodes.shape, spaces.simplex_functions(on.degree, at, spaces.edge_share(problem.space))
-        self._nodes, self.facets = on.nodes, np.arange(count[0])
-        self.weights: Array = on.areas[:, None] * weights
-        self.functions, self.hats, self.at_ends = (
-            np.broadcast_to(values, (count[0], *values.shape))
-            for values in (functions, nodes.hats(on.degree, at), np.eye(count[1]))
-        )
-        shapes = [np.broadcast_to(shape(index, at), self.weights.shape) for index in of_facet(on.degree, d)]
-        self.sides = (BoundaryBubbles(shapes=shapes, blocks=on.bubbles),)
-
-    def of_nodes(self, values: Array) -> Array:
-        """Values at the part's owned nodes (m, ...) by facet, (f, n, ...). Collective."""
-        bs, found = self._field.function_space.dofmap.index_map_bs, []
-        flat = values.reshape(len(values), math.prod(values.shape[1:]))
-        for start in range(0, flat.shape[1], bs):
-            some, local = flat[:, start : start + bs], self._field.x.array.reshape(-1, bs)
-            local[self._surface.blocks, : some.shape[1]] = some
-            self._field.x.scatter_forward()
-            found.append(local[self._nodes, : some.shape[1]])
-        return np.concatenate(found, axis=2).reshape(*self._nodes.shape, *values.shape[1:])
-
-    @staticmethod
-    def on_facets(values: Array) -> Array:
-        """Values by facet, (f, n, k), as they are."""
-        return values
-
-    def summed(self, values: Array) -> Array:
-        """Forces on the functions of facets' nodes (f, n, k) as forces on the owned nodes, (m, k). Collective."""
-        found = fem.Function(self._field.function_space)
-        local = found.x.array.reshape(-1, found.function_space.dofmap.index_map_bs)[:, : values.shape[2]]
-        np.add.at(local, self._nodes, values)
-        found.x.scatter_reverse(la.InsertMode.add)
-        return np.array(local[self._surface.blocks])
-
 
 Basis = Literal["functions", "hats", "at_ends"]
 """By what values at nodes are interpolated."""
@@ -124,13 +43,11 @@ class Trace:
         weights: of the points, over L^(d-1), (f, q).
     """
 
-    def __init__(
-        self, problem: Problem, points: PartPoints | InterfacePoints, surface: Surface, directions: Array
-    ) -> None:
+    def __init__(self, problem: Problem, points: FacetPoints, surface: Surface, directions: Array) -> None:
         self._problem, self._points = problem, points
         self._surface, self._directions, self.weights = surface, directions, points.weights
-        own = points.of_nodes(directions)
-        self._rotations = rotations(own, points.reference)
+        own = points.spread.of_carriers(directions)
+        self._rotations = rotations(own, points.spread.reference)
         self._vectors = self._turned(turned(self._rotations, own))
 
     def _turned(self, own: Array) -> Array:
@@ -142,8 +59,8 @@ class Trace:
         facets, normals = self._points.facets, self._points.normals
         if normals is None:
             return self._on_facets(self._points.functions, own)
-        at_nodes = self._points.of_nodes(self._surface.normals)
-        one = at_nodes[np.arange(len(own)), self._points.reference]
+        at_nodes = self._points.spread.of_carriers(self._surface.normals)
+        one = at_nodes[np.arange(len(own)), self._points.spread.reference]
         alike = own @ rotations_between(np.broadcast_to(one[:, None], at_nodes.shape), at_nodes)
         back = rotations_between(normals, np.broadcast_to(one[facets, None], normals.shape))
         return np.asarray(self._on_facets(self._points.functions, alike) @ back)
@@ -157,7 +74,7 @@ class Trace:
                 the ends of facets in the place of the points ("at_ends").
             along: whether they are components along the directions.
         """
-        there = self._points.of_nodes(values)
+        there = self._points.spread.of_carriers(values)
         return self._on_facets(getattr(self._points, by), turned(self._rotations, there) if along else there)
 
     def of_field(self, u: fem.Function, by: Basis = "functions") -> Array:
@@ -172,16 +89,15 @@ class Trace:
 
     def _on_facets(self, functions: Array, values: Array) -> Array:
         """Sums of functions (f, q, n) times values of nodes (facets, n, k, ...)."""
-        found = self._points.on_facets(values.reshape(*values.shape[:2], math.prod(values.shape[2:])))[
-            self._points.facets
-        ]
+        flat = values.reshape(*values.shape[:2], math.prod(values.shape[2:]))
+        found = (self._points.spread.carriers @ flat)[self._points.facets]
         return np.asarray(functions @ found).reshape(*functions.shape[:2], *values.shape[2:])
 
     def of_bubbles(self, e: fem.Function) -> Array:
         """The values of bubbles, (f, q, k). Collective."""
         found = np.zeros((*self.weights.shape, self._problem.scales.dimension))
         for side in self._points.sides:
-            known = side.values(e, found.shape[2])
+            known = side.values(e)
             for i, values in enumerate(side.shapes):
                 found += side.sign * values[:, :, None] * known[:, i, None]
         return np.asarray(np.einsum("fqkd,fqd->fqk", self._vectors, found))
@@ -195,7 +111,7 @@ class Trace:
         on_facets = np.zeros(self._rotations.shape[:3])
         forces = np.einsum("fqk,fqn->fnk", self.weights[:, :, None] * tau, self._points.functions)
         np.add.at(on_facets, self._points.facets, forces)
-        carried = self._points.summed(np.einsum("fnkl,fnl->fnk", self._rotations, on_facets))
+        carried = self._points.spread.summed(np.einsum("fnkl,fnl->fnk", self._rotations, on_facets))
         return self._surface.blocks, np.einsum("mk,mkd->md", carried, self._directions)
 
     def squared(self, rates: Array) -> list[LocalForces]:
@@ -215,7 +131,7 @@ class Trace:
         return found
 
 
-def rotations(directions: Array, reference: Integers | int = 0) -> Array:
+def rotations(directions: Array, reference: Integers) -> Array:
     """Matrices R of the nodes of facets, (f, n, k, k).
 
     Components c along a node's directions are Rᵀc along those of one node of the facet. Only tangents are turned, the
@@ -223,7 +139,7 @@ def rotations(directions: Array, reference: Integers | int = 0) -> Array:
 
     Args:
         directions: of the nodes of facets, unit vectors, (f, n, k, d).
-        reference: the node of each facet whose tangents the others get, (f,), or the same for all.
+        reference: the node of each facet whose tangents the others get, (f,).
     """
     count, d = directions.shape[2:]
     turned = slice(max(count - d + 1, 0), None)
@@ -330,14 +246,13 @@ def _numbers_in_cell(degree: int, cell: str) -> list[list[int]]:
 
 @dataclass(frozen=True, kw_only=True)
 class SideBubbles:
-    """The bubbles (n) of one side's facets, the same numbers on all ranks, at points of intersections (f).
+    """The bubbles (n) of one side, the same numbers on all ranks, at points of facets or intersections (f).
 
     Attributes:
         comm: the ranks.
         sign: of the side's displacement in the relative one.
         shapes: the values of each bubble of a facet at the points, (f, q) each.
-        facets: the facet of each intersection, (f,).
-        of_facet: the bubbles of each facet (:func:`.bubbles.of_facet`), (f, k).
+        numbers: the bubbles of each facet (:func:`.bubbles.of_facet`), (f, k).
         count: n.
         owned: those that this rank owns, (m,).
         blocks: their local blocks, (m,).
@@ -346,53 +261,53 @@ class SideBubbles:
     comm: MPI.Comm
     sign: float
     shapes: list[Array]
-    facets: Integers
-    of_facet: Integers
+    numbers: Integers
     count: int
     owned: Integers
     blocks: Integers
 
-    def values(self, e: fem.Function, dimension: int) -> Array:
-        """The bubbles of each intersection's facet, (f, k, d). Collective.
+    def values(self, e: fem.Function) -> Array:
+        """The bubbles of each facet, (f, k, d). Collective.
 
         Args:
             e: all bubbles.
-            dimension: of the space.
         """
-        known = np.zeros((self.count, dimension))
-        known[self.owned] = e.x.array.reshape(-1, dimension)[self.blocks]
-        return np.asarray(self.comm.allreduce(known)[self.of_facet[self.facets]])
+        every = e.x.array.reshape(-1, e.function_space.dofmap.bs)
+        known = np.zeros((self.count, every.shape[1]))
+        known[self.owned] = every[self.blocks]
+        return np.asarray(self.comm.allreduce(known)[self.numbers])
 
-    def collected(self, sums: Array) -> tuple[Integers, Array]:
+    def collected(self, sums: Array) -> LocalForces:
         """Forces (f, k, d) on them as those at owned blocks. Collective."""
         found = np.zeros((self.count, sums.shape[2]))
-        np.add.at(found, self.of_facet[self.facets], sums)
+        np.add.at(found, self.numbers, sums)
         return self.blocks, self.comm.allreduce(found)[self.owned]
 
 
-def _bubbles_of(
-    problem: Problem, space: fem.FunctionSpace, side: Facets, name: str, sign: float, facets: Integers, at: Array
-) -> SideBubbles:
-    """The bubbles of a side at points (f, q, d) of its facets (f,). Collective."""
-    local = contact_facets(problem, space, problem.domain.facets([name]))
-    own = [_numbers(problem.space, local.nodes), _numbers(space, local.bubbles)]
-    nodes_of, found = (np.concatenate(parts) for parts in zip(*agree(problem.domain.mesh.comm, own), strict=True))
-    order, wanted = np.lexsort(nodes_of.T), np.lexsort(side.nodes.T)
-    of_facet = np.empty((len(wanted), found.shape[1]), dtype=np.int64)
-    of_facet[wanted] = found[order]
-    known, numbers = np.unique(of_facet, return_inverse=True)
-    start, end = space.dofmap.index_map.local_range
+def _side(space: fem.FunctionSpace, degree: int, sign: float, at: Array, bubbles: Integers) -> SideBubbles:
+    """The bubbles of facets by their global numbers, (f, k), at points (f, q, d) of these. Collective."""
+    comm, d, (start, end) = space.mesh.comm, at.shape[2], space.dofmap.index_map.local_range
+    known = np.unique(np.concatenate([numbers.ravel() for numbers in agree(comm, bubbles)]))
     owned = np.flatnonzero((known >= start) & (known < end))
     return SideBubbles(
-        comm=problem.domain.mesh.comm,
+        comm=comm,
         sign=sign,
-        shapes=_shapes(side.degree, at),
-        facets=facets,
-        of_facet=numbers.reshape(of_facet.shape),
+        shapes=[shape(index, at.reshape(-1, d)).reshape(at.shape[:2]) for index in of_facet(degree, d)],
+        numbers=np.searchsorted(known, bubbles),
         count=len(known),
         owned=owned,
         blocks=known[owned] - start,
     )
+
+
+def _of_interface(problem: Problem, space: fem.FunctionSpace, side: Facets, name: str) -> Integers:
+    """The global numbers of the bubbles of all facets of an interface's side, (facets, k). Collective."""
+    local = contact_facets(problem, space, problem.domain.facets([name]))
+    own = [_numbers(problem.space, local.nodes), _numbers(space, local.bubbles)]
+    nodes_of, found = (np.concatenate(parts) for parts in zip(*agree(problem.domain.mesh.comm, own), strict=True))
+    numbers = np.empty_like(found)
+    numbers[np.lexsort(side.nodes.T)] = found[np.lexsort(nodes_of.T)]
+    return np.asarray(numbers)
 
 
 def _numbers(space: fem.FunctionSpace, blocks: Entities) -> Integers:
@@ -401,106 +316,166 @@ def _numbers(space: fem.FunctionSpace, blocks: Entities) -> Integers:
     return np.asarray(found, dtype=np.int64).reshape(blocks.shape)
 
 
-def _shapes(degree: int, at: Array) -> list[Array]:
-    """The values of each bubble of a facet at points (f, q, d), (f, q)."""
-    d = at.shape[2]
-    return [shape(index, at.reshape(-1, d)).reshape(at.shape[:2]) for index in of_facet(degree, d)]
+@dataclass(frozen=True, kw_only=True)
+class FacetPoints:
+    """Quadrature points (q) on the facets (f) of a part, or on intersections of those of two bodies.
+
+    Attributes:
+        weights: of the points, over L^(d-1), (f, q).
+        facets: of the part or of the first side, (f,).
+        functions: the basis functions of these facets' nodes at the points, (f, q, n).
+        hats: the functions that are linear from node to node, (f, q, n).
+        at_ends: the basis functions at the corners of intersections, or at the nodes, (f, ., n).
+        normals: of the first side at the points where its facets are curved, else None, (f, q, d).
+        sides: the bubbles of the body, or of both.
+        spread: from nodes to facets.
+    """
+
+    weights: Array
+    facets: Integers
+    functions: Array
+    hats: Array
+    at_ends: Array
+    normals: Array | None
+    sides: tuple[SideBubbles, ...]
+    spread: Spread
 
 
-class InterfacePoints:
-    """Quadrature points (q) on the intersections (f) that this rank looks at. Creation is collective.
+def part_points(problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, degree: int) -> FacetPoints:
+    """Points on the facets of a part of the boundary whose cells this rank owns. Collective.
+
+    Args:
+        problem: what was solved.
+        bubbles: the space of bubbles.
+        surface: the part.
+        degree: of the quadrature.
+    """
+    comm, on = problem.domain.mesh.comm, contact_facets(problem, bubbles, surface.facets)
+    at, weights = quadrature("interval" if on.dimension == 2 else "triangle", degree)
+    functions = spaces.simplex_functions(on.degree, at, spaces.edge_share(problem.space))
+    count, own = len(on.nodes), _numbers(problem.space, surface.blocks)
+    known, kept = np.unique(np.concatenate(agree(comm, own))), np.ones(on.nodes.shape, dtype=np.bool_)
+    functions, hats, ends, places = (
+        np.broadcast_to(values, (count, *values.shape))
+        for values in (functions, nodes.hats(on.degree, at), np.eye(on.nodes.shape[1]), at)
+    )
+    return FacetPoints(
+        weights=on.areas[:, None] * weights,
+        facets=np.arange(count),
+        functions=functions,
+        hats=hats,
+        at_ends=ends,
+        normals=None,
+        sides=(_side(bubbles, on.degree, 1.0, places, _numbers(bubbles, on.bubbles)),),
+        spread=Spread(
+            comm=comm,
+            count=len(known),
+            own=np.searchsorted(known, own),
+            at=np.searchsorted(known, _numbers(problem.space, on.nodes)),
+            kept=kept,
+            shares=np.ones((len(own), 1)),
+            carriers=_means(kept),
+        ),
+    )
+
+
+def interface_points(problem: Problem, bubbles: fem.FunctionSpace, interface: Interface, degree: int) -> FacetPoints:
+    """Points on the intersections that this rank looks at. Collective.
 
     Args:
         problem: what was solved.
         bubbles: the space of bubbles.
         interface: one of the problem's.
         degree: of the quadrature.
+    """
+    d, comm, first = problem.scales.dimension, problem.domain.mesh.comm, interface.first
+    overlaps, names = interface.overlaps, interface.sides
+    own = np.arange(comm.rank, len(overlaps.areas), comm.size)
+    rule, weights = quadrature("interval" if d == 2 else "triangle", degree)
+    points = overlaps.sampled(rule, weights, own)
+    size, found = (len(own), len(weights)), list[SideBubbles]()
+    for side, name, sign, at, of in (
+        (interface.first, names.first, 1.0, points.on_first, overlaps.first),
+        (interface.second, names.second, -1.0, points.on_second, overlaps.second),
+    ):
+        bubbles_of = _of_interface(problem, bubbles, side, name)[of[own]]
+        found.append(_side(bubbles, side.degree, sign, at.reshape(*size, d), bubbles_of))
+    functions = first.functions(points.on_first.reshape(*size, d))
+    return FacetPoints(
+        weights=np.asarray(points.weights.reshape(size) / float(problem.scales.length) ** (d - 1)),
+        facets=overlaps.first[own],
+        functions=functions,
+        hats=nodes.hats(first.degree, points.on_first.reshape(-1, d)).reshape(functions.shape),
+        at_ends=first.functions(overlaps.on_first[own]),
+        normals=first.normals_at(points.first, points.on_first).reshape(*size, d) if first.curved else None,
+        sides=tuple(found),
+        spread=_of_carriers(problem, interface),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """Values at the nodes (n) that carry something as values at the nodes of facets.
 
     Attributes:
-        weights: of the points, over L^(d-1), (f, q).
-        facets: of the first side, (f,).
-        functions: the basis functions of the first side's nodes at the points, (f, q, n).
-        hats: the functions that are linear from node to node, (f, q, n).
-        at_ends: the basis functions at the corners of the intersections, (f, d, n).
-        normals: of the first side at the points where facets are curved, else None, (f, q, d).
-        sides: the bubbles of both sides.
-        reference: a node of each facet's carriers, (facets,).
+        comm: the ranks.
+        count: n.
+        own: those that this rank owns, (m,).
+        at: the carriers of each facet, (facets, k).
+        kept: which of the facet's nodes are their own carriers, (facets, k).
+        shares: by how much a relative displacement of 1 at owned nodes moves the first side there, (m, 1).
+        carriers: what the value at each node is the mean of, rows of weights, (facets, k, k).
     """
 
-    def __init__(self, problem: Problem, bubbles: fem.FunctionSpace, interface: Interface, degree: int) -> None:
-        d, comm = problem.scales.dimension, problem.domain.mesh.comm
-        overlaps, names = interface.overlaps, interface.sides
-        own = np.arange(comm.rank, len(overlaps.areas), comm.size)
-        rule, weights = quadrature("interval" if d == 2 else "triangle", degree)
-        points = overlaps.sampled(rule, weights, own)
-        self.weights: Array = np.asarray(points.weights.reshape(len(own), -1) / float(problem.scales.length) ** (d - 1))
-        self.facets = overlaps.first[own]
-        places = [on.reshape(*self.weights.shape, d) for on in (points.on_first, points.on_second)]
-        first = interface.first
-        normals = first.normals_at(points.first, points.on_first) if interface.first.curved else None
-        self.normals = None if normals is None else normals.reshape(*self.weights.shape, d)
-        self.functions, self.at_ends = first.functions(places[0]), first.functions(overlaps.on_first[own])
-        self.hats = nodes.hats(first.degree, places[0].reshape(-1, d)).reshape(self.functions.shape)
-        self.sides = (
-            _bubbles_of(problem, bubbles, first, names.first, 1.0, self.facets, places[0]),
-            _bubbles_of(problem, bubbles, interface.second, names.second, -1.0, overlaps.second[own], places[1]),
-        )
-        self._spread = _Spread(problem, interface)
-        self.reference = self._spread.reference
+    comm: MPI.Comm
+    count: int
+    own: Integers
+    at: Integers
+    kept: Mask
+    shares: Array
+    carriers: Array
 
-    def of_nodes(self, values: Array) -> Array:
-        """Values at the owned nodes (m, ...) by facet and carrier, (facets, n, ...). Collective."""
-        return self._spread.of_carriers(values)
-
-    def on_facets(self, values: Array) -> Array:
-        """Values of carriers (facets, n, k) at the nodes of all facets, (facets, n, k)."""
-        return np.asarray(self._spread.carriers @ values)
-
-    def summed(self, values: Array) -> Array:
-        """Forces on the functions of facets' nodes (facets, n, k) as forces on the owned nodes, (m, k). Collective."""
-        return self._spread.summed(values)
-
-
-class _Spread:
-    """Values at the nodes that carry something as values at the nodes of the first side's facets.
-
-    Attributes:
-        carriers: what the value at each node is the mean of, rows of weights, (f, n, n).
-        reference: a node of each facet's carriers, (f,).
-    """
-
-    def __init__(self, problem: Problem, interface: Interface) -> None:
-        self._comm: MPI.Comm = problem.domain.mesh.comm
-        first, weights = interface.first, interface.rows.weights
-        start = problem.space.dofmap.index_map.local_range[0]
-        own = start + interface.surface.blocks.astype(np.int64)
-        known = np.flatnonzero(weights > 0.0)
-        self._count, self._own = len(known), np.searchsorted(known, own)
-        self._kept = weights[first.nodes] > 0.0
-        at = np.searchsorted(known, first.nodes).clip(max=len(known) - 1)
-        self._at = np.where(self._kept, at, 0)
-        self._shares = (weights[own] / interface.rows.first.diagonal()[own])[:, None]
-        self.carriers = _means(self._kept)
-        for facet, node in dual_basis.adopted(first, interface.overlaps, self._kept).items():
-            self._at[facet, 0], self.carriers[facet, :, 0] = np.searchsorted(known, node), 1.0
-        self.reference: Integers = np.argmax(self.carriers.any(axis=1), axis=1)
+    @functools.cached_property
+    def reference(self) -> Integers:
+        """A node of each facet's carriers, (facets,)."""
+        return np.argmax(self.carriers.any(axis=1), axis=1)
 
     def of_carriers(self, values: Array) -> Array:
-        """Values at the owned nodes (m, ...) by facet and carrier, (facets, n, ...). Collective."""
-        every = np.zeros((self._count, *values.shape[1:]))
-        every[self._own] = values
-        return np.asarray(self._comm.allreduce(every)[self._at])
+        """Values at the owned nodes (m, ...) by facet and carrier, (facets, k, ...). Collective."""
+        every = np.zeros((self.count, *values.shape[1:]))
+        every[self.own] = values
+        return np.asarray(self.comm.allreduce(every)[self.at])
 
     def summed(self, values: Array) -> Array:
-        """Forces on the functions of facets' nodes (facets, n, k) as forces on the relative displacements, (m, k).
+        """Forces on the functions of facets' nodes (facets, k, ·) as forces on the relative displacements, (m, ·).
 
         Beside a node that carries nothing a relative displacement of 1 moves the first side by another amount than 1:
         the rows of the problem (:mod:`.dual_basis`) say by how much. So a uniform traction has the problem's own
         nodal forces. Collective.
         """
-        every = np.zeros((self._count, values.shape[2]))
-        np.add.at(every, self._at[self._kept], values[self._kept])
-        return np.asarray(self._comm.allreduce(every)[self._own] * self._shares)
+        every = np.zeros((self.count, values.shape[2]))
+        np.add.at(every, self.at[self.kept], values[self.kept])
+        return np.asarray(self.comm.allreduce(every)[self.own] * self.shares)
+
+
+def _of_carriers(problem: Problem, interface: Interface) -> Spread:
+    """Of an interface, some of whose nodes carry nothing. Collective."""
+    first, weights = interface.first, interface.rows.weights
+    own = _numbers(problem.space, interface.surface.blocks)
+    known, kept = np.flatnonzero(weights > 0.0), weights[first.nodes] > 0.0
+    at = np.where(kept, np.searchsorted(known, first.nodes), 0)
+    carriers = _means(kept)
+    for facet, node in dual_basis.adopted(first, interface.overlaps, kept).items():
+        at[facet, 0], carriers[facet, :, 0] = np.searchsorted(known, node), 1.0
+    return Spread(
+        comm=problem.domain.mesh.comm,
+        count=len(known),
+        own=np.searchsorted(known, own),
+        at=at,
+        kept=kept,
+        shares=(weights[own] / interface.rows.first.diagonal()[own])[:, None],
+        carriers=carriers,
+    )
 
 
 def _means(kept: Mask) -> Array:
