@@ -264,7 +264,7 @@ def study(
         repeats: of each point at most, for the median of its time; 1 or more.
         force: whether a study that is in the folder already is replaced.
         **axes: values by axis, such as ``epsilon=["exact", 0.1]``, ``mesh=[0, 1, 2]``, ``tolerance``, ``method``,
-            ``smoothing``, ``linear_solver``, ``degree``, ``accuracy``; all combinations are run. Without axes: those of
+            ``smoothing``, ``linear_solver``, ``degree``; all combinations are run. Without axes: those of
             the default plan. ``mesh`` counts refinements of a mesh that you bring, and cells along the first side of a
             block.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..runtime import log
 from ..runtime.mpi import on_root
 from ..solvers import obstacle_force
 from ..system import existence
+from ..typing import Array
 from ..workflow import Preparation, prepare
 
 COMM = MPI.COMM_WORLD
@@ -45,7 +46,7 @@ def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> st
     factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:
         return json.dumps(console.as_data(prepared, factors) | {"sizes": sizes}, indent=2, ensure_ascii=False)
-    begin, end = [*console.heading(prepared, COMM.size), *_size_lines(**sizes)], console.load_factors(factors)
+    begin, end = [*console.heading(prepared, COMM.size), *_size_lines(sizes)], console.load_factors(factors)
     return "\n".join([*begin, *end, *console.effects(prepared), *console.history(prepared)])
 
 
@@ -60,30 +61,24 @@ def _sizes(prepared: Preparation) -> dict[str, Any]:
     sums = {name: COMM.allreduce(force.array_r.reshape(-1, d).sum(axis=0)) for name, force in loads.items()}
     pressed = obstacle_force.pressed(problem)
     obstacles = {} if pressed is None else {pressed.name: pressed.force * pressed.direction}
+
+    def shown(force: Array) -> list[float]:
+        rounding = 1e-12 * np.max(np.abs(force))
+        return (np.where(np.abs(force) > rounding, force, 0.0) * problem.scales.force).tolist()
+
     return {
         "body": list(map(float, problem.domain.upper - problem.domain.lower)),
         "parts": {name: domain_forms.of(problem.space, facets).area for name, facets in problem.part_facets.items()},
-        "loads": {name: _rounded(force * problem.scales.force) for name, force in sums.items()},
-        "obstacle_forces": {name: _rounded(force * problem.scales.force) for name, force in obstacles.items()},
+        "loads": {name: shown(force) for name, force in sums.items()},
+        "obstacle_forces": {name: shown(force) for name, force in obstacles.items()},
     }
 
 
-def _size_lines(
-    body: Sequence[float],
-    parts: Mapping[str, float],
-    loads: Mapping[str, Sequence[float]],
-    obstacle_forces: Mapping[str, Sequence[float]],
-) -> Iterator[str]:
+def _size_lines(sizes: dict[str, Any]) -> Iterator[str]:
     """The sizes, a line for each kind."""
-    area, force = ("m", "N/m") if len(body) == 2 else ("m²", "N")
-    yield f"body: {' x '.join(f'{e:.4g}' for e in body)} m"
-    yield f"parts: {', '.join(f'{name} {value:.4g} {area}' for name, value in parts.items())}"
-    for what, forces in (("sum of", loads), ("force on the obstacle of", obstacle_forces)):
-        for name, total in forces.items():
+    area, force = ("m", "N/m") if len(sizes["body"]) == 2 else ("m²", "N")
+    yield f"body: {' x '.join(f'{e:.4g}' for e in sizes['body'])} m"
+    yield f"parts: {', '.join(f'{name} {value:.4g} {area}' for name, value in sizes['parts'].items())}"
+    for what, kind in (("sum of", "loads"), ("force on the obstacle of", "obstacle_forces")):
+        for name, total in sizes[kind].items():
             yield f"{what} {name}: ({', '.join(f'{component:.4g}' for component in total)}) {force}"
-
-
-def _rounded(force: Any) -> list[float]:
-    """The components; what is only rounding beside the largest is zero."""
-    least = 1e-12 * float(np.max(np.abs(force), initial=0.0))
-    return [float(f) if abs(f) > least else 0.0 for f in force]

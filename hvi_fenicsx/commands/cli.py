@@ -219,7 +219,7 @@ def _equilibria(equilibria: argparse.ArgumentParser) -> None:
 def _study(study: argparse.ArgumentParser) -> None:
     text = (
         "solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, tolerance, "
-        "linear_solver or accuracy; several axes: all combinations; none: the program plans the study"
+        "or linear_solver; several axes: all combinations; none: the program plans the study"
     )
     study.add_argument("--axis", action="append", default=[], metavar="NAME=VALUE,...", help=text)
     text = "solve a point at most N times for its time, by default 9"

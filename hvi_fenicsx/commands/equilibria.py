@@ -71,12 +71,16 @@ def _run(call: Session) -> int:
     )
     if found.left:
         on_root(COMM, lambda: kept.write(call.folder.work, found.left))
-    code = _exit_code(prepared, found, interrupted=call.interrupted())
+    interrupted, code = call.interrupted(), ExitCode.NOT_CONVERGED
+    if prepared.solvability.state == "escapes":
+        code = ExitCode.NO_SOLUTION
+    elif found.proven or interrupted:
+        code = ExitCode.CERTIFIED if found.proven else ExitCode.INTERRUPTED
     say([f"result: {found.reason}; {counted(found.nodes, 'box', 'boxes')}"])
     rows = list(_all_written(call, bodies, found))
     entry = _entry(found, rows, prepared.problem.scales.energy)
     more = plain({"reason": found.reason, "exit_code": int(code), "equilibria": entry, "command": options.given})
-    record, draw = common(prepared) | more, not options.no_pictures and not call.interrupted()
+    record, draw = common(prepared) | more, not options.no_pictures and not interrupted
     on_root(COMM, lambda: _write(call, rows, record, draw=draw))
     say(_lines(prepared, found, rows))
     return int(code)
@@ -87,7 +91,7 @@ class _StateFile:
 
     def __init__(self, call: Session) -> None:
         self._call, self._identity = call, on_root(COMM, lambda: call.identity)
-        self._next, self._broken = time.monotonic() + KEPT_EVERY, False
+        self._next = time.monotonic() + KEPT_EVERY
 
     def keep(self, state: Callable[[], Saved]) -> None:
         """Write what is left, if it is time.
@@ -96,27 +100,18 @@ class _StateFile:
             state: makes it.
         """
         began = time.monotonic()
-        if COMM.rank or self._broken or began < self._next:
+        if COMM.rank or began < self._next:
             return
         try:
             self.write(self._call.folder.announce(JOURNAL).parent, state())
+            self._next = time.monotonic() + KEPT_EVERY * max(1.0, time.monotonic() - began)
         except NotWrittenError as error:
-            self._broken = True
+            self._next = np.inf
             LOG.info("%s; a kill would lose the search", error)
-        now = time.monotonic()
-        self._next = now + KEPT_EVERY * max(1.0, now - began)
 
     def write(self, folder: Path, state: Saved) -> None:
         """Write what is left into a folder. Rank 0 only."""
         writing.write_journal(folder / JOURNAL, self._identity, [state])
-
-
-def _exit_code(prepared: Preparation, found: Found, *, interrupted: bool) -> ExitCode:
-    if prepared.solvability.state == "escapes":
-        return ExitCode.NO_SOLUTION
-    if found.proven:
-        return ExitCode.CERTIFIED
-    return ExitCode.INTERRUPTED if interrupted else ExitCode.NOT_CONVERGED
 
 
 def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[Row]:
@@ -141,12 +136,12 @@ def _row(bodies: Equilibria, point: StationaryPoint, solution: Solution) -> Row:
     comm, unit = problem.domain.mesh.comm, problem.scales.displacement
     slips = [np.linalg.norm(s.slip, axis=1) for s in examination.states]
     openings = [np.where(np.isfinite(s.gap), s.gap, -s.normal) for s in examination.states]
-    slip, opening = (max((float(np.max(one, initial=0.0)) for one in all_), default=0.0) for all_ in (slips, openings))
+    slip, opening = (largest(comm, np.max(np.hstack([0.0, *found]))) * unit for found in (slips, openings))
     return {
         "energy": examination.energy * problem.scales.energy,
         "kind": point.kind,
-        "max_slip": largest(comm, slip) * unit,
-        "max_opening": largest(comm, opening) * unit,
+        "max_slip": slip,
+        "max_opening": opening,
         "broken": falls_passed(bodies.problem, point.x) if point.x.size else 0,
         "isolated": point.isolated,
         "certified": solution.converged,

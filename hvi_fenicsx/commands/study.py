@@ -36,10 +36,8 @@ def execute(options: argparse.Namespace) -> int:
     with display():
         study, warnings = measurement.conduct(folder, existing, [options.scene])
         told = [f"warning: {text}" for text in warnings]
-        certified, ranks = (
-            sum(row.converged for row in study.rows),
-            "1 rank" if COMM.size == 1 else f"{COMM.size} ranks",
-        )
+        certified = sum(row.converged for row in study.rows)
+        ranks = "1 rank" if COMM.size == 1 else f"{COMM.size} ranks"
         say([f"{study.title or 'untitled'}: {len(study.rows)} points, {certified} certified, on {ranks}"])
         if study.left_out:
             say([f"{len(study.left_out)} combinations are no scenes, like {study.left_out[0]}"])

@@ -18,8 +18,6 @@ from typing import Any
 
 from mpi4py import MPI
 
-from ..accuracy.adaptive import AdaptiveSolver
-from ..accuracy.control import Goal, solve_to_goal
 from ..errors import ExitCode, HviError
 from ..report import page
 from ..report.solution_arrays import ReportError
@@ -194,7 +192,7 @@ class Measurement:
         found, exact = self._fields(solution), self.plan.exact_like(point)
         if point == exact:
             self._exact = point, found
-        smoothed = bool(point.scene.solver.smoothing) and point.accuracy is None and solution is not None
+        smoothed = bool(point.scene.solver.smoothing) and solution is not None
         if smoothed and self._exact[0] != exact:
             self._exact = exact, self._fields(self._measured(exact, None, repeats=0)[1])
         on_root(self.comm, lambda: self._keep({**record, **self._errors(found, smoothed=smoothed)}))
@@ -250,19 +248,11 @@ class Measurement:
         return bool(self.comm.bcast(wanted, root=0))
 
     def _solved(self, point: Point, timer: Timer, over: Callable[[], bool]) -> Solution:
-        """The scene on its mesh, or on one made for an accuracy. Collective."""
-
-        def stop() -> bool:
-            return self.interrupted() or over()
-
-        if point.accuracy is None:
-            found = find_solution(prepare(point.scene, self.comm, timer), interrupted=stop)
-            found.free()
-            return found.solution
-        solver = AdaptiveSolver(timer=timer, interrupted=stop)
-        reached = solve_to_goal(point.scene, self.comm, Goal(point.accuracy), solver, lambda line: None)
-        timer.seconds["solve"] += timer.seconds["estimate"]  # which steers the refinement: part of what it costs
-        return reached.solution
+        """Collective."""
+        prepared = prepare(point.scene, self.comm, timer)
+        found = find_solution(prepared, interrupted=lambda: self.interrupted() or over())
+        found.free()
+        return found.solution
 
 
 def _failed(reason: str, code: int) -> dict[str, Any]:

@@ -49,17 +49,15 @@ class Point:
     """What one point of a study solves.
 
     Attributes:
-        scene: the scene, on its own mesh.
-        accuracy: instead of that mesh, one refined adaptively until the estimate is below this (`hvi run --accuracy`).
+        scene: the scene.
     """
 
     scene: Model
-    accuracy: float | None = None
 
     @property
     def name(self) -> str:
         """A digest of its scene and the mesh file's content."""
-        digest = hashlib.sha256(f"{self.accuracy}\n{dump_scene(self.scene)}".encode())
+        digest = hashlib.sha256(dump_scene(self.scene).encode())
         for file in self.scene.files():
             digest.update(file.read_bytes())
         return digest.hexdigest()[:16]
@@ -67,8 +65,6 @@ class Point:
     @property
     def mesh(self) -> str:
         """The mesh, as people name it."""
-        if self.accuracy is not None:
-            return f"adaptive to {100 * self.accuracy:g} %"
         return self.scene.domain.mesh_text(lambda metres: quantity(metres, "m"))
 
     @property
@@ -118,7 +114,7 @@ def read_axis(text: str) -> tuple[str, tuple[str, ...]]:
     """
     name, _, rest = text.partition("=")
     values = tuple(dict.fromkeys(v.strip() for v in rest.split(",") if v.strip()))
-    axes = ("mesh", *SolverTable.model_fields, "accuracy")
+    axes = ("mesh", *SolverTable.model_fields)
     if name not in axes:
         raise InputError(f"--axis {text}: {unknown('axis', name, axes)}")
     if not values:
@@ -131,12 +127,8 @@ def _combinations(scene: Model, axes: Values, left_out: list[str]) -> Iterator[P
     for values in itertools.product(*axes.values()):
         pairs = dict(zip(axes, values, strict=True))
         on_mesh = _on_mesh(scene, pairs.pop("mesh", scene.domain))
-        accuracy = pairs.pop("accuracy", None)
-        if accuracy is not None and on_mesh.domain.refined(Fraction(2)) is None:
-            raise InputError("--axis accuracy: this mesh cannot be refined; leave the axis out")
-        try:  # an accuracy is between 0 and 1, as a tolerance is
-            least = None if accuracy is None else _solved(scene, {"tolerance": accuracy}).solver.tolerance
-            yield Point(_solved(on_mesh, pairs), least)
+        try:
+            yield Point(_solved(on_mesh, pairs))
         except InputError as error:
             left_out.append(f"{', '.join(f'{name} {value}' for name, value in pairs.items())}: {error}")
 
@@ -149,7 +141,7 @@ def _on_mesh(scene: Model, mesh: str | DomainShape) -> Model:
 
 
 def _default(scene: Model) -> Iterator[Values]:
-    """Meshes by widths; on the scene's own mesh smoothings, methods, tolerances; both degrees; adaptive meshes."""
+    """Meshes by widths; on the scene's own mesh smoothings, methods, tolerances; both degrees."""
     exact, meshes = {"epsilon": (EXACT,)}, {"mesh": _default_meshes(scene)}
     widths = {"epsilon": (EXACT, "0.1", "0.01")} if scene.laws() else exact
     yield {**meshes, **widths}
@@ -160,8 +152,6 @@ def _default(scene: Model) -> Iterator[Values]:
     yield {**exact, "tolerance": ("1e-4", "1e-10")}
     yield {**exact, "linear_solver": ("lu", "gamg")}
     yield {**meshes, **exact, "degree": ("2",)}
-    if scene.domain.refined(Fraction(2)) is not None:
-        yield {"accuracy": ("0.1", "0.03"), "degree": ("1", "2")}
 
 
 def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
@@ -178,28 +168,18 @@ def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
     """
     _check_axes(scene, axes)
     scene = scene.with_solver(degree=scene.solver.degree or 1)
-    left_out, products = list[str](), list(_asked(dict(axes)) if axes else _default(scene))
+    left_out, products = list[str](), [dict(axes)] if axes else list(_default(scene))
     wanted = [point for product in products for point in _combinations(scene, product, left_out)]
     if not wanted:
         raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(left_out))
     own = Point(scene)
     plan = Plan(own, tuple(dict.fromkeys(left_out)))
-    uniform = [own, *(point for point in wanted if point.accuracy is None)]
-    everything = [*wanted, own, *map(plan.exact_like, uniform)]
-    distinct = {(dump_scene(p.scene), p.accuracy): p for p in everything}.values()
-    finest = max(uniform, key=lambda p: p.scene.domain.unknowns(scene.dimension))
+    everything = [*wanted, own, *map(plan.exact_like, [own, *wanted])]
+    distinct = {dump_scene(p.scene): p for p in everything}.values()
+    finest = max(everything, key=lambda p: p.scene.domain.unknowns(scene.dimension))
     degree = max(point.degree for point in everything)
     points = tuple(sorted(distinct, key=lambda p: (p.unknowns, p.scene.solver.smoothing is not None)))
     return replace(plan, points=points, reference=_reference(finest, degree))
-
-
-def _asked(axes: Values) -> Iterator[Values]:
-    """All combinations; those of adaptive meshes beside the others, at each degree."""
-    uniform = {name: values for name, values in axes.items() if name != "accuracy"}
-    if uniform:
-        yield uniform
-    if "accuracy" in axes:
-        yield {name: values for name, values in axes.items() if name in ("accuracy", "degree")}
 
 
 def _check_axes(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> None:

@@ -72,9 +72,8 @@ class Row:
     Attributes:
         point: its name.
         mesh: as people name it.
-        accuracy: that an adaptive mesh is made for; None of any other.
         degree: of the elements.
-        h: the mesh width, m; None of an adaptive mesh.
+        h: the mesh width, m.
         smoothing: kind of the smoothing; None for the exact law.
         epsilon: width of the smoothing, relative; None for the exact law.
         epsilon_absolute: width of the smoothing, N/m, where the scene says it so.
@@ -97,7 +96,6 @@ class Row:
 
     point: str
     mesh: str
-    accuracy: float | None
     degree: int
     h: float | None
     smoothing: str | None
@@ -304,8 +302,7 @@ def _row(point: Point, known: Mapping[str, Any], certain: Mapping[str, Certainty
     found = [(q, error, certain[q].error) for q, error in errors.items()]
     of_solver = ("smoothing", "epsilon_absolute", "method", "linear_solver", "tolerance")
     setting: dict[str, Any] = {name: getattr(solver, name) for name in of_solver}
-    setting |= {name: getattr(point, name) for name in ("mesh", "accuracy", "degree")}
-    setting["h"] = None if point.accuracy is not None else point.scene.domain.width() or record.get("h")
+    setting |= {"mesh": point.mesh, "degree": point.degree, "h": point.scene.domain.width() or record.get("h")}
     setting["epsilon"] = (record.get("epsilon") or solver.epsilon) if solver.smoothing else None
     beyond = tuple(q for q, error, least in found if error is not None and least is not None and error < least)
     return Row(**{**record, **setting, "beyond_reference": beyond})

@@ -44,9 +44,8 @@ def test_meshes_of_a_model_are_refinements_of_its_body(body: hvi.Body) -> None:
 @pytest.mark.long
 def test_data_on_the_mesh_leave_the_model_that_mesh(body: hvi.Body, tmp_path: Path) -> None:
     model = with_ufl(body)
-    for axis in ({"mesh": [0, 1]}, {"accuracy": [0.1]}):
-        with pytest.raises(hvi.InputError, match=r"--axis (mesh|accuracy): .*(no other mesh|cannot be refined)"):
-            hvi.study(model, **axis)  # type: ignore[arg-type]
+    with pytest.raises(hvi.InputError, match=r"--axis mesh: .*no other mesh"):
+        hvi.study(model, mesh=[0, 1])
     found = hvi.study(model, tmp_path / "kept", tolerance=[1e-4], repeats=1)
     assert {row.mesh for row in found.rows} == {"the body's mesh"}
     kept = json.loads((tmp_path / "kept" / "study.json").read_text(encoding="utf-8"))

@@ -44,13 +44,6 @@ def test_combinations_that_are_no_scene_are_left_out() -> None:
     assert "solves the law without smoothing" in made.left_out[0]
 
 
-def test_adaptive_meshes_are_added_and_the_reference_stays_finer_than_the_scenes_own_mesh() -> None:
-    made = planned(scene(8, friction=LAW), "mesh=4", "accuracy=0.1,0.05")
-    assert [p.accuracy for p in made.points if p.accuracy] == [0.1, 0.05]
-    assert {cells(p) for p in made.points if not p.accuracy} == {4, 8}
-    assert (cells(made.reference[0]), made.reference[0].accuracy) == (32, None)
-
-
 def test_a_plan_of_the_programs_own_varies_what_the_scene_has() -> None:
     with_law, without = planned(scene(8, friction=LAW)), planned(scene(8))
     assert {p.scene.solver.smoothing for p in with_law.points} == {None, "quadratic", "chks", "log_exp", "paper"}
@@ -58,7 +51,7 @@ def test_a_plan_of_the_programs_own_varies_what_the_scene_has() -> None:
     for made in (with_law, without):
         assert {cells(p) for p in made.points} == {2, 4, 8, 16}
         assert {"auto", "snes_vi"} <= {p.scene.solver.method for p in made.points}
-        assert {p.mesh for p in made.points if p.degree == 2} >= {"8 × 8 cells", "adaptive to 10 %"}
+        assert {p.mesh for p in made.points if p.degree == 2} >= {"8 × 8 cells", "16 × 16 cells"}
         assert made.reference[0].degree == 2
 
 
@@ -69,7 +62,6 @@ def test_a_plan_of_the_programs_own_varies_what_the_scene_has() -> None:
         (["mesh="], "needs values"),
         (["epsilon=-1"], "greater than 0"),
         (["degree=3"], "must be 2 or less"),
-        (["accuracy=2"], "less than 1"),
         (["method=newton"], "method"),
         (["mesh=0"], "number of cells"),
         (["mesh=8", "mesh=16"], "twice"),
@@ -85,7 +77,7 @@ def test_a_bad_plan_says_how_to_mend_it(given: list[str], words: str) -> None:
 
 def study_of(pairs: list[tuple[float, float]], own_error: float = 1e-4, **keys: Any) -> Study:
     """Rows by their seconds and errors; the first is the scene's own setting, the last the exact law."""
-    empty = ("accuracy", "h", "smoothing", "epsilon", "epsilon_absolute", "energy", "iterations", "runs", "phases")
+    empty = ("h", "smoothing", "epsilon", "epsilon_absolute", "energy", "iterations", "runs", "phases")
     setting = {"mesh": "4 × 4 cells", "degree": 1, "method": "auto", "linear_solver": "auto", "tolerance": 1e-8}
     found = {"dofs": 1, "converged": True, "reason": "certified", "exit_code": 0}
     rows = []
