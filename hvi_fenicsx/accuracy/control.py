@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -53,7 +53,7 @@ def solve_to_goal(
     quantity = quantities.find(goal.quantity)()
     solver = replace(solver, existence=quantity.needs_existence)
     degree = scene.solver.degree or (2 if quantity.estimated else 1)
-    run = _Run(comm, ErrorBalance(goal.accuracy, quantity, scene.dimension, degree), solver, report)
+    run = _Run(comm, goal.accuracy, quantity, solver, report)
     level, why = run.levels(scene.with_solver(degree=degree))
     return AccuracyResult(
         goal=goal,
@@ -67,13 +67,22 @@ def solve_to_goal(
 
 
 class _Run:
-    """One run to a goal. Everything it decides on is the same on all ranks."""
+    """One run to an accuracy, which balances three parts of the error; what it decides is the same on all ranks.
+
+    The mesh has the largest part; smoothing and solver get what is small beside it.
+    """
 
     def __init__(
-        self, comm: MPI.Comm, balance: ErrorBalance, solver: AdaptiveSolver, report: Callable[[str], None]
+        self, comm: MPI.Comm, accuracy: float, quantity: Quantity, solver: AdaptiveSolver, report: Callable[[str], None]
     ) -> None:
         self.steps: list[AdaptiveStep] = []
-        self._comm, self._balance, self._solver, self._report = comm, balance, solver, report
+        self._comm, self._accuracy, self._quantity, self._solver, self._report = (
+            comm,
+            accuracy,
+            quantity,
+            solver,
+            report,
+        )
         self._room = cost.memory_room(comm) - cost.peak_memory(comm)
         self._failures, self._start = 0, time.perf_counter()
         self._estimated: AdaptiveLevel | None = None
@@ -83,7 +92,7 @@ class _Run:
         level = self._solver.begin(scene, self._comm)
         try:
             self._record(level)
-            while self._failures or not self.steps[-1].error <= self._balance.accuracy:
+            while self._failures or not self.steps[-1].error <= self._accuracy:
                 self._start = time.perf_counter()
                 if self._estimated is not None and self._solver.interrupted():
                     raise _EndedError(_INTERRUPTED)
@@ -102,7 +111,7 @@ class _Run:
         if solution.solve_result is None or solution.solve_result.interrupted:
             stopped = solution.solve_result is not None and self._estimated is not None
             raise _EndedError(_INTERRUPTED if stopped else solution.reason)
-        self._balance.quantity.add(level)
+        self._quantity.add(level)
         if solution.estimate is None and solution.converged:
             raise _EndedError("the error of a law whose energy of separation depends on the mode is not estimated")
         if solution.estimate is None:
@@ -116,11 +125,10 @@ class _Run:
         self._report(_line(len(self.steps), self.steps[-1], self._solver.timer.total))
 
     def _step(self, level: AdaptiveLevel, estimate: Estimate) -> AdaptiveStep:
-        norm, quantity = estimate.energy_norm or 1.0, self._balance.quantity
-        smoothing = quantity.smoothing()
+        norm, smoothing = estimate.energy_norm or 1.0, self._quantity.smoothing()
         return AdaptiveStep(
             dofs=level.dofs,
-            error=quantity.error(),
+            error=self._quantity.error(),
             discretisation=estimate.discretisation / norm,
             smoothing=smoothing,
             algebraic=estimate.algebraic / norm,
@@ -132,29 +140,73 @@ class _Run:
 
     def _next(self, level: AdaptiveLevel) -> AdaptiveLevel:
         """The next level. Collective."""
-        balance, scene = self._balance, level.solution.scene
-        last = None if self._failures else self.steps[-1]
-        if last is not None and math.isfinite(last.error):
-            self._check_affordable(balance.needed(level.dofs, last.error))
+        scene, last = level.solution.scene, None if self._failures else self.steps[-1]
+        degree, dimension = scene.solver.degree or 1, scene.dimension
+        if last is not None and math.isfinite(last.error):  # at the best rate of convergence
+            rate, missing = self._quantity.power_of_energy * degree / dimension, last.error / self._accuracy
+            with np.errstate(over="ignore"):
+                self._check_affordable(level.dofs * np.maximum(1.0, missing) ** (1.0 / rate), scene)
         if self.steps:
-            scene = balance.next_scene(scene, self.steps[-1])
-        if last is not None and balance.mesh_suffices(self.steps):
+            scene = self._scene(scene, self.steps[-1])
+        if last is not None and self._mesh_suffices():
             return self._solver.again(level, scene)
-        refined = adaptive.refined(level, balance.bulk(last))
-        self._check_affordable(refined.domain.dimension * nodes.count(refined.domain.mesh, balance.degree))
-        return self._solver.refine(level, refined, scene, balance.quantity.ahead())
+        refined = adaptive.refined(level, self._bulk(last, dimension, degree))
+        self._check_affordable(dimension * nodes.count(refined.domain.mesh, degree), scene)
+        return self._solver.refine(level, refined, scene, self._quantity.ahead())
 
-    def _check_affordable(self, dofs: float) -> None:
+    def _check_affordable(self, dofs: float, scene: Model) -> None:
         """End where so many unknowns cannot be solved for."""
-        wanted, degree = self._balance.accuracy, self._balance.degree
         if not math.isfinite(dofs):
-            raise _EndedError(f"{wanted:g} is beyond any number of unknowns")
-        needed = cost.memory_of_all_meshes(dofs, self._balance.dimension, degree)
+            raise _EndedError(f"{self._accuracy:g} is beyond any number of unknowns")
+        needed = cost.memory_of_all_meshes(dofs, scene.dimension, scene.solver.degree or 1)
         if dofs > _LARGEST or needed > self._room:
             raise _EndedError(
-                f"{wanted:g} would need {dofs:.1e} unknowns or more and {needed / 1024:.3g} GB; "
+                f"{self._accuracy:g} would need {dofs:.1e} unknowns or more and {needed / 1024:.3g} GB; "
                 f"{self._room / 1024:.3g} GB can be used"
             )
+
+    def _bulk(self, last: AdaptiveStep | None, dimension: int, degree: int) -> float:
+        """Part of the squared error to refine: no more than the aim needs.
+
+        In space, and on Γc, where errors fall as the square of the energy norm's, a smaller part goes as far.
+        """
+        quantity = self._quantity
+        on_contact = quantity.known_from_one_mesh and not quantity.in_energy_norm
+        most = CONTROL.bulk ** (1 if dimension == 2 and not on_contact else 2)
+        mesh, smoothing, _ = (0.0, 0.0, 0.0) if last is None else quantity.parts(last)
+        if not quantity.known_from_one_mesh or mesh <= 0.0:
+            return most
+        left = self._beside(smoothing) / mesh
+        # Halving the edges of marked cells leaves 4^-p of it.
+        needed = (1 - (left**2 if quantity.in_energy_norm else left)) / (1 - 0.25**degree)
+        return min(needed, most) if needed > 0.0 else most
+
+    def _beside(self, part: float) -> float:
+        """The largest error beside a part with which both together are no larger than the aim."""
+        return math.sqrt(max((_AIM * self._accuracy) ** 2 - part**2, 0.0))
+
+    def _mesh_suffices(self) -> bool:
+        """Whether the next step must change ε or the tolerance, and not the mesh."""
+        *others, last = self.steps
+        mesh, smoothing, algebraic = self._quantity.parts(last)
+        if smoothing > max(mesh, self._allowed_smoothing(mesh)):  # unless a smaller ε on this mesh did not help
+            return not (others and others[-1].dofs == last.dofs and last.smoothing >= 0.99 * others[-1].smoothing)
+        return mesh <= _AIM * self._accuracy < max(smoothing, algebraic) * 2
+
+    def _allowed_smoothing(self, mesh: float) -> float:
+        """The error that smoothing may cause: a part of the accuracy, or all that a fine enough mesh leaves."""
+        return max(CONTROL.smoothing * self._accuracy, self._beside(mesh))
+
+    def _scene(self, scene: Model, last: AdaptiveStep) -> Model:
+        """The scene with the ε and the tolerance of the next step."""
+        mesh, smoothing, _ = self._quantity.parts(last)
+        solver, values = scene.solver, dict[str, float]()
+        if smoothing > self._allowed_smoothing(mesh):
+            widths = {name: getattr(solver, name) for name in ("epsilon", "epsilon_absolute")}
+            values = {name: CONTROL.smoothing * width for name, width in widths.items() if width is not None}
+        if 10 * last.algebraic > max(last.discretisation, self._accuracy):
+            values["tolerance"] = solver.tolerance / 10
+        return scene.with_solver(**values)
 
 
 def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:
@@ -164,96 +216,6 @@ def _line(level: int, step: AdaptiveStep, elapsed: float) -> str:
         f"mesh {level}: {step.dofs:,} unknowns, {error} (energy norm: mesh {step.discretisation:.1e}, smoothing "
         f"{step.smoothing:.1e}, solver {step.algebraic:.1e}), tolerance {step.tolerance:.0e}{width}, {elapsed:.1f} s"
     )
-
-
-@dataclass(frozen=True)
-class ErrorBalance:
-    """The balance between the three parts of the error.
-
-    The mesh has the largest part; smoothing and solver get what is small beside it.
-
-    Attributes:
-        accuracy: what is asked for, relative.
-        quantity: the target quantity.
-        dimension: d, 2 or 3.
-        degree: of the elements that are refined, p, 1 or 2.
-    """
-
-    accuracy: float
-    quantity: Quantity
-    dimension: int
-    degree: int
-
-    def needed(self, dofs: int, error: float) -> float:
-        """The unknowns that the accuracy takes, at the best rate of convergence.
-
-        Args:
-            dofs: unknowns now.
-            error: with these.
-        """
-        rate = self.quantity.power_of_energy * self.degree / self.dimension
-        with np.errstate(over="ignore"):
-            return float(dofs * np.maximum(1.0, np.float64(error) / self.accuracy) ** (1.0 / rate))
-
-    def bulk(self, last: AdaptiveStep | None) -> float:
-        """Part of the squared error to refine: no more than the aim needs.
-
-        In space, and on Γc, where errors fall as the square of the energy norm's, a smaller part goes as far.
-
-        Args:
-            last: the last step; None where no error is known.
-        """
-        on_contact = self.quantity.known_from_one_mesh and not self.quantity.in_energy_norm
-        most = CONTROL.bulk ** (1 if self.dimension == 2 and not on_contact else 2)
-        mesh, smoothing, _ = (0.0, 0.0, 0.0) if last is None else self.quantity.parts(last)
-        if not self.quantity.known_from_one_mesh or mesh <= 0.0:
-            return most
-        left = self._beside(smoothing) / mesh
-        # Halving the edges of marked cells leaves 4^-p of it.
-        needed = (1 - (left**2 if self.quantity.in_energy_norm else left)) / (1 - 0.25**self.degree)
-        return min(needed, most) if needed > 0.0 else most
-
-    def _beside(self, part: float) -> float:
-        """The largest error beside a part with which both together are no larger than the aim."""
-        return math.sqrt(max((_AIM * self.accuracy) ** 2 - part**2, 0.0))
-
-    def mesh_suffices(self, steps: Sequence[AdaptiveStep]) -> bool:
-        """Whether the next step must change ε or the tolerance, and not the mesh.
-
-        Args:
-            steps: all steps so far, one at least.
-        """
-        mesh, smoothing, algebraic = self.quantity.parts(steps[-1])
-        if smoothing > max(mesh, self._allowed_smoothing(mesh)):
-            return self._smoothing_falls(steps)
-        wanted = _AIM * self.accuracy
-        return mesh <= wanted < max(smoothing, algebraic) * 2
-
-    @staticmethod
-    def _smoothing_falls(steps: Sequence[AdaptiveStep]) -> bool:
-        """Whether a smaller ε on the same mesh, where the last step tried it, made smoothing's part smaller."""
-        last, before = steps[-1], steps[-2] if len(steps) > 1 else None
-        return before is None or before.dofs != last.dofs or last.smoothing < 0.99 * before.smoothing
-
-    def _allowed_smoothing(self, mesh: float) -> float:
-        """The error that smoothing may cause: a part of the accuracy, or all that a fine enough mesh leaves."""
-        return max(CONTROL.smoothing * self.accuracy, self._beside(mesh))
-
-    def next_scene(self, scene: Model, last: AdaptiveStep) -> Model:
-        """The scene with the ε and the tolerance of the next step.
-
-        Args:
-            scene: of the last step.
-            last: the last step.
-        """
-        mesh, smoothing, _ = self.quantity.parts(last)
-        solver, values = scene.solver, dict[str, float]()
-        if smoothing > self._allowed_smoothing(mesh):
-            widths = {name: getattr(solver, name) for name in ("epsilon", "epsilon_absolute")}
-            values = {name: CONTROL.smoothing * width for name, width in widths.items() if width is not None}
-        if 10 * last.algebraic > max(last.discretisation, self.accuracy):
-            values["tolerance"] = solver.tolerance / 10
-        return scene.with_solver(**values)
 
 
 @dataclass(frozen=True)

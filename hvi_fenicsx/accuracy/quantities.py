@@ -161,16 +161,13 @@ class LoadFactor(Observable):
 
     def missing(self, level: AdaptiveLevel) -> str | None:
         """A load that can be raised until the body escapes."""
-        if np.isfinite(self._factor(level)):
+        if np.isfinite(self.read(level)[0]):
             return None
         return "no load factor holds the body, or none ends what does; hvi check reports the state"
 
     def read(self, level: AdaptiveLevel) -> Array:
         """The factor, (1,)."""
-        return np.array([self._factor(level)])
-
-    def _factor(self, level: AdaptiveLevel) -> float:
-        return float(getattr(level.solution.solvability, self.name))
+        return np.array([getattr(level.solution.solvability, self.name)])
 
 
 class HeldFactor(LoadFactor):

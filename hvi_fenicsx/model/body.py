@@ -81,34 +81,19 @@ class Body:
         """
         from mpi4py import MPI
 
-        return cls._of(shape, comm or MPI.COMM_WORLD)
+        return cls.of_places(shape, comm or MPI.COMM_WORLD)
 
     @classmethod
-    def _of(cls, shape: DomainShape, comm: MPI.Comm | None) -> Self:
+    def of_places(cls, shape: DomainShape, comm: MPI.Comm | None, **places: Mapping[str, Any]) -> Self:
+        """A body of a shape with its places. Not collective.
+
+        Args:
+            shape: the shape with its mesh.
+            comm: the ranks that share the mesh; None: that of a scene file, which each command makes on its ranks.
+            **places: its ``pieces`` and ``interfaces`` by name.
+        """
         body = cls.__new__(cls)
-        body.shape, body.comm = shape, comm
-        return body
-
-    @classmethod
-    def of_file(cls, shape: DomainShape, interfaces: Mapping[str, InterfaceSides]) -> Self:
-        """The body of a scene file: it keeps no mesh, and each command makes it on its ranks. Not collective.
-
-        Args:
-            shape: the shape with its mesh.
-            interfaces: where two of its sides meet, by name.
-        """
-        body = cls._of(shape, None)
-        body.interfaces = interfaces
-        return body
-
-    def with_shape(self, shape: DomainShape) -> Self:
-        """The body with another shape or mesh. Not collective.
-
-        Args:
-            shape: the shape with its mesh.
-        """
-        body = self._of(shape, self.comm)
-        body.pieces, body.interfaces = self.pieces, self.interfaces
+        body.__dict__.update(places, shape=shape, comm=comm)
         return body
 
     @classmethod

@@ -78,23 +78,17 @@ class SolverTable(Table):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if mistakes := self._contradictions():
-            raise validation_error(mistakes)
+        if self.epsilon and self.epsilon_absolute:
+            raise validation_error([Mistake(("epsilon_absolute",), "epsilon is given too; leave one of them out")])
+        if self.smoothing and not (self.epsilon or self.epsilon_absolute):
+            text = (
+                "needs its width: add epsilon = 0.01 (relative to the law's energy at its kink) "
+                "or epsilon_absolute = 0.1 (N/m), or leave smoothing out to solve the law itself"
+            )
+            raise validation_error([Mistake(("smoothing",), text)])
         return self
 
-    def _contradictions(self) -> list[Mistake]:
-        found = []
-        if self.epsilon is not None and self.epsilon_absolute is not None:
-            found.append(Mistake(("epsilon_absolute",), "epsilon is given too; leave one of them out"))
-        if self.smoothing and self.epsilon is None and self.epsilon_absolute is None:
-            found.append(Mistake(("smoothing",), _HOW_WIDE))
-        return found
 
-
-_HOW_WIDE = (
-    "needs its width: add epsilon = 0.01 (relative to the law's energy at its kink) "
-    "or epsilon_absolute = 0.1 (N/m), or leave smoothing out to solve the law itself"
-)
 Factor = Annotated[float, Field(ge=-1e100, le=1e100)]
 """A factor beyond this makes work of which squares are no numbers."""
 _AS_LIST = BeforeValidator(lambda value: tuple(value) if isinstance(value, list | tuple) else (value,))
@@ -109,14 +103,15 @@ def _programme(factors: tuple[float, ...]) -> tuple[float, ...]:
     return factors
 
 
-def _written(factors: tuple[float, ...]) -> Any:
-    return factors[0] if len(factors) == 1 else list(factors)
-
-
 class PathTable(Table):
     """The load path that `hvi path` follows. A factor grows from 0 and multiplies what drives the body."""
 
-    to: Annotated[tuple[Factor, ...], _AS_LIST, AfterValidator(_programme), PlainSerializer(_written)] = (1.0,)
+    to: Annotated[
+        tuple[Factor, ...],
+        _AS_LIST,
+        AfterValidator(_programme),
+        PlainSerializer(lambda to: to[0] if len(to) == 1 else list(to)),
+    ] = (1.0,)
     """the factor at which the path ends; or a programme with turns: [1.0, 0.2, 1.5] loads, unloads, loads again"""
     scaled: Names | None = None
     """what the factor multiplies: loads, prescribed displacements and moved obstacles by name, such as
@@ -345,7 +340,8 @@ def _smoothing(model: Content) -> Iterator[Mistake]:
     wanted = model.solver.smoothing
     fitting = None if wanted is None else smoothing.registered()[wanted].laws
     if fitting is not None and (others := [n for n in names if n not in fitting]):
-        text = f'{shown(wanted)} is made for law = {_quoted(fitting)}, not for {_quoted(others)}; use "quadratic"'
+        made_for, given = (", ".join(map(shown, kinds)) for kinds in (fitting, others))
+        text = f'{shown(wanted)} is made for law = {made_for}, not for {given}; use "quadratic"'
         yield Mistake(("solver", "smoothing"), text)
 
 
@@ -379,7 +375,3 @@ def _against(model: Content, effect: Effect, side: str, prescribed: Mapping[int,
 
 def _axis(axis: int) -> str:
     return f"u_{'xyz'[axis]}"
-
-
-def _quoted(names: Iterable[str]) -> str:
-    return ", ".join(map(shown, names))

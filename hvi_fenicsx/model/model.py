@@ -71,8 +71,7 @@ class Model(Content):
             Mistakes: it contradicts itself.
         """
         model = cls.__new__(cls)
-        model.from_file, model.body = True, body
-        model.__dict__.update(rest)
+        model.__dict__.update(rest, from_file=True, body=body)
         model._complete(effects, parts)
         return model
 
@@ -122,10 +121,8 @@ class Model(Content):
         found = [i for i in alike if places in (frozenset(self.effects[i].where or ()), {self.effects[i].name})]
         if len(found) == 1:
             return found[0]
-        known = "; ".join(f"{e.key} on {in_words(tuple(sorted(e.where or ())))}" for e in self.effects)
         count = "no" if not found else "several effects"
-        where = in_words(tuple(sorted(places)))
-        raise InputError(f"replace: the model has {count} {wanted.key} on {where}; it has {known}")
+        raise InputError(f"replace: the model has {count} {wanted.key} on {in_words(wanted.where)}; it is {self!r}")
 
     def _with(self, effects: Iterable[Effect], **changes: Any) -> Self:
         """A model like it with other effects and attributes, checked."""
@@ -147,7 +144,9 @@ class Model(Content):
             solver: how to solve.
             path: the load path.
         """
-        body = self.body if domain is None else self.body.with_shape(domain)
+        body, old = self.body, self.body
+        if domain is not None:
+            body = Body.of_places(domain, old.comm, pieces=old.pieces, interfaces=old.interfaces)
         return self._with(self.effects, body=body, solver=solver or self.solver, path=path or self.path)
 
     def with_solver(self, **values: Any) -> Self:
@@ -180,21 +179,20 @@ class Model(Content):
         Args:
             folder: from which the paths of mesh files and plugins are given; None: absolute paths.
         """
-        context = None if folder is None else {"folder": folder}
 
         def write(table: Table) -> dict[str, Any]:
-            return table.model_dump(mode="json", exclude_none=True, context=context)
+            return table.model_dump(mode="json", exclude_none=True, context=folder and {"folder": folder})
 
         found: dict[str, Any] = {"title": self.title}
         if self.plugins:
-            found["plugins"] = [path if folder is None else os.path.relpath(path, folder) for path in self.plugins]
-        found |= {"domain": write(self.domain)}
+            found["plugins"] = [os.path.relpath(path, folder) if folder else path for path in self.plugins]
+        found["domain"] = write(self.domain)
         effects: dict[str, dict[str, Any]] = {table: {} for table in TABLES}
         for name, part in self.parts.items():
-            if (sides := self.body.interfaces.get(name)) is not None:
+            if sides := self.body.interfaces.get(name):
                 effects["interface"][name] = {"between": [sides.first, sides.second], "tied": sides.tied}
             else:
-                piece = {} if part.where is None else {"where": part.where.source}
+                piece = {"where": part.where.source} if part.where else {}
                 effects["boundary"][name] = {"on": _one_or_list(part.on), **piece}
         for effect in self.effects:
             own = effects[self.table(effect)].setdefault(effect.name, {})
@@ -205,8 +203,8 @@ class Model(Content):
             else:
                 own[effect.key] = write(effect)
         found |= {table: named.get(WHOLE, named) for table, named in effects.items() if named}
-        path = {} if self.path is None else {"path": write(self.path)}
-        return found | {"solver": write(self.solver), **path}
+        found["solver"] = write(self.solver)
+        return found | {"path": write(self.path)} if self.path else found
 
     def __eq__(self, other: object) -> bool:
         """Whether both say the same of the same body."""
@@ -217,7 +215,7 @@ class Model(Content):
 
     def _content(self) -> tuple[Any, ...]:
         body = self.domain, self.parts, self.body.interfaces
-        return (*body, self.effects, self.title, self.solver, self.path, self.plugins)
+        return body, self.effects, self.title, self.solver, self.path, self.plugins
 
     def __repr__(self) -> str:
         names = (f"{type(effect).__name__} on {in_words(effect.where)}" for effect in self.effects)

@@ -242,7 +242,7 @@ class _SceneTables(TopLevel):
         materials = [material.at(material.where, name) for name, material in self.material.items()]
         tables = [*self.body.items(), *self.boundary.items(), *self.interface.items()]
         return Model.of_tables(
-            Body.of_file(self.domain, interfaces),
+            Body.of_places(self.domain, None, interfaces=interfaces),
             [*materials, *(effect for name, table in tables for effect in table.effects(name))],
             {name: BoundaryPart(table.on, table.where) for name, table in self.boundary.items()},
             title=self.title,
