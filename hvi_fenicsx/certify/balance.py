@@ -109,8 +109,9 @@ def _holders(state: ContactState) -> Iterator[Holder]:
             least, most = -high, -low
             if (length := law.term.length) is not None:
                 stuck, given = law.argument <= law.near, -law.allowed[:, k]
-                pull, push = length.extent(k)
-                least, most = np.where(stuck, -pull * high, given), np.where(stuck, push * high, given)
+                pull = length.factors[k] * high
+                least = np.where(stuck, -pull, given)
+                most = np.where(stuck, pull * length.two_sided()[k], given)
             yield holder(law.term.directions[:, k], law.term.weights, -law.allowed[:, k], least, most)
 
 

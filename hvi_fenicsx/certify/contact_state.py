@@ -13,6 +13,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..effects import Direction
+from ..laws import Length, Superpotential
 from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
@@ -279,20 +280,32 @@ class LawState:
         return force_attribution.on_kink(self.term.law.convex, self.argument, self.near)
 
 
+def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
+    """The admissible tractions of a law nearest to given ones, (m, k).
+
+    Args:
+        law: its superpotential j.
+        length: the length that it acts on; None: the signed slip, k = 1.
+        slip: the components of what it acts on, (m, k).
+        traction: the given ones, (m, k).
+        near: distance from a kink that counts as being on it, one for all or (m,).
+    """
+    ends = law.interval(slip[:, 0] if length is None else length.of(slip), near)
+    if length is None:
+        return np.asarray(np.clip(traction[:, 0], *ends)[:, None])
+    return length.allowed(slip, traction, ends, near)
+
+
 def _law_state(term: LawTerm, u: Array, given: Array, hidden: Mask, scale: Array, near: Array) -> LawState:
     """The state of a law that gives known tractions at a local array u."""
-    components, argument = term.slip(u), term.argument(u)
-    low, high = term.law.interval(argument, near)
-    if term.length is None:
-        traction, allowed = given[:, 0], np.clip(given, low[:, None], high[:, None])
-    else:
-        distance = near * term.stretch
-        traction = term.length.traction(components, given, distance)
-        allowed = term.length.allowed(components, given, (low, high), distance)
+    components, traction = term.slip(u), given[:, 0]
+    allowed = nearest(term.law, term.length, components / term.stretch[:, None], given, near)
+    if term.length is not None:
+        traction = term.length.traction(components, given, near * term.stretch)
     return LawState(
         term=term,
         components=components,
-        argument=argument,
+        argument=term.argument(u),
         traction=traction,
         given=given,
         distance=np.linalg.norm(given - allowed, axis=1),

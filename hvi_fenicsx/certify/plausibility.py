@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..effects import Direction
@@ -53,6 +54,11 @@ def of_law(problem: Problem, term: LawTerm) -> str:
         if where == part and any(law.direction is term.direction for law in contribution.laws)
     )
     return f"boundary.{part}.{next(keys)}"
+
+
+def _most(comm: MPI.Comm, values: Array) -> float:
+    """The largest of values that are not negative, on all ranks. Collective."""
+    return largest(comm, float(np.max(values, initial=0.0)))
 
 
 def before_solving(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[str, ...]:
@@ -122,7 +128,7 @@ def _polygons(problem: Problem) -> Iterator[str]:
         turns = facets.turns(domain.mesh, np.setdiff1d(surface.facets, known).astype(np.int32))
         bent = turns[(turns > PLAUSIBILITY.straight) & (turns < PLAUSIBILITY.corner)]
         if total(comm, len(bent)) > PLAUSIBILITY.mostly_bent * total(comm, len(turns)):
-            most = np.degrees(largest(comm, float(np.max(bent, initial=0.0))))
+            most = np.degrees(_most(comm, bent))
             yield (
                 f"{of_bounds(problem, surface.part)}: nearly all facets turn from one to the next, by up to "
                 f"{most:.2g}°, as those of a curved side. They are taken for a polygon, and the pressure of degree 2 "
@@ -168,14 +174,15 @@ def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Iterator[st
 
 def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rounding: float) -> bool:
     """Whether a rigid motion that the supports leave works against the law. Collective."""
-    comm, surface, work = problem.domain.mesh.comm, term.surface, 0.0
+    comm, surface = problem.domain.mesh.comm, term.surface
     for body, rigid in zip(problem.bodies, existence.rigid_problems(problem, forces), strict=True):
         basis = kernel(comm, body, rigid.fixed)
         mine = existence.inside(problem, body, surface.blocks)
         fields = problem.motions_at(surface.blocks[mine], body)
         along = np.einsum("mkd,mnd,nj->mkj", term.directions[mine], fields, basis)
-        work = max(work, float(np.max(np.abs(along), initial=0.0)))
-    return largest(comm, work) > rounding
+        if _most(comm, np.abs(along)) > rounding:
+            return True
+    return False
 
 
 def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> tuple[str, ...]:
@@ -188,7 +195,7 @@ def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> 
     """
     warnings = [*_strain(problem, u)]
     if examination.certificate.passed:
-        size = largest(problem.domain.mesh.comm, float(np.max(np.abs(u.x.array), initial=0.0)))
+        size = _most(problem.domain.mesh.comm, np.abs(u.x.array))
         warnings += _dips(problem, examination, size)
         for state in examination.states:
             warnings += _distant_obstacle(problem, state, size)
@@ -202,15 +209,16 @@ def _strain(problem: Problem, u: fem.Function) -> Iterator[str]:
     """By the edges: of P1, the strain along an edge is its change of length over its length."""
     comm, scales, d = problem.domain.mesh.comm, problem.scales, problem.scales.dimension
     values = u.x.array.reshape(-1, d)
-    size = np.sqrt(d) * largest(comm, float(np.max(np.abs(values), initial=0.0))) * scales.displacement
+    size = np.sqrt(d) * _most(comm, np.abs(values)) * scales.displacement
     shortest = problem.once("shortest edge", None, lambda: _shortest_edge(problem))
     if 2.0 * size <= PLAUSIBILITY.large * shortest:
         return
-    most = 0.0
-    for edge, change in zip(_along_edges(problem, problem.points[:, :d]), _along_edges(problem, values), strict=True):
-        along = np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge)
-        most = max(most, float(np.max(along, initial=0.0)))
-    strain = largest(comm, most) * scales.displacement
+    strain = scales.displacement * max(
+        _most(comm, np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge))
+        for edge, change in zip(
+            _along_edges(problem, problem.points[:, :d]), _along_edges(problem, values), strict=True
+        )
+    )
     if strain > PLAUSIBILITY.large:
         yield f"the largest strain is {strain:.3g}, where small strains are assumed; is the modulus in N/m²?"
 
@@ -262,9 +270,9 @@ def _slip_and_kink(problem: Problem, law: LawState) -> Iterator[str]:
         return
     if term.direction in (Direction.OPENING, Direction.PENETRATION):
         reached = np.where(law.argument > 0, reached, 0.0)
-    most = largest(comm, float(np.max(reached, initial=0.0)))
+    most = _most(comm, reached)
     beyond = total(comm, float(weights[reached > far * kink].sum())) / total(comm, float(weights.sum()))
-    metres = problem.scales.displacement * largest(comm, float(np.max(term.stretch, initial=0.0)))
+    metres = problem.scales.displacement * _most(comm, term.stretch)
     what = "slip" if term.direction is Direction.SLIP else term.direction.value
     sizes = f"{most * metres:.3g} m, the law's first kink {kink * metres:.3g} m"
     if DEFAULT.near < most < kink / far:
@@ -288,7 +296,7 @@ def _wide_smoothing(problem: Problem, law: LawState) -> Iterator[str]:
     away, weights, limit = law.true_distance(), term.weights, PLAUSIBILITY.large
     share = total(comm, float(weights[away > limit * peak].sum())) / total(comm, float(weights.sum()))
     if share > PLAUSIBILITY.large:
-        most, of_peak = (largest(comm, float(np.max(v, initial=0.0))) for v in (away * term.multiplier, away / peak))
+        most, of_peak = (_most(comm, v) for v in (away * term.multiplier, away / peak))
         yield (
             f"{of_law(problem, term)}: smoothing changes the traction by up to "
             f"{most * problem.scales.stress:.3g} N/m² ({percent(of_peak)} of the law's peak), "

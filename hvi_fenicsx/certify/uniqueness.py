@@ -84,20 +84,12 @@ def _needed(arc: Arc, x: Array, energy: Array, traction: Array, rounding: Array)
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = 1.0 / (arc.low - x), 1.0 / (arc.high - x)  # c(y) = -(2 a w² + 2 b w + slope), w being 1/(y - x)
         turn = np.clip(np.where(above > 0.0, -0.5 * steeper / above, ends[0]), np.minimum(*ends), np.maximum(*ends))
-        found = [-2.0 * _beyond(above * w + steeper, rounding) * w - arc.slope for w in (*ends, turn)]
-        sides = [_beside(arc, np.abs(w), s * steeper, rounding) for s, w in zip((-1.0, 1.0), ends, strict=True)]
-    return np.where(inside, np.maximum(*sides), np.max(found, axis=0))
-
-
-def _beyond(tractions: Array, rounding: Array) -> Array:
-    """Differences of tractions; 0 where they are rounding, (m,)."""
-    return np.where(np.abs(tractions) <= rounding, 0.0, tractions)
-
-
-def _beside(arc: Arc, w: Array, steeper: Array, rounding: Array) -> Array:
-    """The least c on one side of an x on the piece, which ends 1/w from x; infinite where the energy falls."""
-    needed = np.where(steeper < -rounding, np.inf, -2.0 * np.maximum(steeper, 0.0) * w - arc.slope)
-    return np.where(np.isinf(w), -np.inf, needed)
+        tractions = [(w, above * w + steeper) for w in (*ends, turn)]
+        found = [-2.0 * np.where(np.abs(t) <= rounding, 0.0, t) * w - arc.slope for w, t in tractions]
+        ahead = arc.high - x > x - arc.low
+        pull, near = np.where(ahead, steeper, -steeper), np.where(ahead, *np.abs(ends[::-1]))
+        beside = np.where(pull < -rounding, np.inf, -2.0 * np.maximum(pull, 0.0) * near - arc.slope)
+    return np.where(inside, beside, np.max(found, axis=0))
 
 
 WAY_OUT = "`hvi equilibria SCENE --lowest` finds out"

@@ -11,15 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem, la
+from dolfinx import fem
 from mpi4py import MPI
 
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Bounds, Problem
 from ..problem.scaling import DEFAULT as composition
+from ..problem.vectors import nodal_values
 from ..runtime import forms
-from ..typing import Array, Entities, Mask
+from ..typing import Array, Entities
 from .bubbles import DEFAULT, BubbleStiffness, of_cell
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
@@ -187,17 +188,6 @@ class Constraints:
     prescribed: tuple[Prescribed, ...]
     bounds: tuple[BubbleBounds, ...]
 
-    def free(self, blocks: Entities) -> Mask:
-        """Where bubbles are not prescribed, (k, d).
-
-        Args:
-            blocks: the bubbles' owned blocks, with bounds, (k,).
-        """
-        found = np.ones((len(blocks), self.bounds[0].normals.shape[1]), dtype=np.bool_)
-        for given in self.prescribed:
-            found[np.isin(blocks, given.blocks), given.component] = False
-        return found
-
 
 def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Constraints:
     """What the bubbles must meet beside a solution. Collective.
@@ -275,7 +265,11 @@ class LeastEnergy:
         at = part.blocks
         if self._begun:
             return self._e[at]
-        return np.where(self._under.free(at), self.residual[at] * self._stiffness.inverse[at], self._e[at])
+        found = self.residual[at] * self._stiffness.inverse[at]
+        for given in self._under.prescribed:
+            there = np.isin(at, given.blocks)
+            found[there, given.component] = self._e[at[there], given.component]
+        return found
 
     def _put_on_bounds(self) -> None:
         """Put the bubbles on the bounds that hold them; the residual follows, at first what is prescribed, too."""
@@ -343,7 +337,7 @@ class VertexStiffness(BubbleStiffness):
         self._in.x.scatter_forward()
         self.at_nodes.x.array[:] = 0.0
         self._press()
-        force = -self.problem.combined(_assembled(self._on_nodes, self.at_nodes))
+        force = -self.problem.combined(nodal_values(self._on_nodes))
         if unmet is not None:
             force += unmet
         self.at_nodes.x.array[:] = self._node_inverse.solve(force, self._tolerance)[0].x.array
@@ -353,7 +347,7 @@ class VertexStiffness(BubbleStiffness):
         """The pressures of the bubbles and the nodes as they are. Collective."""
         parts = self.problem.bulk.dilatations
         for pressure, dilated, part in zip(self.pressures, self._dilated, parts, strict=True):
-            average = _assembled(dilated, pressure).ravel()
+            average = nodal_values(dilated).ravel()
             pressure.x.array[: len(average)] = part.stiffness.array_r * average
             pressure.x.scatter_forward()
 
@@ -366,15 +360,6 @@ class VertexStiffness(BubbleStiffness):
         self._owned(self._in)[:] = 0.0
         self._let_follow(unmet)
         return super()._product()
-
-
-def _assembled(form: fem.Form, like: fem.Function) -> Array:
-    """A linear form's values at the owned blocks of a function's space, (n, block size). Collective."""
-    vector = fem.assemble_vector(form)
-    vector.scatter_reverse(la.InsertMode.add)
-    dofs = like.function_space.dofmap
-    found = vector.array[: dofs.index_map.size_local * dofs.index_map_bs]
-    return np.array(found).reshape(-1, dofs.index_map_bs)
 
 
 def squares(traces: LawTraces, inverse: DualNorm) -> Array:

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from ..certify import balance
 from ..certify.certificate import Examination
-from ..certify.contact_state import ContactState
+from ..certify.contact_state import ContactState, nearest
 from ..certify.force_attribution import components, on_bounds, on_kink
 from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..problem.law_term import LawTerm
@@ -28,7 +28,6 @@ from ..system.system import System
 from ..system.thresholds import DEFAULT as SYSTEM
 from ..typing import Array, Entities, Integers
 from .bubbles import DEFAULT
-from .law_traces import nearest
 
 NEAR = CERTIFICATE.near
 
@@ -142,16 +141,6 @@ def _rising(comm: MPI.Comm, term: LawTerm, u: Array) -> Array:
     return term.rate(u, secant, second)
 
 
-def smoothing(problem: Problem, states: Sequence[ContactState]) -> Array:
-    """The smoothed laws' nodal forces minus the nearest ones of the unsmoothed laws, owned blocks (n, d).
-
-    Args:
-        problem: what was solved.
-        states: of the parts of Γc.
-    """
-    return _law_forces(problem, states, exact=True)
-
-
 def algebraic(problem: Problem, examination: Examination) -> Array:
     """Nodal forces that nothing accounts for: off the carriers, beyond the laws, pulling or distant contact; (n, d).
 
@@ -160,19 +149,14 @@ def algebraic(problem: Problem, examination: Examination) -> Array:
         examination: of its solution.
     """
     rest = balance.unbalanced(problem, examination.forces.reaction, examination.states)
-    rest = rest - _law_forces(problem, examination.states, exact=False)  # a law's force is minus its residual
+    rest = rest - law_forces(problem, examination.states, exact=False)  # a law's force is minus its residual
     for state in examination.states:
         if state.bounds is not None:
-            force = state.surface.weights * _impossible_pressure(state)
+            p = state.contact_pressure
+            possible = (state.on_upper & (p <= 0)) | (state.on_lower & (p >= 0))
+            force = np.where(possible, 0.0, state.surface.weights * p)
             rest[state.surface.blocks] += force[:, None] * state.surface.normals
     return np.asarray(rest)
-
-
-def _impossible_pressure(state: ContactState) -> Array:
-    """σ_n (m,) that contact cannot carry: at a gap, or of the wrong sign."""
-    p = state.contact_pressure
-    right = (state.on_upper & (p <= 0)) | (state.on_lower & (p >= 0))
-    return np.where(right, 0.0, p)
 
 
 def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> float:
@@ -190,8 +174,14 @@ def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> floa
     return total(problem.domain.mesh.comm, local)
 
 
-def _law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool) -> Array:
-    """Nodal law forces that the (exact or solved) law cannot give, owned blocks (n, d)."""
+def law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool) -> Array:
+    """The laws' nodal forces minus the nearest ones that they allow, owned blocks (n, d).
+
+    Args:
+        problem: what was solved.
+        states: of the parts of Γc.
+        exact: whether the unsmoothed laws are asked, not those that were solved.
+    """
     d = problem.scales.dimension
     forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
     for state in states:

@@ -94,7 +94,7 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
     cells += data_errors.squares(problem, traces.bubbles, examination.states)
     cells += part_ends.squares(problem, traces.bubbles, u, examination, inverse)
     smoothed = any(term.law != term.exact for term in problem.terms)
-    smoothing = inverse.solve(dual_norm.smoothing(problem, examination.states))[1] if smoothed else 0.0
+    smoothing = inverse.solve(dual_norm.law_forces(problem, examination.states, exact=True))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])
     inverse.destroy()
     comm = problem.domain.mesh.comm
@@ -105,13 +105,8 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
         "algebraic": algebraic**2 + beyond,
         "energy_norm": energy,
     }
-    norms = {name: _norm(square, DEFAULT.rounding) for name, square in squares.items()}
+    norms = {k: float(np.sqrt(s)) if s > DEFAULT.rounding**2 else 0.0 for k, s in squares.items()}
     return Estimate(cells=np.sqrt(cells), field=None if smoothed else field, **norms)
-
-
-def _norm(square: float, rounding: float) -> float:
-    """The root of what is more than rounding, else 0."""
-    return float(np.sqrt(square)) if square > rounding**2 else 0.0
 
 
 def _discretisation(traces: LawTraces, inverse: DualNorm, energy: float) -> tuple[ErrorField | None, Array]:

@@ -13,33 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
-from ..certify.contact_state import ContactState, LawState
+from ..certify.contact_state import ContactState, LawState, nearest
 from ..certify.placed_forces import traction
 from ..certify.thresholds import DEFAULT as CERTIFICATE
-from ..laws import Length, Superpotential
+from ..laws import Superpotential
 from ..mesh import nodes
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..typing import Array, Mask
 from . import bubbles
 from .bubbles import DEFAULT, LocalForces, collected
-from .traces import FacetPoints, Trace, frames, interface_points, part_points
-
-
-def nearest(law: Superpotential, length: Length | None, slip: Array, traction: Array, near: float | Array) -> Array:
-    """The admissible tractions of a law nearest to given ones, (m, k).
-
-    Args:
-        law: its superpotential j.
-        length: the length that it acts on; None: the signed slip, k = 1.
-        slip: the components of what it acts on, (m, k).
-        traction: the given ones, (m, k).
-        near: distance from a kink that counts as being on it, one for all or (m,).
-    """
-    ends = law.interval(slip[:, 0] if length is None else length.of(slip), near)
-    if length is None:
-        return np.asarray(np.clip(traction[:, 0], *ends)[:, None])
-    return length.allowed(slip, traction, ends, near)
+from .traces import FacetPoints, Trace, interface_points, part_points
 
 
 def stopped(law: Superpotential, before: Array, after: Array) -> Array:
@@ -247,7 +231,7 @@ class LawTraces:
             force -= np.einsum("mk,mkd->md", law.carried, law.term.directions)
         axes = np.tile(np.eye(force.shape[1]), (len(force), 1, 1))
         if (interface := self.problem.interface_of(state.surface)) is not None and interface.first.curved:
-            axes = frames(state.surface)
+            axes = np.concatenate([state.surface.normals[:, None], state.surface.tangents], axis=1)
         points = Trace(self.problem, self._points(state.surface), state.surface, axes)
         return points.with_bubbles(points.interpolated(np.einsum("mkd,md->mk", axes, force), along=True))
 

@@ -161,15 +161,6 @@ def turned(rotations: Array, values: Array) -> Array:
     return np.asarray(np.einsum("fnkl,fnk...->fnl...", rotations, values))
 
 
-def frames(surface: Surface) -> Array:
-    """Normal and tangents of the nodes of a part, (m, d, d).
-
-    Args:
-        surface: the part.
-    """
-    return np.concatenate([surface.normals[:, None], surface.tangents], axis=1)
-
-
 def rotations_between(one: Array, other: Array) -> Array:
     """The rotations that take unit vectors to others the shortest way, (..., d, d); these must not be opposite.
 

@@ -138,15 +138,6 @@ class Length:
             counts[:, 0] = c[:, 0] >= -near
         return counts
 
-    def extent(self, component: int) -> tuple[float, float]:
-        """How far the forces for a unit traction at δ = 0 reach against a component, and along it.
-
-        Args:
-            component: its number.
-        """
-        factor = self.factors[component]
-        return factor, (factor if self.two_sided()[component] else 0.0)
-
     def two_sided(self) -> Mask:
         """Which components count in both directions, (k,)."""
         counts = np.ones(len(self.factors), dtype=bool)
@@ -229,16 +220,6 @@ class Mixity(ABC):
         Args:
             share: of the slip in the work, 0 to 1, (m,).
         """
-
-    @property
-    def least(self) -> float:
-        """The least energy over that of opening alone."""
-        return min(1.0, self.energy_ratio)
-
-    @property
-    def greatest(self) -> float:
-        """The greatest one."""
-        return max(1.0, self.energy_ratio)
 
 
 class BenzeggaghKenane(Mixity):

@@ -257,7 +257,7 @@ def acts_on(problem: Problem, body: AnyBody, surface: Surface) -> bool:
 
 def _resistance(problem: Problem, body: AnyBody, term: LawTerm) -> Resistance:
     surface, law, mixity = term.surface, term.exact, term.mixity
-    least, greatest = (1.0, 1.0) if mixity is None else (mixity.least, mixity.greatest)
+    least, greatest = (1.0, 1.0) if mixity is None else sorted((1.0, mixity.energy_ratio))
     mine = inside(problem, body, surface.blocks)
     return Resistance(
         fields=problem.motions_at(surface.blocks[mine], body),
