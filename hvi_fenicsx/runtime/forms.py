@@ -175,45 +175,12 @@ def _lock(file: Path) -> int:
 
 
 def _renumbered(form: Any) -> Any:
-    """The form with new numbers of its facets, from 1 on, so that forms over different parts are compiled once.
-
-    Facets have one number if the same integrands are integrated over them.
-
-    Args:
-        form: UFL; one without arguments, or whose facets have no numbers, stays as it is.
-    """
-    over = [i for i in form.integrals() if i.integral_type() == "exterior_facet" and _has_numbers(i)]
-    if not form.arguments() or len({id(i.subdomain_data()) for i in over}) != 1:
+    """A form over one boundary part as one over facets of the number 1: so parts share a compiled form."""
+    over = [i for i in form.integrals() if i.integral_type() == "exterior_facet"]
+    tags, numbers = (over[0].subdomain_data(), over[0].subdomain_id()) if over and form.arguments() else (None, "")
+    if isinstance(numbers, str) or any(i.subdomain_data() is not tags or i.subdomain_id() != numbers for i in over):
         return form
-    first, numbers = dict[Any, Any](), dict[Any, list[int]]()
-    for one in over:
-        integrand = one.integrand(), str(one.metadata())
-        first.setdefault(integrand, one)
-        numbers.setdefault(integrand, []).extend(_numbers(one))
-    if any(len(set(each)) < len(each) for each in numbers.values()):  # an integrand counts twice there
-        return form
-    integrands = {n: tuple(n in each for each in numbers.values()) for each in numbers.values() for n in each}
-    kinds = sorted(set(integrands.values()))
-    new = {n: 1 + kinds.index(kind) for n, kind in integrands.items()}
-    tags = _selected(form.arguments()[0].ufl_function_space().mesh, over[0].subdomain_data(), new)
-    made = [i for i in form.integrals() if not any(i is one for one in over)]
-    for integrand, one in first.items():
-        ids = tuple(sorted({new[n] for n in numbers[integrand]}))
-        made.append(one.reconstruct(subdomain_id=ids, subdomain_data=tags))
-    return ufl.Form(made)
-
-
-def _has_numbers(integral: Any) -> bool:
-    return integral.subdomain_data() is not None and all(isinstance(n, int) for n in _numbers(integral))
-
-
-def _numbers(integral: Any) -> tuple[int, ...]:
-    number = integral.subdomain_id()
-    return number if isinstance(number, tuple) else (number,)
-
-
-def _selected(mesh: Any, tags: Any, new: dict[int, int]) -> Any:
-    """The entities that have one of these numbers, with the new ones."""
-    kept = np.isin(tags.values, list(new))
-    values = np.array([new[number] for number in tags.values[kept]], dtype=np.int32)
-    return meshtags(mesh, tags.dim, tags.indices[kept], values)
+    on = tags.indices[np.isin(tags.values, numbers)]
+    one = meshtags(form.arguments()[0].ufl_function_space().mesh, tags.dim, on, np.ones_like(on))
+    others = [i for i in form.integrals() if i.integral_type() != "exterior_facet"]
+    return ufl.Form([*others, *(i.reconstruct(subdomain_id=1, subdomain_data=one) for i in over)])
