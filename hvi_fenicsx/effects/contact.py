@@ -150,7 +150,7 @@ class Obstacle(Table):
         return self.nearest(self._seen(points))[1]
 
     def _seen(self, points: Array) -> Array:
-        return points if self.displacement is None else np.asarray(points - np.asarray(self.displacement), np.float64)
+        return points if self.displacement is None else points - self.displacement
 
     def lower(self) -> SpatialValue:
         """The lower bound of the opening that it makes: its distance, with the other sign."""
@@ -189,13 +189,13 @@ class Plane(Obstacle):
     def nearest(self, points: Array) -> tuple[Array, Array]:
         """Along its normal."""
         normal = unit(self.normal)
-        distance = (points - np.asarray(self.point)) @ normal
-        return distance, np.asarray(np.broadcast_to(0.0 - normal, points.shape), np.float64)
+        distance = (points - self.point) @ normal
+        return distance, np.broadcast_to(0.0 - normal, points.shape)
 
     def ahead(self, points: Array, direction: Array) -> Array:
         """NaN where the direction leads away from it."""
         steep = float(-unit(self.normal) @ direction)
-        return np.asarray(self.nearest(points)[0] / (steep if steep > 0.0 else math.nan), np.float64)
+        return self.nearest(points)[0] / (steep if steep > 0.0 else math.nan)
 
     @property
     def moves_straight(self) -> bool:
@@ -223,18 +223,18 @@ class _Round(Obstacle):
         """The components of vectors (m, d) that count for the distance from the centre."""
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
-        away = self.across(points - np.asarray(self.center))
+        away = self.across(points - self.center)
         length = np.linalg.norm(away, axis=1)
         out = np.divide(away, length[:, None], out=np.full_like(away, np.nan), where=length[:, None] > 0.0)
         return (self.radius - length, out) if self.hollow else (length - self.radius, -out)
 
     def ahead(self, points: Array, direction: Array) -> Array:
-        away, along = self.across(points - np.asarray(self.center)), self.across(direction[None])[0]
+        away, along = self.across(points - self.center), self.across(direction[None])[0]
         square, middle = float(along @ along), away @ along
         with np.errstate(all="ignore"):
             length = np.linalg.norm(away, axis=1)
             root = np.sqrt(middle**2 - square * (length - self.radius) * (length + self.radius))
-            return np.asarray((-middle + (root if self.hollow else -root)) / square)
+            return (-middle + (root if self.hollow else -root)) / square
 
 
 class Sphere(_Round):
@@ -258,7 +258,7 @@ class Cylinder(_Round):
     def across(self, vectors: Array) -> Array:
         """Those across the axis."""
         axis = unit(self.axis)
-        return np.asarray(vectors - (vectors @ axis)[:, None] * axis)
+        return vectors - (vectors @ axis)[:, None] * axis
 
 
 class TriangulatedSurface(Obstacle):
@@ -283,7 +283,7 @@ class TriangulatedSurface(Obstacle):
 
     def ahead(self, points: Array, direction: Array) -> Array:
         """By its triangles that face the body."""
-        return self.scale * _distances_along(self.file, np.asarray(points / self.scale, np.float64), direction)
+        return self.scale * _distances_along(self.file, points / self.scale, direction)
 
 
 def _obstacle(value: Any, info: ValidationInfo) -> Obstacle:

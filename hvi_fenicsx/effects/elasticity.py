@@ -262,14 +262,14 @@ class Orthotropic(_ByMatrix):
 
     def held(self) -> Array:
         """Normal stresses from normal strains."""
-        return np.asarray(np.linalg.inv(self._compliance()), dtype=np.float64)
+        return np.linalg.inv(self._compliance())
 
     def stiffness(self) -> Array:
         """The inverse of the compliance; plane strain leaves out what only z would need."""
         from scipy.linalg import block_diag
 
         normal = self.dimension() or 2
-        return np.asarray(block_diag(self.held()[:normal, :normal], np.diag(self.shear_moduli[::-1])))
+        return block_diag(self.held()[:normal, :normal], np.diag(self.shear_moduli[::-1]))
 
 
 class Anisotropic(_ByMatrix):
@@ -310,7 +310,7 @@ class Anisotropic(_ByMatrix):
 
     def thermal_stress(self) -> Array:
         """C : αI."""
-        return np.asarray(self.thermal_expansion * self.stiffness()[:, : self.dimension() or 2].sum(axis=1))
+        return self.thermal_expansion * self.stiffness()[:, : self.dimension() or 2].sum(axis=1)
 
     def out_of_plane(self) -> Array:
         """Zero: the matrix does not tell it."""

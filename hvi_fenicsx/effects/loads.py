@@ -242,7 +242,7 @@ class Moment(_Total):
         """A x r."""
         d = len(moments.centroid)
         r = np.pad(points[:, :d] - moments.centroid, ((0, 0), (0, 3 - d)))
-        return np.asarray(np.cross(_rotation(moments.second, self.values)[0], r)[:, :d], dtype=np.float64)
+        return np.cross(_rotation(moments.second, self.values)[0], r)[:, :d]
 
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:
         """The largest component over the body's length squared, cubed in 3D."""
@@ -257,7 +257,7 @@ def _rotation(second: Array, moment: tuple[float, ...]) -> tuple[Array, bool]:
     wide = np.pad(second, (0, 3 - len(second)))
     inertia = np.trace(wide) * np.eye(3) - wide
     wanted = np.array([0.0, 0.0, *moment] if len(moment) == 1 else moment)
-    rate = np.asarray(np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ wanted)
+    rate = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ wanted
     return rate, bool(np.allclose(inertia @ rate, wanted, rtol=0.0, atol=1e-9 * np.max(np.abs(wanted))))
 
 

@@ -110,7 +110,7 @@ class Expression(SpatialValue):
         known = space.tabulate_dof_coordinates()
         if not len(known):
             return np.zeros(len(points))
-        return np.asarray(sampled.x.array[cKDTree(known).query(points)[1]], dtype=np.float64)
+        return sampled.x.array[cKDTree(known).query(points)[1]]
 
     def in_ufl(self, mesh: Any, number: Callable[[float], Any]) -> Any:
         """Itself, or what it is at the nodes of another mesh."""

@@ -135,7 +135,7 @@ def _simplices(lower: Integers, upper: Integers, cells: Sequence[int] | Integers
     for begin, end, step in zip(lower, upper, steps, strict=True):
         corners = np.add.outer(np.arange(begin, end) * step, corners).ravel()
     paths = np.array([np.cumsum([0, *path]) for path in itertools.permutations(steps)])
-    return np.asarray((corners[:, None, None] + paths).reshape(-1, len(cells) + 1))
+    return (corners[:, None, None] + paths).reshape(-1, len(cells) + 1)
 
 
 def _steps(cells: Sequence[int] | Integers) -> list[int]:
@@ -145,7 +145,7 @@ def _steps(cells: Sequence[int] | Integers) -> list[int]:
 
 def _flat(places: Integers, cells: Sequence[int] | Integers) -> Integers:
     """The numbers of the grid's vertices, x running fastest, (n,)."""
-    return np.asarray(places @ np.array(_steps(cells), dtype=np.int64))
+    return places @ np.array(_steps(cells), dtype=np.int64)
 
 
 def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Array:
@@ -270,7 +270,7 @@ def _numbers_of_owner(parts: Sequence[Box], rank: int, places: Integers) -> Inte
     own: Mask = _owners(parts, rank) == rank
     counts = _counts(parts[rank])
     at = np.ravel_multi_index(tuple((places - parts[rank][0]).T), tuple(counts), order="F")
-    return np.asarray((np.cumsum(own) - 1)[at])
+    return (np.cumsum(own) - 1)[at]
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ class Inequalities:
 
 def _hold(values: list[Array], signs: list[Callable[[Array, Array], Any]]) -> Mask:
     pairs = zip(signs, values[:-1], values[1:], strict=True)
-    return np.asarray(np.logical_and.reduce([sign(one, other) for sign, one, other in pairs]))
+    return np.logical_and.reduce([sign(one, other) for sign, one, other in pairs])
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ def _sample(domain: Domain) -> _CellSample:
     """The same cells in the same order for any number of ranks. Collective."""
     comm, topology, d = domain.mesh.comm, domain.mesh.topology, domain.dimension
     every = max(1, topology.index_map(d).size_global // DEFAULT.hierarchy_from)
-    numbers = np.asarray(topology.original_cell_index, dtype=np.int64)
+    numbers = topology.original_cell_index
     chosen = np.flatnonzero(numbers % every == 0)
     corners = owned_corners(domain.mesh)[chosen]
     within = np.zeros((len(numbers), len(domain.regions)), dtype=bool)
@@ -112,7 +112,7 @@ def _surface(domain: Domain) -> _Surface | None:
         on[domain.sides[name], i] = True
     inside = np.setdiff1d(np.flatnonzero(on[: owned.size_local].any(axis=1)), facets)
     nodes = _outward(mesh, facets)
-    numbers = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[nodes]
+    numbers = mesh.geometry.input_global_indices[nodes]
     parts = agree(mesh.comm, (len(inside), numbers, mesh.geometry.x[nodes][:, :, :d], on[facets]))
     if any(part[0] for part in parts):
         return None
@@ -124,7 +124,7 @@ def _surface(domain: Domain) -> _Surface | None:
 def _exterior(mesh: dmesh.Mesh) -> Entities:
     d = mesh.topology.dim
     mesh.topology.create_connectivity(d - 1, d)
-    return np.asarray(dmesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
+    return dmesh.exterior_facet_indices(mesh.topology)
 
 
 def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
@@ -132,7 +132,7 @@ def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     d = mesh.topology.dim
     if not len(facets):
         return np.empty((0, d), dtype=np.int32)  # dolfinx divides by their number
-    nodes = np.asarray(dmesh.entities_to_geometry(mesh, d - 1, facets), dtype=np.int32)
+    nodes = dmesh.entities_to_geometry(mesh, d - 1, facets)
     if d == 2:
         return nodes
     links = mesh.topology.connectivity(2, 3)
@@ -140,7 +140,7 @@ def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     a, b, c = mesh.geometry.x[nodes].transpose(1, 0, 2)
     inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), middle - a) > 0
     nodes = np.where(inward[:, None], nodes[:, ::-1], nodes)
-    first = np.argmin(np.asarray(mesh.geometry.input_global_indices)[nodes], axis=1)
+    first = np.argmin(mesh.geometry.input_global_indices[nodes], axis=1)
     return np.take_along_axis(nodes, (first[:, None] + np.arange(3)) % 3, axis=1)
 
 
@@ -255,7 +255,7 @@ def _nearest(places: Array, points: Array) -> Integers:
     """The number of the place that is nearest to each point."""
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(places).query(points)[1], dtype=np.int64)
+    return cKDTree(places).query(points)[1]
 
 
 def owned_corners(mesh: dmesh.Mesh) -> Array:
@@ -266,4 +266,4 @@ def owned_corners(mesh: dmesh.Mesh) -> Array:
 def _volumes(corners: Array) -> Array:
     """Volumes of cells, m^d."""
     edges = corners[:, 1:] - corners[:, :1]
-    return np.asarray(np.abs(np.linalg.det(edges)) / math.factorial(edges.shape[1]))
+    return np.abs(np.linalg.det(edges)) / math.factorial(edges.shape[1])

@@ -17,7 +17,7 @@ def cell_facets(mesh: dmesh.Mesh) -> Entities:
     mesh.topology.create_entities(d - 1)
     mesh.topology.create_connectivity(d, d - 1)
     mesh.topology.create_connectivity(d - 1, d)
-    return np.asarray(mesh.topology.connectivity(d, d - 1).array).reshape(-1, d + 1)
+    return mesh.topology.connectivity(d, d - 1).array.reshape(-1, d + 1)
 
 
 def in_copies(facets: Entities, mesh: dmesh.Mesh, cells: Entities, other: dmesh.Mesh, copies: Entities) -> Entities:
@@ -57,7 +57,7 @@ def corners(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
     if not len(facets):  # dolfinx divides by their number
         return np.empty((0, d, d))
     found = dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets)
-    return np.asarray(mesh.geometry.x[found][:, :, :d])
+    return mesh.geometry.x[found][:, :, :d]
 
 
 def areas(points: Array) -> Array:
@@ -68,7 +68,7 @@ def areas(points: Array) -> Array:
     """
     edges = points[:, 1:] - points[:, :1]
     gram = np.einsum("fki,fli->fkl", edges, edges)
-    return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / math.factorial(edges.shape[1]))
+    return np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / math.factorial(edges.shape[1])
 
 
 def turns(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
@@ -91,4 +91,4 @@ def turns(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
     along = np.abs(np.sum(own * own[first][vertex], axis=1))
     least = np.ones(len(first))
     np.minimum.at(least, vertex, along)
-    return np.asarray(np.arccos(np.minimum(least, 1.0))[count > 1])
+    return np.arccos(np.minimum(least, 1.0))[count > 1]

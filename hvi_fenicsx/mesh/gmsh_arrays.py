@@ -77,7 +77,7 @@ def extract(gmsh: Any, dimension: int) -> MeshArrays:
 def points(gmsh: Any) -> Array:
     """The nodes by their tags, (n, 3)."""
     tags, flat, _ = gmsh.model.mesh.getNodes()
-    return np.asarray(flat.reshape(-1, 3)[np.argsort(tags)])
+    return flat.reshape(-1, 3)[np.argsort(tags)]
 
 
 def _grouped(gmsh: Any, dimension: int) -> tuple[Integers, Entities]:

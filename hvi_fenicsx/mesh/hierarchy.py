@@ -126,7 +126,7 @@ def _joined(pairs: Integers, size: int) -> tuple[int, Integers]:
 
     graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(size, size))
     count, found = connected_components(graph, directed=False)
-    return int(count), np.asarray(found, np.int64)
+    return int(count), found
 
 
 def of_owners(index_map: Any, values: Integers) -> Integers:
@@ -152,7 +152,7 @@ def pieces(domain: Domain) -> list[Piece]:
     """
     found, count = labels(domain)
     if count == 1:
-        return [Piece(domain=domain, numbers=np.asarray(domain.mesh.geometry.input_global_indices, dtype=np.int64))]
+        return [Piece(domain=domain, numbers=domain.mesh.geometry.input_global_indices)]
     return [_piece(domain, found == number) for number in range(count)]
 
 
@@ -165,7 +165,7 @@ def _piece(domain: Domain, within: Mask) -> Piece:
     kind = whole.topology.cell_name()
     mesh = compat.simplex_mesh(whole.comm, numbers[corners], whole.geometry.x[points, : domain.dimension], kind)
     offset = whole.comm.exscan(len(cells)) or 0
-    order = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)[: len(cells)] - offset
+    order = mesh.topology.original_cell_index[: len(cells)] - offset
     parents = cells[order].astype(np.int32)
     own = np.empty(len(mesh.geometry.x), dtype=np.int64)
     own[compat.geometry_dofmap(mesh)] = compat.geometry_dofmap(whole)[parents]
@@ -176,7 +176,7 @@ def _piece(domain: Domain, within: Mask) -> Piece:
         domain=Domain.from_mesh(
             mesh, _present(whole.comm, sides), _present(whole.comm, regions), domain.curves, one_piece=True
         ),
-        numbers=np.asarray(whole.geometry.input_global_indices, dtype=np.int64)[own],
+        numbers=whole.geometry.input_global_indices[own],
     )
 
 

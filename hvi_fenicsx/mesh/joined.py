@@ -46,7 +46,7 @@ class PlacedBody:
 
     def at(self, points: Array) -> Array:
         """Points of the body's own coordinates (n, d) in their place, m, (n, d)."""
-        return np.asarray(points @ self.rotation.T + self.origin)
+        return points @ self.rotation.T + self.origin
 
     def called(self, name: str) -> str:
         """What a side or a region of the body is called among those of all bodies.
@@ -123,7 +123,7 @@ def _numbers(comm: MPI.Comm, bodies: Sequence[PlacedBody], number: int) -> Integ
     own = bodies[number].domain.mesh.geometry.index_map()
     every = own.local_to_global(np.arange(own.size_local + own.num_ghosts, dtype=np.int32))
     rank = np.searchsorted(starts, every, side="right") - 1
-    return np.asarray(before[rank] + every - starts[rank], dtype=np.int64)
+    return before[rank] + every - starts[rank]
 
 
 def _sides(mesh: dmesh.Mesh, body: PlacedBody, cells: Entities) -> Iterator[tuple[str, Entities]]:
@@ -220,7 +220,7 @@ def _selection(space: fem.FunctionSpace, common: fem.FunctionSpace, numbers: Int
     """
     d, here = common.dofmap.index_map_bs, space.dofmap.index_map.size_local
     wanted = _by_dof(space, numbers)[:here]
-    known = _by_dof(common, np.asarray(common.mesh.geometry.input_global_indices, dtype=np.int64))
+    known = _by_dof(common, common.mesh.geometry.input_global_indices)
     blocks = renumbered(common, known[: common.dofmap.index_map.size_local], wanted)
     columns = (blocks[:, None] * d + np.arange(d)).ravel().astype(PETSc.IntType)
     sizes = [(m.size_local * d, m.size_global * d) for m in (space.dofmap.index_map, common.dofmap.index_map)]
@@ -258,7 +258,7 @@ class PlacedMesh:
     def cells(self) -> Entities:
         """This rank's cells by the local vertices, (c, d+1)."""
         topology = self.mesh.topology
-        return np.asarray(compat.geometry_dofmap(self.mesh)[: topology.index_map(topology.dim).size_local])
+        return compat.geometry_dofmap(self.mesh)[: topology.index_map(topology.dim).size_local]
 
 
 def common_mesh(
@@ -281,7 +281,7 @@ def common_mesh(
     mesh = compat.simplex_mesh(comm, cells, points, parts[0].mesh.topology.cell_name())
     offset = mesh.comm.exscan(sum(counts)) or 0
     places = np.empty(sum(counts), dtype=np.int32)
-    places[np.asarray(mesh.topology.original_cell_index)[: sum(counts)] - offset] = np.arange(sum(counts))
+    places[mesh.topology.original_cell_index[: sum(counts)] - offset] = np.arange(sum(counts))
     return mesh, [places[cells] for cells in own]
 
 
@@ -297,7 +297,7 @@ def _from_local(comm: MPI.Comm, parts: Sequence[PlacedMesh], numbers: Sequence[I
     split = [(found[:n], found[n:]) for found, n in zip(numbers, owned, strict=True)]
     places = [(part.points[:n], part.points[n:]) for part, n in zip(parts, owned, strict=True)]
     others = np.concatenate([there for _, there in split])
-    owners = np.concatenate([np.asarray(part.mesh.geometry.index_map().owners) for part in parts])
+    owners = np.concatenate([part.mesh.geometry.index_map().owners for part in parts])
     return compat.mesh_of_cells(
         comm,
         np.vstack([*(here for here, _ in places), *(there for _, there in places)]),
@@ -375,4 +375,4 @@ def _inside(points: Array, cells: Array) -> Array:
         return points[:0]
     _, near = cKDTree(cells.mean(axis=1)).query(points, k=list(range(1, min(_NEAREST, len(cells)) + 1)))
     least = barycentric_weights(cells[near], points[:, None]).min(axis=2)
-    return np.asarray(points[np.any(5 * cells.shape[1] * least > 2, axis=1)])
+    return points[np.any(5 * cells.shape[1] * least > 2, axis=1)]

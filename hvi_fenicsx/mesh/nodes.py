@@ -66,7 +66,7 @@ def points(space: fem.FunctionSpace) -> Array:
     node = np.zeros(size, dtype=np.int32)
     node[dofs[:, :vertices]] = corners
     x = space.mesh.geometry.x
-    found = np.asarray(x[node], dtype=np.float64)
+    found = x[node]
     for number, (a, b) in enumerate(edges(space) if dofs.shape[1] > vertices else ()):
         found[dofs[:, vertices + number]] = (x[corners[:, a]] + x[corners[:, b]]) / 2
     return found
@@ -105,13 +105,13 @@ def middles(corners: Array) -> Array:
         corners: (c, corners, d).
     """
     pairs = basix.topology(basix.CellType[_BY_CORNERS[corners.shape[1]]])[1]
-    return np.asarray(corners[:, np.array(pairs)].mean(axis=2))
+    return corners[:, np.array(pairs)].mean(axis=2)
 
 
 def owned_cells(space: fem.FunctionSpace) -> Entities:
     """The cells that this rank owns, by their nodes, (c, nodes)."""
     topology = space.mesh.topology
-    return np.asarray(space.dofmap.list[: topology.index_map(topology.dim).size_local])
+    return space.dofmap.list[: topology.index_map(topology.dim).size_local]
 
 
 def linear_cells(space: fem.FunctionSpace) -> Entities:
@@ -129,7 +129,7 @@ def middles_of_parts(space: fem.FunctionSpace) -> Array:
     """The middles of the ``linear_cells`` of a cell by their barycentric coordinates, (parts, d+1)."""
     points = reference_points(space)
     own = np.arange(len(points))[None]
-    return np.asarray(points[own if degree(space) == 1 else parts(own)].mean(axis=1))
+    return points[own if degree(space) == 1 else parts(own)].mean(axis=1)
 
 
 def linear_facets(space: fem.FunctionSpace, facets: Entities) -> Entities:
@@ -172,7 +172,7 @@ def facet_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
     to_cells, to_facets = topology.connectivity(d - 1, d), topology.connectivity(d, d - 1)
     cells = to_cells.array[to_cells.offsets[facets]]
     of_cells = to_facets.array.reshape(-1, d + 1)[cells]
-    local = np.argmax(of_cells == np.asarray(facets)[:, None], axis=1)
+    local = np.argmax(of_cells == facets[:, None], axis=1)
     table = np.array(_closures(_name(space), degree(space)), dtype=np.int32)
     return np.take_along_axis(space.dofmap.list[cells], table[local], axis=1)
 

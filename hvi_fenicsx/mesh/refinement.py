@@ -92,7 +92,7 @@ def _edge_lengths(mesh: dmesh.Mesh, cells: Entities) -> Array:
     """Lengths of the cells' edges, in the order of the topology, m, (cells, 3 or 6)."""
     ends = np.array(basix.topology(basix.CellType[mesh.topology.cell_name()])[1])
     corners = cell_corners(mesh)[cells]
-    return np.asarray(np.linalg.norm(corners[:, ends[:, 0]] - corners[:, ends[:, 1]], axis=2))
+    return np.linalg.norm(corners[:, ends[:, 0]] - corners[:, ends[:, 1]], axis=2)
 
 
 def _refined(domain: Domain, edges: Entities | None) -> Refinement:
@@ -121,7 +121,7 @@ def _bisected(mesh: dmesh.Mesh, edges: Entities | None) -> tuple[dmesh.Mesh, Ent
 
 def cell_corners(mesh: dmesh.Mesh) -> Array:
     """Vertices of each local cell, m, (cells, d+1, d)."""
-    return np.asarray(mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : mesh.geometry.dim])
+    return mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : mesh.geometry.dim]
 
 
 def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Entities) -> Halves:

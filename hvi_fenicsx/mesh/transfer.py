@@ -125,7 +125,7 @@ def renumbered(space: fem.FunctionSpace, own: Numbers, wanted: Numbers) -> Numbe
     """
     places = np.arange(*space.dofmap.index_map.local_range, dtype=PETSc.IntType)
     order = PETSc.AO().createMemoryScalable(own.astype(PETSc.IntType), places, comm=space.mesh.comm)
-    return np.asarray(order.app2petsc(wanted.ravel().astype(PETSc.IntType))).reshape(wanted.shape)
+    return order.app2petsc(wanted.ravel().astype(PETSc.IntType)).reshape(wanted.shape)
 
 
 def weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
@@ -222,7 +222,7 @@ def containing_cells(mesh: dolfinx.mesh.Mesh, points: Array) -> Integers:
 def clipped(weights: Array) -> Array:
     """Barycentric weights (..., c) moved into the simplex: none is negative, and their sum is 1."""
     positive = np.clip(weights, 0.0, 1.0)
-    return np.asarray(positive / positive.sum(axis=-1, keepdims=True))
+    return positive / positive.sum(axis=-1, keepdims=True)
 
 
 def barycentric_weights(corners: Array, points: Array) -> Array:

@@ -178,9 +178,10 @@ def _renumbered(form: Any) -> Any:
     """A form over one boundary part as one over facets of the number 1: so parts share a compiled form."""
     over = [i for i in form.integrals() if i.integral_type() == "exterior_facet"]
     tags, numbers = (over[0].subdomain_data(), over[0].subdomain_id()) if over and form.arguments() else (None, "")
-    if isinstance(numbers, str) or any(i.subdomain_data() is not tags or i.subdomain_id() != numbers for i in over):
+    others = any(i.subdomain_data() is not tags or i.subdomain_id() != numbers for i in over)
+    if tags is None or isinstance(numbers, str) or others:
         return form
     on = tags.indices[np.isin(tags.values, numbers)]
     one = meshtags(form.arguments()[0].ufl_function_space().mesh, tags.dim, on, np.ones_like(on))
-    others = [i for i in form.integrals() if i.integral_type() != "exterior_facet"]
-    return ufl.Form([*others, *(i.reconstruct(subdomain_id=1, subdomain_data=one) for i in over)])
+    rest = [i for i in form.integrals() if i.integral_type() != "exterior_facet"]
+    return ufl.Form([*rest, *(i.reconstruct(subdomain_id=1, subdomain_data=one) for i in over)])
