@@ -67,7 +67,7 @@ class PointLaws:
         self._force_units = self.forces[firsts]
         m1, last = len(self.one), len(self.one) + len(self.vectors)
         self.of_lengths, self.of_openings = slice(m1, last), slice(last, None)
-        self.order = _order(problem, firsts)
+        self.order = np.random.default_rng(0).uniform(0.5, 1.5, len(self))
         self.point_of = np.empty(problem.size, dtype=np.int64)
         self.point_of[self.one], self.point_of[self.vectors.flat] = np.arange(m1), m1 + self.vectors.owner
         rows, columns = (np.concatenate([self.one, self.vectors.flat[pair]]) for pair in self.vectors.pairs)

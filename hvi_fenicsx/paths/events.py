@@ -83,7 +83,7 @@ class Events(CurveEquations):
             end = float((self.points.high if high else self.points.low)[point])
             guess = start.y + shares[point] * (y - start.y)
             return self._moved(StepEnd.END, point, self.correct(guess, self.at_end(point, end)))
-        return self._returning(move, aim) or self._turning(move)
+        return self._turning(move)
 
     def _shares(self, move: CurveStep) -> Array:
         """The part of the step after which each point passed an end; 1 where it did not, (m,)."""
@@ -132,12 +132,6 @@ class Events(CurveEquations):
         middle_up = after.values.s[k] - self.points.low[k] > self.points.high[k] - after.values.s[k]
         return bool(rate > 0.0) == bool(middle_up)
 
-    def _returning(self, move: CurveStep, aim: float) -> CurveStep | None:
-        """The step up to where the factor is back at its aim, from which it set out; None: it is not."""
-        began = self.here.y[-1] == aim / self.unit and move.outcome is not StepEnd.FACTOR
-        back = (move.after.y[-1] - self.here.y[-1]) * self.here.tangent[-1] < 0.0
-        return self._up_to(move, StepEnd.FACTOR, None) if began and back else None
-
     def _turning(self, move: CurveStep) -> CurveStep | None:
         """The step up to where the factor, or a bond with memory, turned on the way; None: none did."""
         if not self.points.bent or move.outcome in (StepEnd.FOLD, StepEnd.TURNED):
@@ -175,16 +169,9 @@ class Events(CurveEquations):
         return (StepEnd.TURNED, int(back[0])) if back.size else None
 
     def _rate_of(self, outcome: StepEnd, point: int | None) -> Callable[[CurvePoint], float]:
-        if outcome is StepEnd.FACTOR:
-            return self._mean_rate
         if outcome is StepEnd.FOLD or point is None:
             return lambda place: float(place.tangent[-1])
         return lambda place: float(self.rates_at(place)[point])
-
-    def _mean_rate(self, place: CurvePoint) -> float:
-        """How the factor changes on the way from here to a place of the same step."""
-        way = float(self.here.tangent @ (place.y - self.here.y))
-        return float((place.y[-1] - self.here.y[-1]) / way if way > 0.0 else self.here.tangent[-1])
 
     def _at(self, way: float, known: Mapping[float, CurvePoint]) -> CurvePoint:
         """The point of the curve in the plane across the present tangent at a distance, between those known."""

@@ -57,7 +57,7 @@ class Jump:
     def landing(self) -> Landing | None:
         """Where it leads; None where this was not found, with the points where they were."""
         kept = self._points.kept()
-        for way in (self._held_back, self._released, self._pushed_off):
+        for way in (self._held_back, self._released):
             found = way()
             if found is not None:
                 return found
@@ -144,14 +144,6 @@ class Jump:
         if not relaxation.run(self._directions):
             return None
         return Landing(z=None if relaxation.escapes else relaxation.z)
-
-    def _pushed_off(self) -> Landing | None:
-        """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
-        rate = self._problem.force_rate
-        push = DEFAULT.slow * self._heading
-        push = push * np.max(np.abs(self._load)) / np.max(np.abs(rate), initial=1e-300)
-        found = self._relaxed(self._z.copy(), self._load + push * rate)
-        return found if found is None or found.z is None else self._come_to_rest(found.z)
 
 
 def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:

@@ -109,15 +109,7 @@ class StraightBranch(Branch):
 
     @override
     def leaving(self) -> Iterator[tuple[Array, int]]:
-        k, inverse = self._leader, self.inverse() or self.state.inverse()
-        rise, own = float(self.points.rise[k]), np.eye(1, len(self.z), self._leader)[0]
-        if not rise:
-            found = self.state.softest(inverse, own)
-            yield found * (np.sign(found[k] * self.rates[k]) or 1.0), k
-            return
-        way = np.sign(self.rates[k]) * (rise if rise > 0.0 else 1.0)  # on a drop: it goes on, and all others follow
-        pull = np.where(self.points.moving, -way * self.points.elastic.column(k), 0.0)
-        yield np.where(self.points.moving, inverse.solve(pull), way * own), k
+        yield self.motion, self._leader
 
     @property
     @override
