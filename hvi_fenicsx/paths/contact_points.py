@@ -33,7 +33,7 @@ class PointLaws:
         of_openings: and of openings.
         point_of: the point of each unknown, of an opening that of its length, (n,).
         straight: whether the graphs of all are straight between their ends; coordinates then have units.
-        order: of the points, numbers from 0.5 to 1.5 that look like random ones, (m,): the same on any number of ranks.
+        order: of the points, numbers from 0.5 to 1.5 that look like random ones, (m,).
         places: the number of each point of one unknown, and of each pair of unknowns of a length, in a matrix, (n, n).
         scale: the size of displacements.
         length: the unit of displacements along graphs; 1 where all are straight.
@@ -108,20 +108,6 @@ def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence
     for group in groups:
         diagonal[group] = diagonal[group].mean()
     return float(length), diagonal * float(length)
-
-
-def _order(problem: CondensedProblem, firsts: Sequence[int]) -> Array:
-    """Numbers that look like random ones, from the vertices of the first unknowns of points, (m,)."""
-    scale = float(np.max(np.abs(problem.points), initial=0.0)) or 1.0
-    places = np.round(problem.points[firsts] / scale, 6)
-    seen: dict[bytes, int] = {}
-    found = np.empty(len(firsts))
-    for k in range(len(firsts)):
-        place = (places[k, :] + 0.0).tobytes()
-        number = seen[place] = seen.get(place, 0) + 1
-        mixed = np.sin(float(np.dot(places[k], (12.9898, 78.233, 37.719))) + 4.1 * number) * 43_758.5453
-        found[k] = 0.5 + mixed - np.floor(mixed)
-    return found
 
 
 class VectorPoints:

@@ -57,7 +57,7 @@ class Jump:
     def landing(self) -> Landing | None:
         """Where it leads; None where this was not found, with the points where they were."""
         kept = self._points.kept()
-        for way in (self._held_back, self._released):
+        for way in (self._held_back, self._released, self._pushed_off):
             found = way()
             if found is not None:
                 return found
@@ -138,6 +138,14 @@ class Jump:
     def _come_to_rest(self, z: Array) -> Landing | None:
         found = self._relaxed(z, self._load)
         return found if found is None or found.z is None else self._landed(found.z)
+
+    def _pushed_off(self) -> Landing | None:
+        """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
+        rate = self._problem.force_rate
+        push = DEFAULT.slow * self._heading
+        push = push * np.max(np.abs(self._load)) / np.max(np.abs(rate), initial=1e-300)
+        found = self._relaxed(self._z.copy(), self._load + push * rate)
+        return found if found is None or found.z is None else self._come_to_rest(found.z)
 
     def _relaxed(self, z: Array, load: Array) -> Landing | None:
         relaxation = OverdampedMotion(self._problem, self._points, z, load, held=self._held)

@@ -109,7 +109,13 @@ class StraightBranch(Branch):
 
     @override
     def leaving(self) -> Iterator[tuple[Array, int]]:
-        yield self.motion, self._leader
+        k, found = self._leader, self.motion
+        if self.points.rise[k]:  # on a drop: it goes on, and all others follow
+            way = np.sign(self.rates[k])
+            pull = np.where(self.points.moving, -way * self.points.elastic.column(k), 0.0)
+            found = np.where(self.points.moving, (self.inverse() or self.state.inverse()).solve(pull), 0.0)
+            found[k] = way
+        yield found, k
 
     @property
     @override

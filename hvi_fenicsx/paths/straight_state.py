@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..reduced.condensed_stiffness import CellColumns, CellInverse
 from ..typing import Array
@@ -103,31 +100,6 @@ class StraightState:
         moving = self.points.moving
         found = self._stiffness @ np.where(moving, coordinates, 0.0)
         return np.asarray(found + np.where(moving, self.tangent, self.points.rise) * coordinates)
-
-    def softest(self, inverse: CellInverse, start: Array) -> Array:
-        """The eigenvector of the negative eigenvalue next to zero, or of the greatest one; zero where points stand.
-
-        By Lanczos' method on the inverse.
-
-        Args:
-            inverse: of the equations.
-            start: where the iteration begins, (n,).
-        """
-        found, free = np.zeros(len(self)), np.flatnonzero(self.points.moving)
-
-        def response(v: Array) -> Array:
-            spread = np.zeros(len(self))
-            spread[free] = v.ravel()
-            return inverse.solve(spread)[free]
-
-        begin = response(start[free])
-        found[free] = begin if np.any(begin) else 1.0
-        if free.size < 2 or not np.any(begin):
-            return found
-        operator = LinearOperator((free.size, free.size), matvec=response, dtype=np.float64)
-        with suppress(ArpackNoConvergence):
-            found[free] = eigsh(operator, k=1, which="SA", v0=begin, tol=DEFAULT.none)[1][:, 0]
-        return found
 
 
 FACTOR = -1
