@@ -33,7 +33,7 @@ class PointLaws:
         of_openings: and of openings.
         point_of: the point of each unknown, of an opening that of its length, (n,).
         straight: whether the graphs of all are straight between their ends; coordinates then have units.
-        order: of the points, numbers from 0.5 to 1.5 that look like random ones, (m,).
+        order: of the points, random numbers from 0.5 to 1.5, (m,): the same on any number of ranks.
         places: the number of each point of one unknown, and of each pair of unknowns of a length, in a matrix, (n, n).
         scale: the size of displacements.
         length: the unit of displacements along graphs; 1 where all are straight.
@@ -67,7 +67,8 @@ class PointLaws:
         self._force_units = self.forces[firsts]
         m1, last = len(self.one), len(self.one) + len(self.vectors)
         self.of_lengths, self.of_openings = slice(m1, last), slice(last, None)
-        self.order = np.random.default_rng(0).uniform(0.5, 1.5, len(self))
+        self.order = np.empty(len(self))
+        self.order[np.lexsort(problem.points[firsts].T)] = np.random.default_rng(0).uniform(0.5, 1.5, len(self))
         self.point_of = np.empty(problem.size, dtype=np.int64)
         self.point_of[self.one], self.point_of[self.vectors.flat] = np.arange(m1), m1 + self.vectors.owner
         rows, columns = (np.concatenate([self.one, self.vectors.flat[pair]]) for pair in self.vectors.pairs)
