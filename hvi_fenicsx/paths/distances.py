@@ -9,10 +9,10 @@ import numpy as np
 
 from ..laws import VertexLaws
 from ..reduced.condensed_problem import Bonds, CondensedProblem
+from ..reduced.condensed_stiffness import CellColumns
 from ..typing import Array
 from .relations import ContactPoints
 from .state import PathState
-from .straight_state import StraightState
 from .thresholds import DEFAULT, ROUNDING
 from .vertex_laws import factors, multiplied
 
@@ -156,6 +156,7 @@ class StateOnGraphs:
 
     def _change(self, load: Array) -> Array:
         if self._points.straight:
-            return StraightState(self._points, self._z).inverse().solve(load)
+            columns = CellColumns(slope=self._points.slope, rise=self._points.rise, driver=None, factor=load)
+            return self._points.elastic.inverse(columns).solve(load)
         matrix = self._points.jacobian(self._points.values(self._z))
         return np.asarray(np.linalg.lstsq(matrix, load, rcond=ROUNDING)[0])

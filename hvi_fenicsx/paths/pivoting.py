@@ -19,15 +19,15 @@ from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
-from .branch import Branch, Move, Passage, StepEnd, event_between
+from .branch import Move, Passage, StepEnd, event_between
 from .relations import ContactPoints
 from .segments import piece_at
 from .state import Position
-from .straight_state import FACTOR, Basis, StraightState
+from .straight_equations import FACTOR, StraightEquations
 from .thresholds import DEFAULT, ROUNDING
 
 
-class StraightBranch(Branch):
+class StraightBranch(StraightEquations):
     """The branch from one of its states on.
 
     Args:
@@ -39,12 +39,9 @@ class StraightBranch(Branch):
         inverse: of the equations, where it is known and the factor drives.
 
     Attributes:
-        state: the coordinates.
-        rate: f1, (n,).
         heading: the direction of the variable that drives, 1 or -1.
         small: parts of the order ε of the coordinates, (n,).
-        rates: how all coordinates change with the driving variable, (n,).
-        factor_rate: how the factor does.
+        rates: how all variables change with the driving one, (n + 1,).
 
     Raises:
         numpy.linalg.LinAlgError: the tangent is singular.
@@ -59,9 +56,7 @@ class StraightBranch(Branch):
         factor: float,
         inverse: CellInverse | None = None,
     ) -> None:
-        self._stiffness = points.elastic
-        self.points, self.state = points, StraightState(points, z)
-        self._constant, self.rate, self._factor = constant, rate, factor
+        super().__init__(points, constant, rate, z, factor)
         self.heading, self.trend, self.unstable, self._leader = 1, 0, 0, 0
         self._stiffest, self._live = _largest(self._stiffness.diagonal), _largest(rate)
         random = np.random.default_rng(0)
@@ -69,13 +64,11 @@ class StraightBranch(Branch):
         self.small = random.uniform(0.5, 1.5, len(z)) * np.where(z == points.high, -1.0, 1.0)
         self._lag = random.uniform(0.5, 1.5, len(z))
         self._behind = self._lag.copy()
-        self.state.hold(rate)
         self._begin(FACTOR, inverse)
 
     def _begin(self, driver: int, inverse: CellInverse | None = None) -> None:
         """Set out with a variable that drives."""
-        driver = self._setting_out() if driver == FACTOR else driver
-        self._basis = Basis(self.state, self.rate, driver, inverse)
+        self.drive(self._setting_out() if driver == FACTOR else driver, inverse)
         self._find_direction()
 
     def _setting_out(self) -> int:
@@ -89,23 +82,13 @@ class StraightBranch(Branch):
 
     @property
     @override
-    def factor(self) -> float:
-        return self._factor
-
-    @property
-    @override
     def rising(self) -> float:
-        return 0.0 if self.stands else self.factor_rate
-
-    @property
-    @override
-    def z(self) -> Array:
-        return self.state.tau
+        return 0.0 if self.stands else float(self.rates[FACTOR])
 
     @property
     @override
     def directions(self) -> Array:
-        return self.rates
+        return self.rates[:-1]
 
     @override
     def leaving(self) -> Iterator[tuple[Array, int]]:
@@ -113,21 +96,21 @@ class StraightBranch(Branch):
         if self.points.rise[k]:  # on a drop: it goes on, and all others follow
             way = np.sign(self.rates[k])
             pull = np.where(self.points.moving, -way * self.points.elastic.column(k), 0.0)
-            found = np.where(self.points.moving, (self.inverse() or self.state.inverse()).solve(pull), 0.0)
+            found = np.where(self.points.moving, (self.inverse() or self.factorised()).solve(pull), 0.0)
             found[k] = way
         yield found, k
 
     @property
     @override
     def motion(self) -> Array:
-        return np.where(self.points.moving, self.rates, 0.0)
+        return np.where(self.points.moving, self.directions, 0.0)
 
     @override
     def position(self, leg: int) -> Position:
         return Position(
             leg=leg,
             numbers=self.points.numbers.copy(),
-            driver=self._basis.driver,
+            driver=self.driver,
             heading=self.heading,
             z=self.z.copy(),
             small=self.small.copy(),
@@ -140,56 +123,40 @@ class StraightBranch(Branch):
 
     @override
     def set_out(self, sign: float) -> None:
-        if (self.trend or self.factor_rate) * sign < 0.0:
+        if (self.trend or self.rates[FACTOR]) * sign < 0.0:
             self.heading, self.trend = -self.heading, -self.trend
             self._find_direction()
 
     # -- linear algebra
 
-    @override
-    def inverse(self) -> CellInverse | None:
-        return self._basis.inverse()
-
     def _find_direction(self) -> None:
         """How all variables change with the driving one."""
-        self._basis.renew()
-        rates, driver = -self.heading * self._basis.column, self._basis.driver
-        if driver == FACTOR:
-            self.factor_rate = float(self.heading)
-        else:
-            self.factor_rate = float(rates[driver])
-            rates[driver] = self.heading
-        held = self.state.held
-        self.rates: Array = rates - held.T @ (held @ rates)
+        self.renew()
+        self.rates: Array = self.variables(-self.heading * self.column)
+        self.rates[self.driver] = self.heading
+        self.rates[:-1] -= self.held.T @ (self.held @ self.directions)
         if not self.stands:
-            self.trend = int(np.sign(self.factor_rate))
-
-    def _residual(self) -> Array:
-        values = self.values
-        return np.asarray(self._stiffness @ values.x + values.force - self._constant - self._factor * self.rate)
+            self.trend = int(np.sign(self.rates[FACTOR]))
 
     def _refine(self) -> None:
         """Take out what rounding has left in the equations, and find the direction."""
-        residual = self._residual()
+        residual = self.residual()
         self._find_direction()
-        self._correct(self._basis.roughly(residual))
+        self._correct(self.variables(self.solved(residual)))
 
     def _correct(self, change: Array) -> None:
         """Take a change off, the driving variable held; if that is a slow one, to the nearest point of the branch."""
-        if (driver := self._basis.driver) != FACTOR:
-            scale = _largest(self.motion) or 1.0
-            along, rate, own = self.motion / scale, self.factor_rate / scale, float(change[driver])
-            change[driver] = 0.0
-            slow = abs(self.rates[driver]) < DEFAULT.slow * scale
-            way = float(along @ change) / (float(along @ along) or 1.0) if slow else 0.0
+        scale = _largest(self.motion) or 1.0
+        if self.driver != FACTOR and abs(self.rates[self.driver]) < DEFAULT.slow * scale:
+            along = self.motion / scale
+            way = float(along @ change[:-1]) / (float(along @ along) or 1.0)
             change -= way * self.rates / scale
-            self._factor -= own - way * rate
-        self.state.tau -= change
+        self.y -= change
 
     @override
     def balanced(self, factor: float) -> Array:
-        left = self._residual() + (self._factor - factor) * self.rate
-        return self.z - self.state.inverse().solve(left)
+        left = self.residual() + (self.factor - factor) * self.rate
+        return self.z - self.factorised().solve(left)
 
     # -- events
 
@@ -199,26 +166,25 @@ class StraightBranch(Branch):
         if chosen is None:
             return Move(outcome=StepEnd.AWAY)
         variable, length, small = chosen
-        self.state.tau += length * self.rates
-        self._factor += length * self.factor_rate
-        self.small += small * self.rates
-        inward = self.points.outward * self.rates < 0.0
-        self._behind = np.where(inward, self._behind - small * np.abs(self.rates), self._lag)
+        self.y += length * self.rates
+        self.small += small * self.directions
+        inward = self.points.outward * self.directions < 0.0
+        self._behind = np.where(inward, self._behind - small * np.abs(self.directions), self._lag)
         if variable == FACTOR:
-            self._factor = aim
+            self.y[FACTOR] = aim
             return Move(outcome=StepEnd.FACTOR)
         return Move(outcome=StepEnd.TURNED if inward[variable] else StepEnd.END, point=variable)
 
     def _first_end(self, aim: float) -> tuple[int, float, float] | None:
         """Which variable reaches its end first, the way to there, and that of the order ε."""
         numbers, slack, small, speed, allowed = self._ends()
-        approaches = (aim - self._factor) * self.factor_rate > 0.0 and not self.stands
-        if not numbers.size and not approaches:
+        left, rate = aim - self.factor, self.rising
+        if not numbers.size and left * rate <= 0.0:
             return None
-        if approaches:
-            until = (aim - self._factor) / self.factor_rate
+        if left * rate > 0.0:
+            until = left / rate
             if until <= float(np.min((slack + allowed) / speed, initial=np.inf)):
-                return FACTOR, max(until, 0.0), 0.0
+                return FACTOR, until, 0.0
         ways = slack / speed
         near = np.flatnonzero(ways <= np.min((slack + allowed) / speed))
         first = near[np.argmin(small[near] / speed[near])]
@@ -226,7 +192,7 @@ class StraightBranch(Branch):
 
     def _ends(self) -> tuple[Integers, Array, Array, Array, Array]:
         """The variables that approach an end: numbers, distances, those of the order ε, speeds, what may be passed."""
-        points, rates, tau = self.points, self.rates, self.z
+        points, rates, tau = self.points, self.directions, self.z
         speed = np.abs(rates)
         inward = points.outward * rates < 0.0
         distance = np.where(rates > 0.0, points.high - tau, tau - points.low)
@@ -255,7 +221,7 @@ class StraightBranch(Branch):
     def pass_on(self, move: Move) -> list[Passage]:
         assert move.point is not None
         i, before, trend, stood = move.point, self.points.segment(move.point), self.trend, self.stands
-        forward, held = bool(self.rates[i] > 0.0), self.state.held
+        forward, held = bool(self.rates[i] > 0.0), self.held
         if move.outcome is StepEnd.TURNED:
             self._turn_back(i, forward=forward)
         else:
@@ -265,7 +231,7 @@ class StraightBranch(Branch):
         after = self.points.segment(i)
         softens = 1 if after.hold < before.hold else -1
         change = softens if trend * self.trend < 0 else 0  # by the sign of the pivot
-        neutral = stood or self.stands or self.state.held is not held
+        neutral = stood or self.stands or self.held is not held
         self.unstable = self.points.unstable_directions(self.values) if neutral else self.unstable + change
         if change > 0 or neutral:
             self._leader = i
@@ -282,8 +248,9 @@ class StraightBranch(Branch):
     def _enter(self, i: int, number: int, coordinate: float) -> None:
         """Let a point go on, in its present direction along its graph, on another segment."""
         direction = 1 if self.rates[i] > 0.0 else -1
-        self.state.enter(i, number, coordinate)
-        if self.state.hold(self.rate):  # other motions are held: set out anew with the factor, as it went
+        self.points.enter(i, number)
+        self.y[i] = coordinate
+        if self.hold():  # other motions are held: set out anew with the factor, as it went
             self.heading = self.trend or 1
             self._begin(FACTOR)
         else:
@@ -296,26 +263,26 @@ class StraightBranch(Branch):
 
         The point itself drives, unless it is so slow that the variable that drives already keeps more digits.
         """
-        if i == self._basis.driver:
+        if i == self.driver:
             return direction
-        if onward := self._basis.replace(i):
+        if onward := self.replace(i):
             return onward * self.heading
-        self._basis.exchange(i)
+        self.exchange(i)
         return direction
 
     @property
     @override
     def stands(self) -> bool:
-        points, rates = self.points, self.rates
-        forces = _largest(np.where(points.moving, points.slope, points.rise) * rates)
+        points = self.points
+        forces = _largest(np.where(points.moving, points.slope, points.rise) * self.directions)
         size = self._stiffest * _largest(self.motion) + forces
-        return abs(self.factor_rate) * self._live < DEFAULT.reached * size
+        return abs(self.rates[FACTOR]) * self._live < DEFAULT.reached * size
 
     @override
     def beyond(self) -> Array:
-        found = self._first_end(self._factor)
-        length = self.points.scale / (_largest(self.rates) or 1.0) if found is None else found[1]
-        return self.z + DEFAULT.near * length * self.rates
+        found = self._first_end(self.factor)
+        length = self.points.scale / (_largest(self.directions) or 1.0) if found is None else found[1]
+        return self.z + DEFAULT.near * length * self.directions
 
     @override
     def must_leave(self, aim: float) -> bool:
