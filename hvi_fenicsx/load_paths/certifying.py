@@ -175,8 +175,8 @@ class Certifier:
         What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
         there, what rounding makes of the stresses is excused, and no net force.
         """
-        acting, spread = reaction(self._system, forces), self._condensation.forces.spread(carried)
-        left, given = self._condensation.forces.unbalanced(acting, spread), product(spread, self._system.rotation)
+        acting, spread = reaction(self._system, forces), self._condensation.spread(carried)
+        left, given = self._condensation.unbalanced(acting, spread), product(spread, self._system.rotation)
         for vector in (acting, spread):
             vector.destroy()
         size = max(self._norm(f) for f in (forces.load, forces.reaction))
@@ -266,12 +266,12 @@ def refined(
     unknowns = condensation.expand(graphs.x, factor)
     for _ in range(_STEPS):
         forces = contact_state.forces(problem, system.displacement(unknowns))
-        left, carried = reaction(system, forces), condensation.forces.spread(-graphs.force)
+        left, carried = reaction(system, forces), condensation.spread(-graphs.force)
         left.axpy(-1.0, carried)
-        missing = condensation.forces.condensed(-left.array_r)
+        missing = condensation.forces(-left.array_r)
         before = graphs.x
         graphs.take(missing.condensed)
-        unknowns.array[:] += condensation.forces.change(graphs.x - before, missing)
+        unknowns.array[:] += condensation.change(graphs.x - before, missing)
         for vector in (left, carried):
             vector.destroy()
     u = system.displacement(unknowns)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 from typing_extensions import override
 
-from ..reduced.condensed_stiffness import ProductInverse
+from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers
 from .branch import Branch, Refused
 from .relations import ContactPoints, Values
@@ -351,7 +351,7 @@ class Bordered:
     def __init__(self, matrix: Array) -> None:
         self._row = matrix[-1].copy()
         factors, pivots, singular = dgetrf(matrix, overwrite_a=1)
-        self._inverse = ProductInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), DEFAULT.waits)
+        self._inverse = CellInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), DEFAULT.waits)
         if singular or not self._has_tangent():
             raise np.linalg.LinAlgError("the equations have no tangent here")
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
@@ -26,9 +26,24 @@ from ..typing import Array, Integers
 from . import loading
 from .condensed_problem import CondensedProblem
 from .condensed_stiffness import CondensedStiffness, DenseStiffness
-from .elimination import CondensedMotions, Elimination
+from .elimination import Elimination, balanced
 from .factorised_stiffness import FactorisedStiffness
 from .loading import Carriers
+
+
+@dataclass(frozen=True, kw_only=True)
+class CondensedForces:
+    """Forces on the whole body, condensed.
+
+    Attributes:
+        body: on this rank's unknowns off the supports, (local unknowns,).
+        kept: on all unknowns of Γc that the body keeps, (n of the interior,).
+        condensed: on the condensed unknowns, (n,).
+    """
+
+    body: Array
+    kept: Array
+    condensed: Array
 
 
 class Condensation:
@@ -44,7 +59,6 @@ class Condensation:
 
     Attributes:
         problem: the arrays. Its unknowns x are those of Γc without λ times the obstacles' shift: their bounds stand.
-        forces: on the whole body, and condensed.
 
     Raises:
         InputError: on all ranks alike: a name in ``scaled`` is none; a law on |u_t| cannot be condensed.
@@ -65,14 +79,19 @@ class Condensation:
         self._interior = interior = Interior(self._form, kept)
         laws = loading.laws_of(system, interior, self._loading.prescribed)
         found = loading.carriers_of(system, interior, laws, loading.obstacle_shift(system, scaled or ()))
+        elastic: CondensedStiffness
         if largest_dense is not None and self._is_large(largest_dense, len(found.carrying)):
             chosen = self._reduce(found.carrying)
-            found, laws = found.of(chosen), laws.renumbered(chosen, interior.size)
-            elastic = self._unformed()
+            found, laws = found.of(chosen), laws.renumbered(chosen)
+            self._elimination = Elimination.of_none(self._interior.size)
+            elastic = FactorisedStiffness(self._interior)
         else:
-            elastic = self._formed(interior.stiffness(interrupted), found.carrying)
-        self.problem = self._condensed(elastic, found, laws)
-        self.forces = BodyForces(system, self._interior, self._elimination)
+            whole = interior.stiffness(interrupted)
+            self._elimination = Elimination.of(whole, found.carrying, system.thresholds.rounding)
+            elastic = DenseStiffness(self._elimination.stiffness(whole))
+        stay = self._elimination.stay
+        self._shift = found.shift[stay]
+        self.problem = self._condensed(elastic, found.of(stay), laws.renumbered(stay))
 
     def _is_large(self, most: int, carrying: int) -> bool:
         """Whether Γc has more unknowns, or products with S of those that carry take longer than solves with factors."""
@@ -92,50 +111,32 @@ class Condensation:
             fewer.free()
         return every
 
-    def _unformed(self) -> CondensedStiffness:
-        """S of all kept unknowns, by factorisations. Collective."""
-        self._elimination = Elimination.of_none(self._interior.size)
-        return FactorisedStiffness(self._interior)
-
-    def _formed(self, whole: Array, carrying: Integers) -> CondensedStiffness:
-        """S of the unknowns that stay, the others being eliminated."""
-        self._elimination = Elimination.of(whole, carrying, self._system.thresholds.rounding)
-        return DenseStiffness(self._elimination.stiffness(whole))
-
     def _condensed(self, elastic: CondensedStiffness, found: Carriers, laws: loading.CondensedLaws) -> CondensedProblem:
-        """The problem on the unknowns that stay. Collective."""
-        stay = self._elimination.stay
-        self._shift = found.shift[stay]
+        """The problem on the unknowns that stay, x of u = x + λ shift. Collective."""
         force, applied, constant, applied_constant = self._loads()
         if isinstance(elastic, DenseStiffness):
-            elastic, force = self._balanced(elastic, force)
-        laws = laws.renumbered(stay, self._interior.size)
-        return _shifted(
-            self._shift,
-            CondensedProblem(
-                elastic=elastic,
-                force=force[:, 0],
-                force_rate=force[:, 1],
-                lower=found.lower[stay],
-                upper=found.upper[stay],
-                bonds=laws.bonds,
-                prescribed_bonds=laws.prescribed,
-                constant=constant,
-                applied=applied.T,
-                applied_constant=applied_constant,
-                points=found.points[stay],
-                parts=tuple(found.parts[i] for i in stay),
-            ),
+            stay, loads = self._elimination.stay, self._loading.lifted
+            stiffness, force = balanced(self._system, self._interior, stay, elastic.array, force, loads)
+            elastic = DenseStiffness(stiffness)
+        (plain, rate), by = force.T, found.shift
+        pull = elastic @ by
+        return CondensedProblem(
+            elastic=elastic,
+            force=plain,
+            force_rate=rate - pull,
+            lower=found.lower,
+            upper=found.upper,
+            bonds=laws.bonds,
+            prescribed_bonds=laws.prescribed,
+            constant=constant + np.array([0.0, -plain @ by, (0.5 * pull - rate) @ by]),
+            applied=applied,
+            applied_constant=applied_constant,
+            points=found.points,
+            parts=tuple(found.parts),
         )
 
-    def _balanced(self, elastic: DenseStiffness, force: Array) -> tuple[DenseStiffness, Array]:
-        """Stiffness and loads as rounding has not changed them along rigid motions. Collective."""
-        motions = CondensedMotions.of(self._system, self._interior, self._elimination.stay)
-        work = self._system.comm.allreduce(motions.fields.T @ self._loading.lifted)
-        return DenseStiffness(motions.without_forces(elastic.array)), motions.with_work(force, work)
-
     def _loads(self) -> tuple[Array, Array, Array, Array]:
-        """Condensed forces and applied loads (n, 2), and the constants of the energy and of <g, u>. Collective."""
+        """Condensed forces (n, 2), applied loads (2, n), and the constants of the energy and of <g, u>. Collective."""
         interior, load, total = self._interior, self._loading, self._system.comm.allreduce
         fixed = self._system.problem.fixed_here
         inside = interior.solve(load.lifted)
@@ -148,7 +149,7 @@ class Condensation:
             self._force, self._force
         )
         product, outer = self.products(load.applied)
-        return self._elimination.reduced(self._force), outer.T, _quadratic(constant), _quadratic(product)
+        return self._elimination.reduced(self._force), outer, _quadratic(constant), _quadratic(product)
 
     def products(self, vectors: Array) -> tuple[Array, Array]:
         """The products of vectors c with the body's displacement u: c·u = constants + λ rates + rows x. Collective.
@@ -164,9 +165,9 @@ class Condensation:
         inside = interior.solve(self._loading.lifted)[: len(vectors)]
         inside = self._system.comm.allreduce(vectors.T @ inside)
         rows = self._elimination.reduced(outer)
-        constants = np.asarray(inside + self._elimination.works(outer, self._force))
+        constants = inside + self._elimination.works(outer, self._force)
         constants[:, 1] += rows.T @ self._shift
-        return constants, np.asarray(rows.T)
+        return constants, rows.T
 
     def expand(self, x: Array, factor: float = 1.0) -> PETSc.Vec:
         """The unknowns of the whole body in equilibrium with condensed ones. Collective.
@@ -203,7 +204,7 @@ class Condensation:
         unknowns = self._system.unknowns(u)
         kept = self._interior.gathered(unknowns.array_r)
         unknowns.destroy()
-        return np.asarray(kept[self._elimination.stay] - factor * self._shift)
+        return kept[self._elimination.stay] - factor * self._shift
 
     def load(self, factor: float = 1.0) -> PETSc.Vec:
         """The system's load at a factor, prescribed values in their rows, as :attr:`.System.load`. Collective.
@@ -214,56 +215,6 @@ class Condensation:
         found = self._system.load.duplicate()
         found.array[:] = self._loading.lifted @ np.array([1.0, factor])
         return found
-
-    def free(self) -> None:
-        """Free the PETSc objects, those of the problem's stiffness too. Collective."""
-        self.problem.elastic.free()
-        self._interior.free()
-        self._form.free()
-
-
-def _shifted(by: Array, problem: CondensedProblem) -> CondensedProblem:
-    """The problem in the unknowns x of u = x + λ shift, from that in u."""
-    pull = problem.elastic @ by
-    energy = [0.0, -float(problem.force @ by), float((0.5 * pull - problem.force_rate) @ by)]
-    return replace(
-        problem,
-        force_rate=problem.force_rate - pull,
-        constant=problem.constant + np.array(energy),
-    )
-
-
-def _quadratic(products: Array) -> Array:
-    """c0, c1, c2 of the bilinear form at (1, λ)."""
-    return np.array([products[0, 0], products[0, 1] + products[1, 0], products[1, 1]])
-
-
-@dataclass(frozen=True, kw_only=True)
-class CondensedForces:
-    """Forces on the whole body, condensed.
-
-    Attributes:
-        body: on this rank's unknowns off the supports, (local unknowns,).
-        kept: on all unknowns of Γc that the body keeps, (n of the interior,).
-        condensed: on the condensed unknowns, (n,).
-    """
-
-    body: Array
-    kept: Array
-    condensed: Array
-
-
-class BodyForces:
-    """Forces on a condensed body.
-
-    Args:
-        system: the system.
-        interior: the body with unknowns of Γc held.
-        elimination: of those of them that carry nothing.
-    """
-
-    def __init__(self, system: System, interior: Interior, elimination: Elimination) -> None:
-        self._system, self._interior, self._elimination = system, interior, elimination
 
     def spread(self, forces: Array) -> PETSc.Vec:
         """Forces on the condensed unknowns as forces on the whole body, in the components of the unknowns.
@@ -277,13 +228,13 @@ class BodyForces:
         found.array[interior.kept] = whole[interior.here]
         return found
 
-    def condensed(self, forces: Array) -> CondensedForces:
+    def forces(self, body: Array) -> CondensedForces:
         """Forces on the whole body as forces on the condensed unknowns. Collective.
 
         Args:
-            forces: on this rank's unknowns, in their components, (local unknowns,).
+            body: on this rank's unknowns, in their components, (local unknowns,); what is on supports these carry.
         """
-        body = self._free(forces)
+        body[self._system.problem.fixed_here] = 0.0
         kept = self._interior.loads(body[:, None])[:, 0]
         return CondensedForces(body=body, kept=kept, condensed=self._elimination.reduced(kept))
 
@@ -299,12 +250,6 @@ class BodyForces:
         """
         return self._interior.expand(self._elimination.completed(x, forces.kept), forces.body)
 
-    def _free(self, forces: Array) -> Array:
-        """Forces off the supports, which carry the others, (local unknowns,)."""
-        found = np.array(forces)
-        found[self._system.problem.fixed_here] = 0.0
-        return found
-
     def unbalanced(self, reaction: PETSc.Vec, carried: PETSc.Vec) -> float:
         """What is left of forces on the body once contact and laws carry theirs. Collective.
 
@@ -318,3 +263,14 @@ class BodyForces:
         left = reaction.array - carried.array
         left[np.union1d(self._system.problem.fixed_here, self._system.pins)] = 0.0
         return float(np.sqrt(total(self._system.comm, float(left @ left))))
+
+    def free(self) -> None:
+        """Free the PETSc objects, those of the problem's stiffness too. Collective."""
+        self.problem.elastic.free()
+        self._interior.free()
+        self._form.free()
+
+
+def _quadratic(products: Array) -> Array:
+    """c0, c1, c2 of the bilinear form at (1, λ)."""
+    return np.array([products[0, 0], products[0, 1] + products[1, 0], products[1, 1]])

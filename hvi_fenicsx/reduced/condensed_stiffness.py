@@ -11,15 +11,14 @@ S is an array (:class:`DenseStiffness`), or known by factorisations of the whole
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
 
 import numpy as np
-from scipy.linalg.blas import dger
 from scipy.linalg.lapack import dsytrf
 from typing_extensions import override
 
@@ -48,21 +47,32 @@ class CellColumns:
     @property
     def moving(self) -> Mask:
         """The unknowns that move, (n,)."""
-        return np.asarray(self.rise == 0.0)
+        return self.rise == 0.0
 
 
-class CellInverse(ABC):
-    """The inverse of a cell's equations."""
+class CellInverse:
+    """The inverse of a cell's equations: what it does, and the columns that were exchanged since.
 
-    @abstractmethod
+    Args:
+        first: what all variables are for given right-hand sides before columns are exchanged.
+        most: columns to exchange before it is long.
+    """
+
+    def __init__(self, first: Callable[[Array], Array], most: int) -> None:
+        self._first, self._most = first, most
+        self._changes: tuple[Callable[[Array], None], ...] = ()
+
     def solve(self, right: Array) -> Array:
         """What all variables are for given right-hand sides, (n,). Collective.
 
         Args:
             right: of the equations, (n,).
         """
+        found = self._first(right)
+        for change in self._changes:
+            change(found)
+        return found
 
-    @abstractmethod
     def exchange(self, values: Array, place: int) -> None:
         """Put another column in a place.
 
@@ -70,8 +80,14 @@ class CellInverse(ABC):
             values: what :meth:`solve` finds for the new column, (n,).
             place: where.
         """
+        spread, pivot = values.copy(), float(values[place])
+        spread[place] -= 1.0
 
-    @abstractmethod
+        def change(found: Array) -> None:
+            found -= (found[place] / pivot) * spread
+
+        self._changes = (*self._changes, change)
+
     def swap(self, one: int, other: int) -> None:
         """Swap the places of two variables.
 
@@ -80,14 +96,19 @@ class CellInverse(ABC):
             other: the second one.
         """
 
-    @abstractmethod
-    def copy(self) -> Self:
+        def change(found: Array) -> None:
+            found[[one, other]] = found[[other, one]]
+
+        self._changes = (*self._changes, change)
+
+    def copy(self) -> CellInverse:
         """The same, to be changed by itself."""
+        return copy(self)  # the changes are never changed
 
     @property
-    @abstractmethod
     def is_long(self) -> bool:
         """Whether so many columns were exchanged that it had better be found anew."""
+        return len(self._changes) > self._most
 
 
 class CondensedStiffness(ABC):
@@ -149,7 +170,7 @@ class CondensedStiffness(ABC):
             found = np.random.default_rng(0).standard_normal((n, count))
             for _ in range(_ROUNDS):
                 found = np.linalg.qr(np.stack([inverse.solve(column) for column in found.T], axis=1))[0]
-        return np.asarray(found.T)
+        return found.T
 
     @abstractmethod
     def free(self) -> None:
@@ -187,7 +208,7 @@ class DenseStiffness(CondensedStiffness):
 
     @override
     def __matmul__(self, x: Array) -> Array:
-        return np.asarray(self._array @ x)
+        return self._array @ x
 
     @override
     def column(self, i: int) -> Array:
@@ -204,7 +225,10 @@ class DenseStiffness(CondensedStiffness):
         matrix[np.diag_indices(len(matrix))] += np.where(moving, columns.slope, columns.rise)
         if columns.driver is not None:
             matrix[:, columns.driver] = columns.factor
-        return DenseInverse(np.asarray(np.linalg.inv(matrix)))
+        found = np.asarray(np.linalg.inv(matrix))
+        if not np.all(np.isfinite(found)):
+            raise np.linalg.LinAlgError("the tangent is singular")
+        return CellInverse(found.__matmul__, math.isqrt(len(found)))
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
@@ -215,94 +239,6 @@ class DenseStiffness(CondensedStiffness):
     @override
     def free(self) -> None:
         pass  # arrays only
-
-
-class DenseInverse(CellInverse):
-    """The inverse as an array: a column that is exchanged changes it by a matrix of rank one.
-
-    Args:
-        array: the inverse, (n, n).
-
-    Raises:
-        numpy.linalg.LinAlgError: it is not finite.
-    """
-
-    def __init__(self, array: Array) -> None:
-        self._array: Any = np.asarray(array, dtype=np.float64, order="F")
-        if not np.all(np.isfinite(self._array)):
-            raise np.linalg.LinAlgError("the tangent is singular")
-
-    @override
-    def solve(self, right: Array) -> Array:
-        return np.asarray(self._array @ right, dtype=np.float64)
-
-    @override
-    def exchange(self, values: Array, place: int) -> None:
-        spread, row = values.copy(), self._array[place].copy()
-        pivot = spread[place]
-        spread[place] -= 1.0
-        self._array = dger(-1.0 / pivot, spread, row, a=self._array, overwrite_a=1)
-
-    @override
-    def swap(self, one: int, other: int) -> None:
-        self._array[[one, other]] = self._array[[other, one]]
-
-    @override
-    def copy(self) -> Self:
-        found = object.__new__(type(self))
-        found._array = self._array.copy(order="F")
-        return found
-
-    @property
-    @override
-    def is_long(self) -> bool:
-        return False
-
-
-class ProductInverse(CellInverse):
-    """An inverse that is known by what it does, and the columns that were exchanged since.
-
-    Args:
-        first: what all variables were for a right-hand side before.
-        most: columns to exchange before it is long.
-    """
-
-    def __init__(self, first: Callable[[Array], Array], most: int) -> None:
-        self._first, self._most = first, most
-        self._changes: tuple[Callable[[Array], None], ...] = ()
-
-    @override
-    def solve(self, right: Array) -> Array:
-        found = self._first(right)
-        for change in self._changes:
-            change(found)
-        return found
-
-    @override
-    def exchange(self, values: Array, place: int) -> None:
-        spread, pivot = values.copy(), float(values[place])
-        spread[place] -= 1.0
-
-        def change(found: Array) -> None:
-            found -= (found[place] / pivot) * spread
-
-        self._changes = (*self._changes, change)
-
-    @override
-    def swap(self, one: int, other: int) -> None:
-        def change(found: Array) -> None:
-            found[[one, other]] = found[[other, one]]
-
-        self._changes = (*self._changes, change)
-
-    @override
-    def copy(self) -> Self:
-        return copy(self)  # the changes are never changed
-
-    @property
-    @override
-    def is_long(self) -> bool:
-        return len(self._changes) > self._most
 
 
 ZERO = 1e-11

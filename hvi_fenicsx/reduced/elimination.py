@@ -68,7 +68,7 @@ class Elimination:
         if not self.gone.size:
             return whole
         found = whole[np.ix_(self.stay, self.stay)] - self.coupling.T @ self._solve(self.coupling)
-        return np.asarray(0.5 * (found + found.T))
+        return 0.5 * (found + found.T)
 
     def reduced(self, forces: Array) -> Array:
         """Forces on all unknowns as forces on those that stay, (s, ...).
@@ -76,7 +76,7 @@ class Elimination:
         Args:
             forces: (n, ...).
         """
-        return np.asarray(forces[self.stay] - self.coupling.T @ self._solve(forces[self.gone]))
+        return forces[self.stay] - self.coupling.T @ self._solve(forces[self.gone])
 
     def completed(self, values: Array, forces: Array) -> Array:
         """All unknowns, in balance where they are gone, (n,).
@@ -97,11 +97,11 @@ class Elimination:
             some: on all unknowns, (n, k).
             others: likewise, (n, l).
         """
-        return np.asarray(self._solve(some[self.gone]).T @ others[self.gone])
+        return self._solve(some[self.gone]).T @ others[self.gone]
 
     def _solve(self, right: Array) -> Array:
         """The inverse stiffness of those that are gone times columns."""
-        return right if self.factor is None else np.asarray(cho_solve(self.factor, right))
+        return right if self.factor is None else cho_solve(self.factor, right)
 
 
 def _regular(matrix: Array, tolerance: float) -> Integers:
@@ -109,60 +109,41 @@ def _regular(matrix: Array, tolerance: float) -> Integers:
     if not matrix.size:
         return np.empty(0, np.int64)
     _, pivots, rank, _ = dpstrf(matrix, tol=tolerance * float(np.max(np.diag(matrix))), lower=1)
-    return np.asarray(pivots[:rank] - 1, dtype=np.int64)
+    return pivots[:rank] - 1
 
 
 _UNSEEN = 1e-10
 """A motion that moves no condensed unknown, relative to the one that moves them most."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class CondensedMotions:
-    """Rigid motions that the supports of bodies leave, at condensed unknowns.
+def balanced(
+    system: System, interior: Interior, stay: Integers, stiffness: Array, force: Array, loads: Array
+) -> tuple[Array, Array]:
+    """A stiffness and condensed loads as rounding has not changed them along rigid motions. Collective.
 
-    Attributes:
-        basis: Q, orthonormal, (n, j).
-        fields: the same motions at this rank's unknowns, (local unknowns, j).
+    The motions are those that the supports of bodies leave; none where something resists them, or the unknowns do not
+    see each.
+
+    Args:
+        system: the system.
+        interior: its unknowns of Γc.
+        stay: those of them that the condensed problem has.
+        stiffness: symmetric, (n, n).
+        force: condensed loads, (n, k).
+        loads: the same on the bodies, this rank's, (local unknowns, k).
+
+    Returns:
+        A stiffness whose forces along the motions are zero, and loads whose work in them is that on the bodies.
     """
-
-    basis: Array
-    fields: Array
-
-    @classmethod
-    def of(cls, system: System, interior: Interior, stay: Integers) -> Self:
-        """Those of a system; none where something resists them, or the unknowns do not see each. Collective.
-
-        Args:
-            system: the system.
-            interior: its unknowns of Γc.
-            stay: those of them that the condensed problem has.
-        """
-        fields = _fields(system)
-        basis, triangle = np.linalg.qr(interior.gathered(fields)[stay])
-        lengths = np.abs(np.diagonal(triangle))
-        if len(lengths) < fields.shape[1] or np.any(lengths <= _UNSEEN * np.max(lengths, initial=0.0)):
-            return cls(basis=basis[:, :0], fields=fields[:, :0])
-        return cls(basis=basis, fields=np.linalg.solve(triangle.T, fields.T).T)
-
-    def without_forces(self, stiffness: Array) -> Array:
-        """A stiffness whose forces along the motions are zero, (n, n).
-
-        Args:
-            stiffness: symmetric, (n, n).
-        """
-        q = self.basis
-        defect = stiffness @ q
-        found = stiffness - defect @ q.T - q @ (defect.T - (q.T @ defect) @ q.T)
-        return np.asarray(0.5 * (found + found.T))
-
-    def with_work(self, force: Array, work: Array) -> Array:
-        """Condensed loads whose work in the motions is that of the loads on the bodies, (n, k).
-
-        Args:
-            force: condensed, (n, k).
-            work: of the loads on the bodies, (j, k).
-        """
-        return np.asarray(force + self.basis @ (work - self.basis.T @ force))
+    fields = _fields(system)
+    q, triangle = np.linalg.qr(interior.gathered(fields)[stay])
+    lengths = np.abs(np.diagonal(triangle))
+    if len(lengths) < fields.shape[1] or np.any(lengths <= _UNSEEN * np.max(lengths, initial=0.0)):
+        return stiffness, force
+    work = np.linalg.solve(triangle.T, system.comm.allreduce(fields.T @ loads))
+    defect = stiffness @ q
+    found = stiffness - defect @ q.T - q @ (defect.T - (q.T @ defect) @ q.T)
+    return 0.5 * (found + found.T), force + q @ (work - q.T @ force)
 
 
 def _fields(system: System) -> Array:

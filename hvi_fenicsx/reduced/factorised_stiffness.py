@@ -10,10 +10,8 @@ negative eigenvalues.
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable
 from copy import copy
-from typing import TypeVar
+from functools import lru_cache
 
 import numpy as np
 from petsc4py import PETSc
@@ -23,11 +21,9 @@ from ..runtime.mpi import agree
 from ..system.factorisation import Factorisation
 from ..system.interior import Interior
 from ..system.petsc_options import CHOLESKY
-from ..system.system import System
 from ..typing import Array, Mask
-from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness, ProductInverse
+from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
 
-_T = TypeVar("_T")
 _KNOWN = 8
 """So many products are remembered: events ask for the same ones again."""
 
@@ -43,7 +39,7 @@ class FactorisedStiffness(CondensedStiffness):
         self._interior, self._form, self._own = interior, interior.form.suiting(_PREFIX), interior.own()
         self._system = self._form.system
         self._matrix, self._stiffness = self._form.matrix(), self._system.jacobian.matrix.copy()
-        self._diagonal = self._everywhere(np.asarray(self._own[:, interior.here].diagonal()))
+        self._diagonal = self._everywhere(self._own[:, interior.here].diagonal())
         sums = np.asarray(np.abs(self._own).sum(axis=1)).ravel()
         self._size = float(np.max(self._everywhere(sums), initial=0.0))
         self._add(0.0)
@@ -52,8 +48,8 @@ class FactorisedStiffness(CondensedStiffness):
         """Let so much be added to the diagonal; nothing is known of this one yet."""
         self._added = added
         self.__dict__.pop("rigid", None)
-        self._products: OrderedDict[bytes, Array] = OrderedDict()
-        self._counts: OrderedDict[bytes, int] = OrderedDict()
+        self._products = lru_cache(_KNOWN)(self._product)
+        self._counts = lru_cache(_KNOWN)(self._counted)
 
     def _everywhere(self, own: Array) -> Array:
         return np.concatenate(agree(self._system.comm, own))
@@ -70,12 +66,13 @@ class FactorisedStiffness(CondensedStiffness):
 
     @override
     def __matmul__(self, x: Array) -> Array:
-        return _known(self._products, x.tobytes(), lambda: self._product(x)).copy()
+        return self._products(x.tobytes()).copy()
 
-    def _product(self, x: Array) -> Array:
+    def _product(self, of: bytes) -> Array:
+        x = np.frombuffer(of)
         inner = self._interior.solve((self._interior.coupling @ x)[:, None])
         elastic = self._everywhere(self._own @ x) - self._interior.pulled(inner)[:, 0]
-        return np.asarray(elastic + self._added * x)
+        return elastic + self._added * x
 
     @override
     def column(self, i: int) -> Array:
@@ -89,17 +86,29 @@ class FactorisedStiffness(CondensedStiffness):
 
     @override
     def inverse(self, columns: CellColumns) -> CellInverse:
-        return _inverse(self.factorised(_moving(columns), columns.slope), columns, self._system.thresholds.columns)
+        moving, driver = columns.moving.copy(), columns.driver
+        signs, singular = np.where(moving, 1.0, columns.rise), np.linalg.LinAlgError("the tangent is singular")
+        if driver is not None:  # the unknown in whose place is the factor stands
+            moving[driver], signs[driver] = False, 1.0
+        cell = self.factorised(moving, columns.slope)
+        if cell.factors.is_singular:
+            raise singular
+        found = CellInverse(lambda right: signs * cell.solve(right), self._system.thresholds.columns)
+        if driver is not None:
+            values = found.solve(columns.factor)
+            if not values[driver] or not np.all(np.isfinite(values)):
+                raise singular
+            found.exchange(values, driver)
+        return found
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
         steepest = float(np.max(np.abs(slope[moving]), initial=0.0))
         shift = negligible * (self._size + self._added + steepest)
-        key = np.concatenate([moving, np.where(moving, slope, 0.0), [shift]]).tobytes()
-        return _known(self._counts, key, lambda: self._counted(moving, slope + shift))
+        return self._counts(moving.tobytes(), np.where(moving, slope + shift, 0.0).tobytes())
 
-    def _counted(self, moving: Mask, slope: Array) -> int:
-        cell = self.factorised(moving, slope)
+    def _counted(self, moving: bytes, slope: bytes) -> int:
+        cell = self.factorised(np.frombuffer(moving, dtype=bool), np.frombuffer(slope))
         count = cell.factors.negative
         cell.free()
         return count
@@ -117,7 +126,7 @@ class FactorisedStiffness(CondensedStiffness):
         here = self._interior.here
         factors = Factorisation(self._form, self._matrix.copy(), _INDEFINITE, _PREFIX)
         slope = slope[here] + self._added
-        return FactorisedCell(self._system, self._interior, self._stiffness, factors, moving[here], slope)
+        return FactorisedCell(self._interior, self._stiffness, factors, moving[here], slope)
 
     @override
     def free(self) -> None:
@@ -129,7 +138,6 @@ class FactorisedCell:
     """The stiffness of the whole body in one cell, factorised. Creation is collective.
 
     Args:
-        system: the system.
         interior: which unknowns are condensed.
         stiffness: A.
         factors: of a copy of it, to be made.
@@ -144,15 +152,9 @@ class FactorisedCell:
     """
 
     def __init__(
-        self,
-        system: System,
-        interior: Interior,
-        stiffness: PETSc.Mat,
-        factors: Factorisation,
-        moving: Mask,
-        slope: Array,
+        self, interior: Interior, stiffness: PETSc.Mat, factors: Factorisation, moving: Mask, slope: Array
     ) -> None:
-        self._system, self._interior, self._stiffness, self._moving = system, interior, stiffness, moving
+        self._interior, self._stiffness, self._moving, system = interior, stiffness, moving, interior.form.system
         PETSc.garbage_cleanup(system.comm)  # on several ranks factors that nothing refers to are freed together
         factors.allow_negative()
         factors.add(interior.kept, np.where(moving, slope, 0.0))
@@ -176,7 +178,7 @@ class FactorisedCell:
         self.factors.apply(self._load, self._found)
         self._stiffness.mult(self._found, self._force)
         felt = own - self._force.array_r[kept]
-        return np.concatenate(agree(self._system.comm, np.where(moving, self._found.array_r[kept], felt)))
+        return np.concatenate(agree(interior.form.system.comm, np.where(moving, self._found.array_r[kept], felt)))
 
     def free(self) -> None:
         """Free the PETSc objects. Collective."""
@@ -188,37 +190,3 @@ class FactorisedCell:
 _PREFIX = "cell_"
 _INDEFINITE = {**CHOLESKY, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_24": 1}
 """Options of the factorisation: the pivots of the last block are counted too, and those that are zero are found."""
-
-
-def _inverse(cell: FactorisedCell, columns: CellColumns, most: int) -> CellInverse:
-    """The inverse of a cell's equations; the unknown in whose place is the factor stands in the cell."""
-    singular, driver = np.linalg.LinAlgError("the tangent is singular"), columns.driver
-    if cell.factors.is_singular:
-        raise singular
-    signs = np.where(_moving(columns), 1.0, columns.rise)
-    if driver is not None:
-        signs[driver] = 1.0
-    found = ProductInverse(lambda right: signs * cell.solve(right), most)
-    if driver is not None:
-        values = found.solve(columns.factor)
-        if not values[driver] or not np.all(np.isfinite(values)):
-            raise singular
-        found.exchange(values, driver)
-    return found
-
-
-def _moving(columns: CellColumns) -> Mask:
-    """The unknowns that move in a cell; the one in whose place is the factor stands."""
-    moving = columns.moving.copy()
-    if columns.driver is not None:
-        moving[columns.driver] = False
-    return moving
-
-
-def _known(known: OrderedDict[bytes, _T], key: bytes, made: Callable[[], _T]) -> _T:
-    """The value of a key; the oldest ones are forgotten."""
-    if key not in known:
-        known[key] = made()
-        if len(known) > _KNOWN:
-            known.popitem(last=False)
-    return known[key]

@@ -9,6 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from dolfinx.fem.petsc import set_bc
 
 from ..effects.base import load_name
@@ -148,16 +149,13 @@ class CondensedLaws:
     bonds: tuple[Bonds, ...]
     prescribed: tuple[PrescribedBonds, ...]
 
-    def renumbered(self, stay: Integers, size: int) -> CondensedLaws:
+    def renumbered(self, stay: Integers) -> CondensedLaws:
         """The laws on fewer unknowns.
 
         Args:
-            stay: numbers of the unknowns that stay.
-            size: number of all.
+            stay: numbers of the unknowns that stay, ascending.
         """
-        number = np.full(size, -1)
-        number[stay] = np.arange(len(stay))
-        return replace(self, bonds=tuple(replace(b, unknowns=number[b.unknowns]) for b in self.bonds))
+        return replace(self, bonds=tuple(replace(b, unknowns=np.searchsorted(stay, b.unknowns)) for b in self.bonds))
 
 
 def laws_of(system: System, interior: Interior, prescribed: Array) -> CondensedLaws:
@@ -199,42 +197,29 @@ class _Term:
 
     def bonds(self) -> list[Bonds]:
         """The vertices by the number of free components and whether one is an opening, of all ranks. Collective."""
-        opening = self._opening
+        opens = self._term.length is not None and self._term.length.opens
+        opening = opens & np.any((self._term.directions[:, 0] != 0.0) & self._free, axis=1)
         kinds = [(k, opens) for k in (1, 2, 3) for opens in (False, True)]
-        return [b for k, opens in kinds for b in self._bonds((self._components == k) & (opening == opens), k, opens)]
+        return [b for k, opens in kinds for b in self._alike((self._components == k) & (opening == opens), k, opens)]
 
-    @property
-    def _opening(self) -> Mask:
-        """Where an opening that counts only while it is positive is free, (m,)."""
-        term = self._term
-        if term.length is None or not term.length.opens:
-            return np.zeros(len(self._components), dtype=bool)
-        return np.asarray(np.any((term.directions[:, 0] != 0.0) & self._free, axis=1))
-
-    def _bonds(self, here: Mask, components: int, opens: bool) -> Sequence[Bonds]:
-        """The vertices of one kind, by what the lengths of their law are multiplied by. Collective."""
-        stretch = self._term.stretch
-        known = np.unique(np.concatenate(agree(self._comm, stretch[here])))
-        return [b for one in known for b in self._alike(here & (stretch == one), components, opens, float(one))]
-
-    def _alike(self, here: Mask, components: int, opens: bool, stretch: float) -> Sequence[Bonds]:
-        """The vertices of one kind and stretch. Collective."""
+    def _alike(self, here: Mask, components: int, opens: bool) -> Sequence[Bonds]:
+        """The vertices of one kind. Collective."""
         term, surface = self._term, self._term.surface
         unknowns, signs = self._felt(here, components, opens)
-        parts = (unknowns, signs, (surface.weights * term.placed)[here], surface.points[here])
+        parts = (
+            unknowns,
+            signs / term.stretch[here, None],
+            (surface.weights * term.placed * term.stretch)[here],
+            surface.points[here],
+        )
         unknowns, signs, weights, points = (np.concatenate(agree(self._comm, p)) for p in parts)
         if not len(weights):
             return []
-        law = term.law if stretch == 1.0 else term.law.scaled(1.0 / stretch, 1.0)
-        if term.length is not None and components == 1 and not opens:  # a slip alone: its law has the factor
-            factor = term.length.factors[-1]
-            law = law if factor == 1.0 else law.scaled(factor, 1.0 / factor)
-            signs = np.asarray(signs / factor, dtype=np.float64)
         if term.is_linear and not opens:  # the energy of a spring on a length is that of springs on its components
             weights, points = (np.repeat(part, components, axis=0) for part in (weights, points))
             unknowns, signs = unknowns.reshape(-1, 1), signs.reshape(-1, 1)
         found = Bonds(
-            law=law,
+            law=term.law,
             unknowns=unknowns,
             signs=signs,
             weights=weights,
@@ -271,24 +256,24 @@ class _Term:
         return [PrescribedBonds(law=self._term.law, weights=weights, arguments=arguments)]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Carriers:
     """The vertices' unknowns, the same on all ranks.
 
     Attributes:
         lower: bounds, (n,).
         upper: bounds, (n,).
-        points: vertices, m, (n, 3).
-        parts: the part whose contact bounds the unknown, (n,).
-        carrying: numbers of those that carry a bound or a law.
         shift: by how much obstacles that the factor moves have moved the bounds, which are those without, (n,).
+        points: vertices, m, (n, 3).
+        parts: the part whose contact bounds the unknown; empty where none does, (n,).
+        carrying: numbers of those that carry a bound or a law.
     """
 
     lower: Array
     upper: Array
     shift: Array
     points: Array
-    parts: tuple[str, ...]
+    parts: npt.NDArray[np.object_]
     carrying: Integers
 
     def of(self, chosen: Integers) -> Carriers:
@@ -297,15 +282,8 @@ class Carriers:
         Args:
             chosen: their numbers, ascending, (m,).
         """
-        return replace(
-            self,
-            lower=self.lower[chosen],
-            upper=self.upper[chosen],
-            shift=self.shift[chosen],
-            points=self.points[chosen],
-            parts=tuple(self.parts[i] for i in chosen),
-            carrying=np.searchsorted(chosen, self.carrying),
-        )
+        arrays = [each[chosen] for each in (self.lower, self.upper, self.shift, self.points, self.parts)]
+        return Carriers(*arrays, np.searchsorted(chosen, self.carrying))
 
 
 def carriers_of(system: System, interior: Interior, laws: CondensedLaws, moved: Array) -> Carriers:
@@ -333,8 +311,8 @@ def carriers_of(system: System, interior: Interior, laws: CondensedLaws, moved: 
         upper=upper - shift,
         shift=shift,
         points=np.concatenate(agree(system.comm, system.problem.points[interior.kept // d])),
-        parts=tuple(str(p) if b else "" for p, b in zip(interior.gathered(named), bounded, strict=True)),
-        carrying=np.unique(np.concatenate([np.flatnonzero(bounded), *with_law])).astype(np.int64),
+        parts=np.where(bounded, interior.gathered(named), ""),
+        carrying=np.unique(np.concatenate([np.flatnonzero(bounded), *with_law])),
     )
 
 

@@ -63,8 +63,8 @@ def test_a_force_inside_the_body_that_nothing_carries_is_seen(demo: str) -> None
         reaction = system.load.duplicate()
         reaction.array[:] = forces.reaction.ravel()
         turn(reaction, system.rotation)
-        carried = condensed.forces.spread(condensed.problem.elastic @ x - condensed.problem.load(1.0))
-        left = condensed.forces.unbalanced(reaction, carried)
+        carried = condensed.spread(condensed.problem.elastic @ x - condensed.problem.load(1.0))
+        left = condensed.unbalanced(reaction, carried)
         size = float(np.linalg.norm(forces.load))
         assert (left < 1e-8 * float(np.linalg.norm(forces.reaction))) is balanced
         assert balanced or left > 0.01 * size
