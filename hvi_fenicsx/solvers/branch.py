@@ -74,7 +74,11 @@ class BranchIteration(Method):
         Raises:
             SolverError: a convex step did not lower the energy.
         """
-        x = start.copy() if start is not None else self._resting()
+        if start is None:
+            x, linear = resting_start(self.solver, self._laws)
+            self.counts.linear += linear
+        else:
+            x = start.copy()
         xi = self._first_subgradients(x, start if branches is None else branches)
         with self.solver.reporting(self._progress):
             outcome = self._descend(x, self._convex.cells(x), xi)
@@ -93,11 +97,6 @@ class BranchIteration(Method):
         with self.solver.reporting(self._progress):
             outcome, stationary = self._convex.newton(x, self._convex.cells(x), drops)
         return self._result(x, replace(outcome, converged=stationary))
-
-    def _resting(self) -> PETSc.Vec:
-        x, linear = resting_start(self.solver, self._laws)
-        self.counts.linear += linear
-        return x
 
     def _first_subgradients(self, x: PETSc.Vec, branches: PETSc.Vec | None) -> list[Array]:
         """ξ of the pieces to begin on: those of a displacement, or those of the options."""

@@ -8,7 +8,7 @@ has a minimiser at all.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,12 +17,11 @@ from petsc4py import PETSc
 
 from ..laws import Superpotential
 from ..laws.base import Directional
-from ..problem.law_term import LawTerm
-from ..problem.problem import Problem
 from ..problem.scaling import DEFAULT
-from ..rigid import AnyBody, Resistance, RigidProblem, gives_way
+from ..rigid import gives_way
 from ..system import existence
 from ..system.equations import Cells, VertexModel
+from ..system.system import System
 from ..typing import Array
 from . import kink_bounds
 from .active_set import ENERGY, EXACT, Attempt
@@ -98,7 +97,7 @@ class ConvexStep:
 
     def known_unbounded(self, xi: Sequence[Array]) -> bool:
         """Whether the step has no solution, where that is to be asked before a step. Collective."""
-        return self._check_bounded and self._is_unbounded(xi)
+        return self._check_bounded and is_unbounded(self._system, self._laws, xi)
 
     def minimise(
         self, x: PETSc.Vec, cells: list[Cells], xi: Sequence[Array], tolerance: float, *, steady: bool
@@ -115,9 +114,11 @@ class ConvexStep:
         Returns:
             The cells at the end, and how it ended.
         """
+        most = self._options.max_iterations
         for _ in range(self._thresholds.most_changes):
             models = self.majorants(cells, xi)
-            outcome = self._within(x, models, cells, tolerance, steady=steady)
+            bounds, attempts = kink_bounds.slip_bounds(self._system, cells), self._attempts(models, steady=steady)
+            outcome = self._solver.first_success(x, attempts, tolerance, bounds, self._counts, most)
             moves = self._overloaded(x, models)
             if not outcome.converged or not self.anywhere(moves):
                 return cells, outcome
@@ -132,9 +133,7 @@ class ConvexStep:
             cells: where each vertex is kept, by term.
             xi: ξ by term, (m,) each.
         """
-        models = self.majorants(cells, self._nearest(x, xi))
-        self._system.equations.residual(x, self._residual, models)
-        if self.anywhere(self._beyond_kinks(x, models)):
+        if self.anywhere(self._overloaded(x, self.majorants(cells, self._nearest(x, xi)))):
             return math.inf
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
         return self._solver.measure(x, self._residual, lower, upper)
@@ -218,41 +217,21 @@ class ConvexStep:
 
     def _overloaded(self, x: PETSc.Vec, models: Sequence[VertexModel]) -> list[npt.NDArray[np.int64]]:
         """To which cell each vertex moves whose kink cannot carry its force, by term."""
-        if kink_bounds.exist([m.cells for m in models]):
-            self._system.equations.residual(x, self._residual, models)
-        return self._beyond_kinks(x, models)
-
-    def _beyond_kinks(self, x: PETSc.Vec, models: Sequence[VertexModel]) -> list[npt.NDArray[np.int64]]:
-        """As :meth:`_overloaded`, where the residual at x is known."""
-        if not kink_bounds.exist([m.cells for m in models]):
-            return [np.zeros(len(m.cells.index), dtype=np.int64) for m in models]
+        self._system.equations.residual(x, self._residual, models)
         slack = self._thresholds.margin * self._options.tolerance
         return kink_bounds.overloaded(self._system, x, self._residual, models, slack)
-
-    def _within(
-        self, x: PETSc.Vec, models: Sequence[VertexModel], cells: Sequence[Cells], tolerance: float, *, steady: bool
-    ) -> Outcome:
-        """Minimise the majorant with each vertex kept in its cell, from and into x."""
-        bounds = kink_bounds.slip_bounds(self._system, cells)
-        attempts = self._attempts(models, steady=steady)
-        most = self._options.max_iterations
-        return self._solver.first_success(x, attempts, tolerance, bounds, self._counts, most)
 
     def _attempts(self, models: Sequence[VertexModel], *, steady: bool) -> Iterator[Attempt | str]:
         """Ways to solve the step; after the first failure a reason instead, where it has no solution."""
         yield Attempt(models=models, steady=steady)
         if not self._check_bounded:
             self._check_bounded = True
-            if self._is_unbounded([m.xi for m in models if m.xi is not None]):
+            if is_unbounded(self._system, self._laws, [m.xi for m in models if m.xi is not None]):
                 yield UNBOUNDED
         yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.foundation)
         secants = [replace(m, secant_from=m.law.length_scale) for m in models]
         yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
         yield Attempt(models=models)
-
-    def _is_unbounded(self, xi: Sequence[Array]) -> bool:
-        system = self._system
-        return is_unbounded(system.problem, system.forces, self._laws, xi)
 
 
 def no_step() -> Outcome:
@@ -260,47 +239,38 @@ def no_step() -> Outcome:
     return Outcome(False, 0, 0, math.inf, "no convex step")
 
 
-def is_unbounded(
-    problem: Problem,
-    forces: Mapping[str, PETSc.Vec],
-    laws: Sequence[Superpotential],
-    xi: Sequence[Array],
-) -> bool:
+def is_unbounded(system: System, laws: Sequence[Superpotential], xi: Sequence[Array]) -> bool:
     """Whether the convex energy with H - ξ in the place of each law j = H - G has no minimiser. Collective.
 
     It has none where the load does more work than ∫ H^∞(y) - ξ·y along a rigid motion y that contact admits: the body
     slides away, its remaining bonds do not hold it. Work that is equal within rounding is no proof of that.
 
+    For a law of |u_t|, ξ reduces the weights of the vertices. One whose law falls below zero pushes the body on, and
+    counts as no resistance: the functional stays convex, and a body that slides away in spite of it does so all the
+    more.
+
     Args:
-        problem: the problem.
-        forces: its load vectors by name.
+        system: the assembled problem.
         laws: what is solved, by term.
         xi: ξ at the vertices, by term, (m,) each.
     """
-    comm = problem.domain.mesh.comm
-    growths = [_growth(law) for law in laws]
-    terms = list(zip(problem.terms, growths, xi, strict=True))
-    majorants = (_majorant(problem, forces, body, terms) for body in problem.bodies)
-    return any(gives_way(comm, one) for one in majorants)
-
-
-def _majorant(
-    problem: Problem,
-    forces: Mapping[str, PETSc.Vec],
-    body: AnyBody,
-    terms: Sequence[tuple[LawTerm, Directional, Array]],
-) -> RigidProblem:
-    """The existence question of one body with H - ξ in the place of its laws, given as (term, H^∞, ξ). Collective."""
-    whole = existence.rigid_problem(problem, existence.loads_of_rigid_motions(problem, forces), body)
-    here = [one for one in terms if existence.acts_on(problem, body, one[0].surface)]
-    mine = [xi[existence.inside(problem, body, term.surface.blocks)] for term, _, xi in here]
-    parts = list(zip(whole.resistances, here, mine, strict=True))
-    works = sum((_work(part, term, xi) for part, (term, _, _), xi in parts), np.zeros(body.motions))
-    return replace(
-        whole,
-        loads={**whole.loads, "ξ": problem.domain.mesh.comm.allreduce(works)},
-        resistances=tuple(_majorised(part, term, growth, xi) for part, (term, growth, _), xi in parts),
-    )
+    problem = system.problem
+    for whole in existence.rigid_problems(problem, system.forces):
+        acting = [existence.acts_on(problem, whole.body, term.surface) for term in problem.terms]
+        here = [one for one, acts in zip(zip(problem.terms, laws, xi, strict=True), acting, strict=True) if acts]
+        work, resistances = np.zeros(whole.body.motions), []
+        for part, (term, law, of_term) in zip(whole.resistances, here, strict=True):
+            growth, weights = _growth(law), part.weights
+            mine = of_term[existence.inside(problem, whole.body, term.surface.blocks)]
+            if not term.radial:
+                work += (weights * mine) @ part.slips[:, 0]
+            elif np.isfinite(growth.plus) and growth.plus != 0.0:
+                weights = weights * np.maximum(1.0 - mine / growth.plus, 0.0)
+            resistances.append(replace(part, weights=weights, growth=growth, peak=growth))
+        loads = {**whole.loads, "ξ": system.comm.allreduce(work)}
+        if gives_way(system.comm, replace(whole, loads=loads, resistances=tuple(resistances))):
+            return True
+    return False
 
 
 def _growth(law: Superpotential) -> Directional:
@@ -310,21 +280,3 @@ def _growth(law: Superpotential) -> Directional:
         here, beyond = (law.convex.right(x) * np.sign(ends) for x in (ends, 2.0 * ends))
     minus, plus = np.where(beyond > here, np.inf, here)
     return Directional(float(minus), float(plus))
-
-
-def _majorised(part: Resistance, term: LawTerm, growth: Directional, xi: Array) -> Resistance:
-    """The resistance of H - ξ at infinity; for a law of |u_t|, ξ reduces the weights of the vertices.
-
-    A vertex whose law falls below zero pushes the body on. It counts as no resistance: the functional stays convex, and
-    a body that slides away in spite of it does so all the more.
-    """
-    if not term.radial or not np.isfinite(growth.plus) or growth.plus == 0.0:
-        return replace(part, growth=growth, peak=growth)
-    return replace(part, weights=part.weights * np.maximum(1.0 - xi / growth.plus, 0.0), growth=growth, peak=growth)
-
-
-def _work(part: Resistance, term: LawTerm, xi: Array) -> Array:
-    """∫ ξ·y over this rank's vertices for the rigid basis, (3|6,); 0 for a law of |u_t|."""
-    if term.radial:
-        return np.zeros(part.fields.shape[1])
-    return np.asarray((part.weights * xi) @ part.slips[:, 0])

@@ -85,14 +85,15 @@ def overloaded(
         models: of the step, by term.
         slack: traction by which the kink may be exceeded, relative to the law's scale.
     """
-    radial = any(term.radial for term in system.terms)
-    left = _left_to_radial(system, x, residual, models) if radial else residual.array_r
-    moves, shared = [], Shared(system.terms, models, left)
+    left = _left_to_radial(system, x, residual, models)
+    moves, spare = [], [_spare(*pair, left) for pair in zip(system.terms, models, strict=True)]
     for number, (term, model) in enumerate(zip(system.terms, models, strict=True)):
         excess = slack * system.references.traction_scale(term) * term.weights
         argument = term.argument(x.array_r)
         if term.radial:
-            moves.append(shared.moves(number, argument, excess))
+            others = sum(spare[:number] + spare[number + 1 :], np.zeros_like(left))
+            needed = np.sign(left) * np.maximum(np.abs(left) - others, 0.0)
+            moves.append(_radial_moves(term, model, argument, needed, excess))
         else:
             moves.append(_signed_moves(term, model, argument, residual, excess))
     return moves
@@ -106,8 +107,6 @@ def _left_to_radial(system: System, x: PETSc.Vec, residual: PETSc.Vec, models: S
             _keep_in_cells(term, model.cells, lower, upper)
     held = (x.array_r <= lower.array_r) & (residual.array_r > 0)
     held |= (x.array_r >= upper.array_r) & (residual.array_r < 0)
-    for bound in (lower, upper):
-        bound.destroy()
     return np.where(held, 0.0, residual.array_r)
 
 
@@ -149,51 +148,31 @@ def _jump(part: ConvexPart, at: Array) -> Array:
     return np.where(np.isfinite(at), part.right(finite) - part.left(finite), 0.0)
 
 
-class Shared:
-    """The forces that the kinks of all laws of a length have to carry together.
+def _radial_moves(term: LawTerm, model: VertexModel, argument: Array, needed: Array, excess: Array) -> Integers:
+    """The moves for a law of a length: a stuck vertex goes if its kink cannot carry its force, a slow one sticks."""
+    cells = model.cells
+    if not len(cells.kinks):
+        return np.zeros(len(argument), dtype=np.int64)
+    go = (cells.index == 0) & (np.linalg.norm(_pulls(term, needed), axis=1) > _disc(term, model) + excess)
+    stick = (cells.index == 1) & (argument <= cells.ramp)
+    return go.astype(np.int64) - stick.astype(np.int64)
 
-    Args:
-        terms: all laws.
-        models: what takes their place, by term.
-        forces: what bounds and other kinks leave to them, (n,).
-    """
 
-    def __init__(self, terms: Sequence[LawTerm], models: Sequence[VertexModel], forces: Array) -> None:
-        self._terms, self._models, self._forces = terms, models, forces
-        self._spare = [self._spare_of(number) for number in range(len(terms))]
+def _disc(term: LawTerm, model: VertexModel) -> Array:
+    """The largest force that the kink of a law carries, (m,)."""
+    return term.weights * model.law.convex.right(np.zeros_like(term.weights))
 
-    def moves(self, number: int, argument: Array, excess: Array) -> Integers:
-        """To which cell each vertex of a term moves: a stuck one goes if its kink cannot carry it, a slow one sticks.
 
-        Args:
-            number: of the term.
-            argument: the length, (m,).
-            excess: force by which the kink may be exceeded, (m,).
-        """
-        term, cells = self._terms[number], self._models[number].cells
-        if not len(cells.kinks):
-            return np.zeros(len(argument), dtype=np.int64)
-        others = sum(self._spare[:number] + self._spare[number + 1 :], np.zeros_like(self._forces))
-        needed = np.sign(self._forces) * np.maximum(np.abs(self._forces) - others, 0.0)
-        go = (cells.index == 0) & (np.linalg.norm(_pulls(term, needed), axis=1) > self._disc(number) + excess)
-        stick = (cells.index == 1) & (argument <= cells.ramp)
-        return go.astype(np.int64) - stick.astype(np.int64)
-
-    def _disc(self, number: int) -> Array:
-        """The largest force that the kink of a term carries, (m,)."""
-        weights = self._terms[number].weights
-        return np.asarray(weights * self._models[number].law.convex.right(np.zeros_like(weights)))
-
-    def _spare_of(self, number: int) -> Array:
-        """What the kink of a term can carry of each component where it carries all of the others, (n,)."""
-        spare, term, cells = np.zeros_like(self._forces), self._terms[number], self._models[number].cells
-        if term.radial and len(cells.kinks):
-            squares = _pulls(term, self._forces) ** 2
-            rest = self._disc(number)[:, None] ** 2 - np.sum(squares, axis=1, keepdims=True) + squares
-            room = np.sqrt(np.maximum(rest, 0.0)) * (cells.index == 0)[:, None] * _factors(term)
-            room[:, _opens(term)] *= squares[:, _opens(term)] > 0.0
-            spare[term.surface.dofs] = np.einsum("mkd,mk->md", np.abs(term.directions), room) * term.free
-        return spare
+def _spare(term: LawTerm, model: VertexModel, forces: Array) -> Array:
+    """What the kink of a law of a length can carry of each component where it carries all of the others, (n,)."""
+    spare, cells = np.zeros_like(forces), model.cells
+    if term.radial and len(cells.kinks):
+        squares = _pulls(term, forces) ** 2
+        rest = _disc(term, model)[:, None] ** 2 - np.sum(squares, axis=1, keepdims=True) + squares
+        room = np.sqrt(np.maximum(rest, 0.0)) * (cells.index == 0)[:, None] * _factors(term)
+        room[:, _opens(term)] *= squares[:, _opens(term)] > 0.0
+        spare[term.surface.dofs] = np.einsum("mkd,mk->md", np.abs(term.directions), room) * term.free
+    return spare
 
 
 def _pulls(term: LawTerm, forces: Array) -> Array:

@@ -308,14 +308,8 @@ def _in_unknowns(divergence: PETSc.Mat, system: System) -> PETSc.Mat:
     coupling, found = system.problem.coupling, divergence.copy()
     for step in (coupling and coupling.matrix, system.rotation):
         if step is not None:
-            product = found.matMult(step)
-            found.destroy()
-            found = product
-    mask = system.load.duplicate()
-    mask.set(1.0)
-    mask.array[system.problem.fixed_here] = 0.0
-    found.diagonalScale(None, mask)
-    mask.destroy()
+            found = found.matMult(step)
+    found.diagonalScale(None, system.unprescribed())
     return found
 
 
@@ -327,7 +321,6 @@ def _compliance(part: Dilatation) -> PETSc.Mat:
     matrix = PETSc.Mat().createAIJ((sizes, sizes), nnz=(1, 0), comm=found.comm)
     matrix.setDiagonal(found)
     matrix.assemble()
-    found.destroy()
     return matrix
 
 

@@ -260,7 +260,7 @@ class Level:
         Held unknowns keep their weights in it: their large diagonal leaves them as they are on every level.
         """
         found = self.prolongation.copy()
-        found.diagonalScale(_unprescribed(self.finer), _unprescribed(self.system))
+        found.diagonalScale(self.finer.unprescribed(), self.system.unprescribed())
         return found
 
     @cached_property
@@ -344,11 +344,3 @@ def with_coarser_system(finer: System, coarser: System, levels: Levels, step: PE
     if not levels or step.size[0] >= finer.thresholds.level_growth * levels[0].prolongation.size[1]:
         return (Level(finer, coarser, step), *levels)
     return (Level(finer, levels[0].system, step.matMult(levels[0].prolongation)), *levels[1:])
-
-
-def _unprescribed(system: System) -> PETSc.Vec:
-    """1 for the unknowns that are not prescribed, else 0."""
-    mask = system.load.duplicate()
-    mask.set(1.0)
-    mask.array[system.problem.fixed_here] = 0.0
-    return mask

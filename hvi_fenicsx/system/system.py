@@ -215,6 +215,13 @@ class System:
         """Give the prescribed unknowns of x their values. Local."""
         x.array[self.problem.fixed_here] = self.load.array_r[self.problem.fixed_here]
 
+    def unprescribed(self) -> PETSc.Vec:
+        """1 for the unknowns that are not prescribed, else 0. Collective."""
+        mask = self.load.duplicate()
+        mask.set(1.0)
+        mask.array[self.problem.fixed_here] = 0.0
+        return mask
+
     def undisplaced(self) -> PETSc.Vec:
         """A new x: the prescribed values, and zero elsewhere. Collective."""
         x = self.load.duplicate()
