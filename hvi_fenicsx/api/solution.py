@@ -147,7 +147,10 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: there is no such picture of it.
         """
         require_kind("picture", picture, (str, type(None)), "the name of a picture, or None")
-        return _draw(self, picture or ("escape" if self.solve_result is None else "body"))
+        result, figures = gathering.result(self), list[Figure]()
+        wanted = picture or ("escape" if self.solve_result is None else "body")
+        on_root(self.problem.domain.mesh.comm, lambda: figures.append(_figure(result, wanted)))
+        return figures[0] if figures else None
 
     def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
         """Write the folder that ``hvi run`` writes. Collective.
@@ -188,22 +191,11 @@ class ModelSolution(Solution):
         return "\n".join([*console.outcome(self), *console.warnings(self.warnings)])
 
 
-def _draw(solution: Solution, picture: str) -> Figure | None:
-    """One picture of a solution on rank 0, None elsewhere. Collective."""
-    result, figures = gathering.result(solution), list[Figure]()
-
-    def make() -> None:
-        assert result is not None
-        figures.append(_figure(result, picture))
-
-    on_root(solution.problem.domain.mesh.comm, make)
-    return figures[0] if figures else None
-
-
-def _figure(result: Result, wanted: str) -> Figure:
+def _figure(result: Result | None, wanted: str) -> Figure:
     """Draw on rank 0."""
     from ..report.pictures.drawings import drawings, x_server
 
+    assert result is not None
     known = {drawing.path.stem: drawing for drawing in drawings(result)}
     if wanted not in known:
         raise InputError(f"plot: there is no picture {wanted!r} of this solution; there are: {', '.join(known)}")

@@ -61,19 +61,14 @@ def _told(command: Callable[[], int]) -> int:
 
 
 def _parsed(words: Sequence[str]) -> argparse.Namespace:
-    for word in words:
-        _check_utf8(word)
+    for word in words:  # what could be written into no file of the result
+        try:
+            word.encode("utf-8")
+        except UnicodeEncodeError:
+            raise InputError(f"{word}: is not UTF-8; rename the file or folder") from None
     options = parser().parse_args(words)
     options.given = shlex.join(["hvi", *words])
     return options
-
-
-def _check_utf8(word: str) -> None:
-    """Refuse what could be written into no file of the result."""
-    try:
-        word.encode("utf-8")
-    except UnicodeEncodeError:
-        raise InputError(f"{word}: is not UTF-8; rename the file or folder") from None
 
 
 def _with_petsc_joined(words: Sequence[str]) -> list[str]:

@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import PydanticCustomError
-
 from ..errors import HviError, InputError
 from ..runtime import log
 from ..schema import refusal, shown
@@ -41,14 +39,12 @@ def load(names: Any, folder: str | os.PathLike[str]) -> tuple[str, ...]:
         PydanticCustomError: a file that is not there, no Python file, or raises an error of its own.
     """
     names = [names] if isinstance(names, str) else names
-    if not isinstance(names, list | tuple):
-        raise _named_wrongly(names)
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n.endswith(".py") for n in names):
+        raise refusal(f'must name Python files, like "my_laws.py" (is {shown(names)})')
     return tuple(_load(name, Path(folder)) for name in names)
 
 
-def _load(name: Any, folder: Path) -> str:
-    if not isinstance(name, str) or not name.endswith(".py"):
-        raise _named_wrongly(name)
+def _load(name: str, folder: Path) -> str:
     path = Path(os.path.abspath(folder / name))
     if not path.is_file():
         raise refusal(f"{path} does not exist; it is looked for beside the scene file")
@@ -106,7 +102,3 @@ def _words(error: BaseException) -> str:
     with contextlib.suppress(Exception):
         return f"{type(error).__name__}: {error}"
     return type(error).__name__
-
-
-def _named_wrongly(value: Any) -> PydanticCustomError:
-    return refusal(f'must name Python files, like "my_laws.py" (is {shown(value)})')

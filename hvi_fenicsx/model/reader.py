@@ -59,9 +59,15 @@ def _piece(value: Any) -> Inequalities:
 
 
 class _EffectTable(Table):
-    """A table of a place, with the effects that act there."""
+    """A table of a place, with the effects that act there.
+
+    Class attributes:
+        place: where they act.
+        where_key: the key of its sides or regions; empty: the table's name is the place.
+    """
 
     place: ClassVar[Place]
+    where_key: ClassVar[str]
     _acting: tuple[Effect, ...] = PrivateAttr(default=())
 
     @model_validator(mode="wrap")
@@ -95,13 +101,10 @@ class _EffectTable(Table):
         """The effects that may act there, by key."""
         return Effect.registry[cls.place]
 
-    def stands(self, name: str) -> tuple[str, ...] | None:
-        """The sides or regions, None for the whole body, of a table of this name."""
-        raise NotImplementedError
-
     def effects(self, name: str) -> Iterator[Effect]:
         """Its effects at their place, where its name is this."""
-        return (effect.at(self.stands(name), name) for effect in self._acting)
+        where = getattr(self, self.where_key) if self.where_key else (name,)
+        return (effect.at(where, name) for effect in self._acting)
 
 
 class BoundaryTable(_EffectTable):
@@ -109,16 +112,13 @@ class BoundaryTable(_EffectTable):
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
     place: ClassVar[Place] = Place.BOUNDARY
+    where_key: ClassVar[str] = "on"
 
     on: Names
     """a side of the shape, a physical group of the mesh file, or a list of them"""
     where: Annotated[Inequalities, BeforeValidator(_piece), PlainSerializer(lambda piece: piece.source)] | None = None
     """only a piece of it: inequalities in x, y, z (m) that hold at the midpoints of its facets, like `"x > 0.3"` or
     `"0.1 < x < 0.2 and y < 1"`"""
-
-    def stands(self, name: str) -> tuple[str, ...]:
-        """Its sides."""
-        return self.on
 
 
 class InterfaceTable(_EffectTable):
@@ -128,6 +128,7 @@ class InterfaceTable(_EffectTable):
     """
 
     place: ClassVar[Place] = Place.BOUNDARY
+    where_key: ClassVar[str] = ""
 
     between: Annotated[tuple[str, str], vector(2)]
     """the two sides, like ["lower.top", "upper.bottom"]; the vertices of the first carry contact and laws, and its
@@ -140,22 +141,15 @@ class InterfaceTable(_EffectTable):
         """Those that may act between two bodies."""
         return {key: kind for key, kind in super().known().items() if kind.on_interfaces}
 
-    def stands(self, name: str) -> tuple[str, ...]:
-        """The interface itself."""
-        return (name,)
-
 
 class BodyTable(_EffectTable):
     """The effects that act in the body, or in one region of it."""
 
     place: ClassVar[Place] = Place.BODY
+    where_key: ClassVar[str] = "region"
 
     region: Names | None = None
     """a physical group of cells, or a list of them; without it the whole body"""
-
-    def stands(self, name: str) -> tuple[str, ...] | None:
-        """Its regions."""
-        return self.region
 
 
 class MaterialTable(Table):

@@ -132,19 +132,14 @@ def _toml(file: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(_broken(file, text, str(error))) from None
+        reason = re.sub(r" \(at .*\)$", "", str(error), flags=re.DOTALL)
+        found = re.search(r"\(at line (\d+), column (\d+)\)$", str(error))
+        line, column = found.groups() if found else (str(text.count("\n") + 1), "1")
+        content = "".join(text.splitlines()[int(line) - 1 :][:1]).strip()[:60]
+        raise InputError(f"{file}:{line}:{column}: not valid TOML: {reason}: {content}") from None
     except (ValueError, RecursionError) as error:
         reason = "is nested too deep" if isinstance(error, RecursionError) else "has a number of too many digits"
         raise InputError(f"{file}: {reason}") from None
-
-
-def _broken(file: Path, text: str, message: str) -> str:
-    """Tomllib's message with its place in front."""
-    reason = re.sub(r" \(at .*\)$", "", message, flags=re.DOTALL)
-    found = re.search(r"\(at line (\d+), column (\d+)\)$", message)
-    line, column = found.groups() if found else (str(text.count("\n") + 1), "1")
-    content = "".join(text.splitlines()[int(line) - 1 :][:1]).strip()[:60]
-    return f"{file}:{line}:{column}: not valid TOML: {reason}: {content}"
 
 
 def lines_of(text: str) -> Mapping[Keys, int]:
