@@ -139,13 +139,6 @@ class Branch(ABC):
             numpy.linalg.LinAlgError: the factor stands along the branch.
         """
 
-    def set_out_as(self, other: Branch) -> None:  # noqa: B027
-        """Set out from the same state as another branch goes, and let the points pass that have to.
-
-        Args:
-            other: which one.
-        """
-
     @abstractmethod
     def advance(self, aim: float) -> Move:
         """One step: to the first event, or as far as is safe.

@@ -223,14 +223,6 @@ class CurvedBranch(Events):
         return self.z + min(DEFAULT.near, float(np.min(ways, initial=np.inf))) * self.here.tangent[:-1]
 
     @override
-    def set_out_as(self, other: Branch) -> None:
-        assert isinstance(other, CurvedBranch)
-        along = other.here.tangent.copy()
-        along[-1] = 0.0
-        self.head(along)
-        Crossing(self).run()
-
-    @override
     def balanced(self, factor: float) -> Array:
         return self.correct(self.here.y, self.at_factor(factor))[:-1]
 

@@ -9,7 +9,6 @@ equilibrium wherever it goes. Where no such branch leads to an end soon, the bod
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -66,27 +65,21 @@ class Jump:
 
     def _held_back(self) -> Landing | None:
         """The landing of the first restraint whose branch leads to an end soon."""
-        kept, ways = self._points.kept(), (True,) if self._points.straight else (False, True)
-        for (restraint, k), against in itertools.product(_restraints(self._branch), ways):
+        kept = self._points.kept()
+        for restraint, k in _restraints(self._branch):
             with suppress(Refused, np.linalg.LinAlgError):
-                found = self._restrained(restraint, k, against=against)
+                found = self._restrained(restraint, k)
                 if found is not None:
                     return found
             self._points.restore(kept)
         return None
 
-    def _restrained(self, restraint: Array, k: int, *, against: bool) -> Landing | None:
-        """The landing of the branch along which a restraint grows at first; None where none is found.
-
-        It sets out as the path goes, or against the restraint.
-        """
+    def _restrained(self, restraint: Array, k: int) -> Landing | None:
+        """The landing of the branch along which a restraint grows at first; None where none is found."""
         points, inverse = self._points, self._branch.inverse()
         restraint = points.unresisted(self._values, restraint).balanced * float(np.mean(points.forces))
         branch = branch_from(points, self._load, restraint, self._z, 0.0, inverse)
-        if against:
-            branch.set_out(-1.0)
-        else:
-            branch.set_out_as(self._branch)
+        branch.set_out(-1.0)
         back = points.straight and branch.directions[k] * self._directions[k] <= 0.0
         if back or branch.rising > DEFAULT.undecided:
             return None
