@@ -155,7 +155,9 @@ class CurvedBranch(Events):
     @override
     def watch_folds(self) -> None:
         self.trend = int(np.sign(self.rising)) or self.trend
-        with suppress(Refused):  # points pass their ends a little before or after them: that leaves rounding
+        with suppress(
+            Refused, np.linalg.LinAlgError
+        ):  # points pass their ends a little before or after them: that leaves rounding
             y = np.append(self.correct(self.here.y, self.plane(0.0))[:-1], self.here.y[-1])
             self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
 
@@ -213,8 +215,8 @@ class CurvedBranch(Events):
         return float((values.moves > 0.0) * (low * 1.0 - high) @ points.along(values, motion))
 
     @property
-    @override
     def motion(self) -> Array:
+        """How fast the displacements change along the branch, (n,)."""
         return displacement_rate(self.points, self.here)
 
     @override

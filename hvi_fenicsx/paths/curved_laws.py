@@ -31,10 +31,8 @@ class _Group:
     def __init__(self, at: Sequence[tuple[int, VertexLaw]]) -> None:
         self.points: Integers = np.array([k for k, _ in at])
         self.rows = [law for _, law in at]
-        self.law, r = self.rows[0].law, len(at)
-        self._signs, self._weights = (
-            np.array([getattr(law, name) for law in self.rows]) for name in ("sign", "weight")
-        )
+        laws, numbers, r = self.rows[0].laws, [law.number for law in self.rows], len(at)
+        self.law, self._signs, self._weights = laws.law, laws.factors[numbers], laws.weights[numbers]
         self.live: Mask = np.zeros(r, dtype=bool)
         self.chords, self.ends, self.inset = np.zeros((r, 3)), np.zeros((r, 2)), np.zeros((r, 2))
 

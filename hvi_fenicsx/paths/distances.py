@@ -14,7 +14,7 @@ from ..typing import Array
 from .relations import ContactPoints
 from .state import PathState
 from .thresholds import DEFAULT, ROUNDING
-from .vertex_laws import factors, multiplied
+from .vertex_laws import multiplied
 
 
 class Distances:
@@ -26,8 +26,7 @@ class Distances:
     """
 
     def __init__(self, problem: CondensedProblem, remember: Collection[int]) -> None:
-        self._factors = factors(problem)
-        self._problem = multiplied(problem, self._factors)
+        self._problem, self._factors = multiplied(problem)
         bonds = enumerate(self._problem.bonds)
         self._laws = [b.laws.with_memory if number in remember else b.laws for number, b in bonds]
 
@@ -130,8 +129,8 @@ class StateOnGraphs:
     """
 
     def __init__(self, problem: CondensedProblem, remember: Collection[int], state: PathState) -> None:
-        self._factors = factors(problem)
-        self._points = ContactPoints(multiplied(problem, self._factors), remember)
+        known, self._factors = multiplied(problem)
+        self._points = ContactPoints(known, remember)
         self._z = self._points.take(state)
         self._read()
 

@@ -202,7 +202,8 @@ class CurveEquations(Branch):
             condition: the condition.
 
         Raises:
-            Refused: the method does not converge, or comes to a point whose equations are singular.
+            Refused: the method does not converge.
+            numpy.linalg.LinAlgError: it comes to a point whose equations are singular.
         """
         value, gradient = condition
         size, last = 1.0 + float(np.max(np.abs(y))), np.inf
@@ -237,13 +238,7 @@ class CurveEquations(Branch):
             found = self._factors.step(left, row, off)
             if np.max(np.abs(found)) <= expected:
                 return found
-        return self._factorised(values, row).step(left, row, off)
-
-    def _factorised(self, values: Values, row: Array) -> Bordered:
-        try:
-            return self._factorise(values, row)
-        except np.linalg.LinAlgError:
-            raise Refused from None
+        return self._factorise(values, row).step(left, row, off)
 
     def _sharpness(self, gradient: Array) -> float:
         """How fast a condition's value changes along the curve: what hardly changes fixes a point to few digits."""

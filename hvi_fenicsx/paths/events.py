@@ -110,7 +110,7 @@ class Events(CurveEquations):
         Raises:
             Refused: it went inwards first, and came back within the step.
         """
-        rate = self._rate_of(StepEnd.TURNED, point)(self.here)
+        rate = self._rate_of(point)(self.here)
         beyond = move.after.values.s[point] - move.before.values.s[point]
         largest = float(np.max(np.abs(self.here.tangent)))
         if rate * beyond < 0.0 and abs(rate) > DEFAULT.undecided * largest and not self.points.outward[point]:
@@ -144,7 +144,7 @@ class Events(CurveEquations):
         whole = float(self.here.tangent @ (move.after.y - self.here.y))
         if whole <= DEFAULT.standing:
             return None
-        rate = self._rate_of(outcome, point)
+        rate = self._rate_of(point)
         if rate(self.here) * rate(move.after) >= 0.0:
             return self._moved(outcome, point, move.after.y)
         known = {0.0: self.here, whole: move.after}  # corrected anew, their rates may have other signs by rounding
@@ -168,8 +168,8 @@ class Events(CurveEquations):
         back = np.flatnonzero(self.points.turning_back(after.values, rates) & clear)
         return (StepEnd.TURNED, int(back[0])) if back.size else None
 
-    def _rate_of(self, outcome: StepEnd, point: int | None) -> Callable[[CurvePoint], float]:
-        if outcome is StepEnd.FOLD or point is None:
+    def _rate_of(self, point: int | None) -> Callable[[CurvePoint], float]:
+        if point is None:
             return lambda place: float(place.tangent[-1])
         return lambda place: float(self.rates_at(place)[point])
 

@@ -18,7 +18,7 @@ from .jumps import Jump
 from .relations import ContactPoints
 from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped
 from .thresholds import DEFAULT
-from .vertex_laws import factors, multiplied
+from .vertex_laws import multiplied
 
 
 class Follower(LoadHistory):
@@ -46,8 +46,8 @@ class Follower(LoadHistory):
         interrupted: Callable[[], bool] = lambda: False,
     ) -> None:
         super().__init__(options)
-        self._factors = factors(problem)
-        self._problem = problem = multiplied(problem, self._factors)
+        problem, self._factors = multiplied(problem)
+        self._problem = problem
         self._resume, self._interrupted = resume, interrupted
         self._events, self._peak, self._adrift = 0, 0.0, False
         self._points = ContactPoints(problem, options.remember)
@@ -134,12 +134,12 @@ class Follower(LoadHistory):
 
     def _first(self) -> Array | None:
         """Where the points are at the factor 0; None: the path has ended."""
-        rest = at_rest(self._problem, self._points)
-        if rest.constant is not None:
-            return self._loaded(rest.constant)
-        if rest.held:
-            return rest.z
-        z = self._at_no_load(rest.z, self._options.programme[0])
+        rest, constant = at_rest(self._problem, self._points)
+        if constant is not None:
+            return self._loaded(constant)
+        if self._points.is_held(self._points.values(rest)):
+            return rest
+        z = self._at_no_load(rest, self._options.programme[0])
         if isinstance(z, Nowhere):
             (self._come_off if z is Nowhere.AWAY else self._lose)(0.0, z.value)
             return None

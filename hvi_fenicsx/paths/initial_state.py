@@ -5,7 +5,7 @@ Where nothing holds a body at rest, a small part of the loads takes it to where 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
@@ -27,23 +27,10 @@ class Nowhere(Enum):
     UNKNOWN = "nothing holds the body at rest, and no state was found to which a small load takes it"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rest:
-    """The state before any load acts.
+def at_rest(problem: CondensedProblem, points: ContactPoints) -> tuple[Array, CondensedProblem | None]:
+    """The coordinates of the points before any load acts, (n,), and the path from there to the constant loads.
 
-    Attributes:
-        z: the coordinates of the points, (n,).
-        held: whether the body is held there.
-        constant: the path from there to the constant loads, its factor from 0 to 1; None where there are none.
-    """
-
-    z: Array
-    held: bool
-    constant: CondensedProblem | None = None
-
-
-def at_rest(problem: CondensedProblem, points: ContactPoints) -> Rest:
-    """The state before any load acts; the points are put there.
+    The points are put there.
 
     Args:
         problem: the problem.
@@ -61,7 +48,7 @@ def at_rest(problem: CondensedProblem, points: ContactPoints) -> Rest:
         points.enter(k, number)
         if i is not None:
             z[i], force[i] = points.coordinate(k, at, s_force), s_force
-    return Rest(z=z, held=points.is_held(points.values(z)), constant=constant_alone(problem, x, force))
+    return z, _constant_alone(problem, x, force)
 
 
 def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:
@@ -106,15 +93,10 @@ def settled(
     return Nowhere.UNKNOWN
 
 
-def constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> CondensedProblem | None:
+def _constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> CondensedProblem | None:
     """The path from rest to the constant loads, its factor from 0 to 1; None where there are none.
 
     Rounding of the elastic forces at rest, where a bound lifts the body as a whole, is no load.
-
-    Args:
-        problem: the problem.
-        x: the displacement at rest, (n,).
-        forces: of bonds and bounds there, (n,).
     """
     held = problem.elastic @ x + forces
     away, stiffest = problem.force - held, float(np.max(problem.elastic.diagonal, initial=0.0))

@@ -126,25 +126,25 @@ class Jump:
 
     def _released(self) -> Landing | None:
         """The landing of an overdamped motion, from a little farther along the path: there smaller loads are borne."""
-        return self._come_to_rest(self._z if self._points.on_drops() else self._branch.beyond())
-
-    def _come_to_rest(self, z: Array) -> Landing | None:
-        found = self._relaxed(z, self._load)
-        return found if found is None or found.z is None else self._landed(found.z)
+        return self._relaxed(self._z if self._points.on_drops() else self._branch.beyond(), self._load)
 
     def _pushed_off(self) -> Landing | None:
         """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
         rate = self._problem.force_rate
         push = DEFAULT.slow * self._heading
         push = push * np.max(np.abs(self._load)) / np.max(np.abs(rate), initial=1e-300)
-        found = self._relaxed(self._z.copy(), self._load + push * rate)
-        return found if found is None or found.z is None else self._come_to_rest(found.z)
+        return self._relaxed(self._z, self._load + push * rate, self._load)
 
-    def _relaxed(self, z: Array, load: Array) -> Landing | None:
-        relaxation = OverdampedMotion(self._problem, self._points, z, load, held=self._held)
-        if not relaxation.run(self._directions):
-            return None
-        return Landing(z=None if relaxation.escapes else relaxation.z)
+    def _relaxed(self, z: Array, *loads: Array) -> Landing | None:
+        """The landing of overdamped motions under one load after the other."""
+        for load in loads:
+            motion = OverdampedMotion(self._problem, self._points, z, load, held=self._held)
+            if not motion.run(self._directions):
+                return None
+            if motion.escapes:
+                return Landing(z=None)
+            z = motion.z
+        return self._landed(z)
 
 
 def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:

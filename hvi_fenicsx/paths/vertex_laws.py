@@ -51,11 +51,6 @@ class VertexLaw:
         return tuple(int(i) for i in self.bonds.unknowns[self.number])
 
     @property
-    def sign(self) -> float:
-        """The law's argument is that times the coordinate."""
-        return float(self.laws.factors[self.number])
-
-    @property
     def weight(self) -> float:
         """Lumped area."""
         return float(self.laws.weights[self.number])
@@ -213,30 +208,20 @@ def shares(laws: Sequence[VertexLaw], x: float, force: float) -> list[float]:
     return [float(t) for t in left + share * (right - left)]
 
 
-def factors(problem: CondensedProblem) -> Array:
-    """What the unknowns are multiplied by, (n,); 1 where no law acts on a length.
+def multiplied(problem: CondensedProblem) -> tuple[CondensedProblem, Array]:
+    """The problem in unknowns on whose length laws act, and what they are multiplied by for that, (n,).
 
     Args:
         problem: the problem.
     """
-    found = np.ones(problem.size)
+    factors = np.ones(problem.size)
+    if is_straight(problem):
+        return problem, factors
     for bonds in problem.bonds:
         if bonds.radial:
-            found[bonds.unknowns] = bonds.signs
-    return found
-
-
-def multiplied(problem: CondensedProblem, factors: Array) -> CondensedProblem:
-    """The problem in unknowns that are multiplied.
-
-    Args:
-        problem: the problem.
-        factors: by unknown, positive or negative, (n,).
-    """
-    if np.all(factors == 1.0) and is_straight(problem):
-        return problem
+            factors[bonds.unknowns] = bonds.signs
     ends = np.sort(np.stack([problem.lower * factors, problem.upper * factors]), axis=0)
-    return replace(
+    found = replace(
         problem,
         elastic=DenseStiffness(problem.stiffness / np.outer(factors, factors)),
         force=problem.force / factors,
@@ -246,3 +231,4 @@ def multiplied(problem: CondensedProblem, factors: Array) -> CondensedProblem:
         applied=problem.applied / factors,
         bonds=tuple(replace(b, signs=b.signs / factors[b.unknowns]) for b in problem.bonds),
     )
+    return found, factors
