@@ -38,10 +38,10 @@ def load(names: Any, folder: str | os.PathLike[str]) -> tuple[str, ...]:
     Raises:
         PydanticCustomError: a file that is not there, no Python file, or raises an error of its own.
     """
-    names = [names] if isinstance(names, str) else names
-    if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n.endswith(".py") for n in names):
+    files = [names] if isinstance(names, str) else names
+    if not isinstance(files, list | tuple) or not all(isinstance(n, str) and n.endswith(".py") for n in files):
         raise refusal(f'must name Python files, like "my_laws.py" (is {shown(names)})')
-    return tuple(_load(name, Path(folder)) for name in names)
+    return tuple(_load(name, Path(folder)) for name in files)
 
 
 def _load(name: str, folder: Path) -> str:
