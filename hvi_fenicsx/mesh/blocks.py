@@ -227,12 +227,12 @@ def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> PartVertices:
     """
     owner = _owners(parts, comm.rank)
     own = owner == comm.rank
-    order = np.concatenate([np.flatnonzero(own), np.flatnonzero(~own)])
+    order = np.argsort(~own, kind="stable")
     local = np.empty(len(order), dtype=np.int32)
     local[order] = np.arange(len(order), dtype=np.int32)
     owned = int(np.count_nonzero(own))
     first = np.concatenate([[0], np.cumsum(comm.allgather(owned))])
-    places, others = _vertex_places(parts[comm.rank])[order], owner[order[owned:]].astype(np.int32)
+    places, others = _places(parts[comm.rank])[order], owner[order[owned:]]
     ghosts = np.empty(len(others), dtype=np.int64)
     for rank in np.unique(others):
         at = others == rank
@@ -246,23 +246,20 @@ def _counts(part: Box) -> Integers:
     return np.where(np.all(extent > 0), extent + 1, 0)
 
 
-def _vertex_places(part: Box) -> Integers:
+def _places(part: Box) -> Integers:
     """The integer coordinates of a part's vertices, x running fastest, (n, d)."""
     counts = _counts(part)
-    ways = np.unravel_index(np.arange(int(np.prod(counts))), counts, order="F")
-    return np.stack(ways, axis=1) + part[0]
+    return np.stack(np.unravel_index(np.arange(counts.prod()), counts, order="F"), axis=1) + part[0]
 
 
 def _owners(parts: Sequence[Box], rank: int) -> Integers:
-    """The rank that owns each vertex of a part, x running fastest, (n,)."""
-    lower, upper = parts[rank]
-    owner = np.full(_counts(parts[rank]), rank, dtype=np.int64)
-    for other, (begin, end) in enumerate(parts[:rank]):
-        low, high = np.maximum(begin, lower), np.minimum(end, upper)
-        if owner.size and np.all(end > begin) and np.all(high >= low):
-            shared = tuple(slice(a, b + 1) for a, b in zip(low - lower, high - lower, strict=True))
-            owner[shared] = np.minimum(owner[shared], other)
-    return owner.ravel(order="F")
+    """The rank that owns each vertex of a part, x running fastest, (n,): the first of those that have it."""
+    places = _places(parts[rank])
+    owner = np.full(len(places), rank, dtype=np.int32)
+    for other in reversed(range(rank)):
+        begin, end = parts[other]
+        owner[np.all((places >= begin) & (places <= end), axis=1) & np.all(end > begin)] = other
+    return owner
 
 
 def _numbers_of_owner(parts: Sequence[Box], rank: int, places: Integers) -> Integers:

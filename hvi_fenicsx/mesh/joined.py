@@ -44,9 +44,21 @@ class PlacedBody:
     origin: Array
     rotation: Array
 
-    def at(self, points: Array) -> Array:
-        """Points of the body's own coordinates (n, d) in their place, m, (n, d)."""
-        return points @ self.rotation.T + self.origin
+    @property
+    def points(self) -> Array:
+        """Its local vertices, those of the geometry, in their place, m, (n, d)."""
+        return self.domain.mesh.geometry.x[:, : self.domain.dimension] @ self.rotation.T + self.origin
+
+    @property
+    def owned(self) -> int:
+        """Vertices of the geometry that this rank owns."""
+        return int(self.domain.mesh.geometry.index_map().size_local)
+
+    @property
+    def cells(self) -> Entities:
+        """This rank's cells by the local vertices, (c, d+1)."""
+        topology = self.domain.mesh.topology
+        return compat.geometry_dofmap(self.domain.mesh)[: topology.index_map(topology.dim).size_local]
 
     def called(self, name: str) -> str:
         """What a side or a region of the body is called among those of all bodies.
@@ -72,7 +84,7 @@ def joined(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> Domain:
         bodies: at least one, all of one dimension.
     """
     numbers = [_numbers(comm, bodies, i) for i in range(len(bodies))]
-    mesh, cells = common_mesh(comm, [_placed(body) for body in bodies], numbers)
+    mesh, cells = common_mesh(comm, bodies, numbers)
     pairs = list(zip(bodies, cells, strict=True))
     sides = _united(found for body, at in pairs for found in _sides(mesh, body, at))
     regions = _united(found for body, at in pairs for found in _regions(body, at))
@@ -101,23 +113,12 @@ def _united(found: Iterable[tuple[str, Entities]]) -> dict[str, Entities]:
     return {name: np.unique(np.concatenate(those)).astype(np.int32) for name, those in parts.items()}
 
 
-def _placed(body: PlacedBody) -> PlacedMesh:
-    """The body's mesh and its vertices in their place."""
-    mesh = body.domain.mesh
-    return PlacedMesh(mesh, body.at(mesh.geometry.x[:, : body.domain.dimension]))
-
-
-def _nodes(body: PlacedBody) -> int:
-    """Vertices of the geometry that this rank owns."""
-    return int(body.domain.mesh.geometry.index_map().size_local)
-
-
 def _numbers(comm: MPI.Comm, bodies: Sequence[PlacedBody], number: int) -> Integers:
     """The number that the common mesh gives to each local vertex of a body. Collective.
 
     It counts the vertices through the ranks, on each of them body by body.
     """
-    counts = np.array(agree(comm, [_nodes(body) for body in bodies]), dtype=np.int64)
+    counts = np.array(agree(comm, [body.owned for body in bodies]), dtype=np.int64)
     before = np.concatenate([[0], np.cumsum(counts.sum(axis=1))])[:-1] + counts[:, :number].sum(axis=1)
     starts = np.concatenate([[0], np.cumsum(counts[:, number])])
     own = bodies[number].domain.mesh.geometry.index_map()
@@ -237,32 +238,8 @@ def _by_dof(space: fem.FunctionSpace, by_node: Integers) -> Integers:
     return found
 
 
-@dataclass(frozen=True)
-class PlacedMesh:
-    """A mesh without ghost cells, and where its vertices are.
-
-    Attributes:
-        mesh: of straight simplices.
-        points: its local vertices, those of the geometry, in their place, m, (n, d).
-    """
-
-    mesh: dmesh.Mesh
-    points: Array
-
-    @property
-    def owned(self) -> int:
-        """Vertices that this rank owns."""
-        return int(self.mesh.geometry.index_map().size_local)
-
-    @property
-    def cells(self) -> Entities:
-        """This rank's cells by the local vertices, (c, d+1)."""
-        topology = self.mesh.topology
-        return compat.geometry_dofmap(self.mesh)[: topology.index_map(topology.dim).size_local]
-
-
 def common_mesh(
-    comm: MPI.Comm, parts: Sequence[PlacedMesh], numbers: Sequence[Integers]
+    comm: MPI.Comm, parts: Sequence[PlacedBody], numbers: Sequence[Integers]
 ) -> tuple[dmesh.Mesh, list[Entities]]:
     """The common mesh, and the local number in it of each part's local cells. Collective.
 
@@ -278,41 +255,37 @@ def common_mesh(
         return _from_local(comm, parts, numbers), own
     cells = np.vstack([found[part.cells] for part, found in zip(parts, numbers, strict=True)])
     points = np.vstack([part.points[: part.owned] for part in parts])
-    mesh = compat.simplex_mesh(comm, cells, points, parts[0].mesh.topology.cell_name())
+    mesh = compat.simplex_mesh(comm, cells, points, parts[0].domain.mesh.topology.cell_name())
     offset = mesh.comm.exscan(sum(counts)) or 0
     places = np.empty(sum(counts), dtype=np.int32)
     places[mesh.topology.original_cell_index[: sum(counts)] - offset] = np.arange(sum(counts))
     return mesh, [places[cells] for cells in own]
 
 
-def _from_local(comm: MPI.Comm, parts: Sequence[PlacedMesh], numbers: Sequence[Integers]) -> dmesh.Mesh:
+def _from_local(comm: MPI.Comm, parts: Sequence[PlacedBody], numbers: Sequence[Integers]) -> dmesh.Mesh:
     """The mesh of local cells and vertices, of these first those that the rank owns. Collective."""
-    owned, ghosts = [part.owned for part in parts], [len(part.points) - part.owned for part in parts]
-    first = np.concatenate([[0], np.cumsum(owned)])
-    last = first[-1] + np.concatenate([[0], np.cumsum(ghosts)])
-    local = [
-        np.concatenate([np.arange(n) + at, np.arange(m) + behind]).astype(np.int32)
-        for n, m, at, behind in zip(owned, ghosts, first, last, strict=False)
-    ]
-    split = [(found[:n], found[n:]) for found, n in zip(numbers, owned, strict=True)]
-    places = [(part.points[:n], part.points[n:]) for part, n in zip(parts, owned, strict=True)]
-    others = np.concatenate([there for _, there in split])
-    owners = np.concatenate([part.mesh.geometry.index_map().owners for part in parts])
+    sizes = [len(part.points) for part in parts]
+    owned = np.concatenate([np.arange(n) < part.owned for n, part in zip(sizes, parts, strict=True)])
+    order, place = np.argsort(~owned, kind="stable"), np.empty(len(owned), dtype=np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    local = np.split(place, np.cumsum(sizes)[:-1])
+    inputs, count = np.concatenate(numbers)[order], int(np.count_nonzero(owned))
+    owners = np.concatenate([part.domain.mesh.geometry.index_map().owners for part in parts])
     return compat.mesh_of_cells(
         comm,
-        np.vstack([*(here for here, _ in places), *(there for _, there in places)]),
+        np.vstack([part.points for part in parts])[order],
         np.vstack([at[part.cells] for part, at in zip(parts, local, strict=True)]),
-        index_map=(int(first[-1]), others.astype(np.int64), owners.astype(np.int32)),
-        inputs=np.concatenate([*(here for here, _ in split), others]).astype(np.int64),
+        index_map=(count, inputs[count:], owners),
+        inputs=inputs,
         facets=_facets(parts, local) if comm.size == 1 else None,
     )
 
 
-def _facets(parts: Sequence[PlacedMesh], local: Sequence[Entities]) -> tuple[Entities, Entities]:
+def _facets(parts: Sequence[PlacedBody], local: Sequence[Entities]) -> tuple[Entities, Entities]:
     """All facets by the common vertices, (f, d), and those of each cell, (c, d+1). One rank only."""
     corners, sides, count = [], [], 0
     for part, at in zip(parts, local, strict=True):
-        topology, d = part.mesh.topology, part.mesh.topology.dim
+        topology, d = part.domain.mesh.topology, part.domain.mesh.topology.dim
         topology.create_connectivity(d - 1, 0)
         topology.create_connectivity(d, d - 1)
         node = np.empty(topology.index_map(0).size_local, dtype=np.int32)
@@ -355,8 +328,7 @@ def check_places(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> None:
 
 def _corners(body: PlacedBody) -> Array:
     """The corners of the cells that this rank owns, in their place, (c, d+1, d)."""
-    placed = _placed(body)
-    return placed.points[placed.cells]
+    return body.points[body.cells]
 
 
 def _box(comm: MPI.Comm, corners: Array) -> tuple[Array, Array]:

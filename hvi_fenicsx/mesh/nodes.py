@@ -173,7 +173,8 @@ def facet_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
     cells = to_cells.array[to_cells.offsets[facets]]
     of_cells = to_facets.array.reshape(-1, d + 1)[cells]
     local = np.argmax(of_cells == facets[:, None], axis=1)
-    table = np.array(_closures(_name(space), degree(space)), dtype=np.int32)
+    layout = space.dofmap.dof_layout
+    table = np.array([layout.entity_closure_dofs(d - 1, i) for i in range(d + 1)], dtype=np.int32)
     return np.take_along_axis(space.dofmap.list[cells], table[local], axis=1)
 
 
@@ -203,14 +204,3 @@ def edges(space: fem.FunctionSpace) -> list[list[int]]:
     """The edges of a cell by its corners, in the order of their midpoints."""
     found: list[list[int]] = basix.topology(basix.CellType[_name(space)])[1]
     return found
-
-
-def _closures(cell: str, wanted: int) -> list[list[int]]:
-    """The local nodes of each facet of a cell."""
-    topology: Any = basix.topology(basix.CellType[cell])
-    d = len(topology) - 1
-    middles = {frozenset(edge): d + 1 + number for number, edge in enumerate(topology[1])}
-    facet_edges = basix.topology(basix.CellType[{2: "interval", 3: "triangle"}[d]])[1] if wanted == 2 else []
-    return [
-        [*facet, *(middles[frozenset(facet[i] for i in ends)] for ends in facet_edges)] for facet in topology[d - 1]
-    ]

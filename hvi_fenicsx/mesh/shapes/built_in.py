@@ -204,9 +204,12 @@ class Round(PlaneShape):
 
     mesh_sizes = ("mesh_size", "mesh_size_below")
 
-    if TYPE_CHECKING:
-        radius: float
-        mesh_size_below: float | None
+    radius: Length
+    """radius of the disk, m"""
+    mesh_size: Length
+    """edge length of the triangles, m"""
+    mesh_size_below: Length | None = None
+    """edge length at the lowest point, m; it grows with the distance from there; by default `mesh_size`"""
 
     @property
     def finest(self) -> float:
@@ -231,12 +234,6 @@ class Disk(Round):
 
     shape: Literal["disk"] = "disk"
     """the centre is (0, radius); sides lower_arc, upper_arc"""
-    radius: Length
-    """radius of the disk, m"""
-    mesh_size: Length
-    """edge length of the triangles, m"""
-    mesh_size_below: Length | None = None
-    """edge length at the lowest point, m; it grows with the distance from there; by default `mesh_size`"""
 
     def outline(self) -> Outline:
         """Four arcs, the lowest point being a corner."""
@@ -252,12 +249,6 @@ class HalfDisk(Round):
 
     shape: Literal["half_disk"] = "half_disk"
     """the centre is (0, radius); sides arc, top (the flat side)"""
-    radius: Length
-    """radius of the disk, m"""
-    mesh_size: Length
-    """edge length of the triangles, m"""
-    mesh_size_below: Length | None = None
-    """edge length at the lowest point, m; it grows with the distance from there; by default `mesh_size`"""
 
     def outline(self) -> Outline:
         """Two arcs, the lowest point being a corner, and the flat top."""
