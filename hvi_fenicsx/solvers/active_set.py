@@ -153,7 +153,6 @@ class ActiveSetSolver:
         finite = np.isfinite(step.norm())
         if finite:
             x.axpy(-1.0, step)
-        step.destroy()
         return Outcome(reason > 0 and finite, 1, iterations, float("nan"), f"KSP reason {reason}")
 
     def first_success(
@@ -194,8 +193,6 @@ class ActiveSetSolver:
             if attempt.line_search == ENERGY and np.isfinite(found.measure):
                 x.copy(begin)
         best.copy(x)
-        for vector in (begin, best):
-            vector.destroy()
         return replace(outcome, interrupted=found.interrupted)
 
     def solve(self, x: PETSc.Vec, attempt: Attempt, tolerance: float, bounds: Bounds, most: int) -> Outcome:

@@ -21,7 +21,6 @@ from ..errors import SolverError
 from ..formula import Formula
 from ..laws import Superpotential
 from ..model.content import Start
-from ..problem.law_term import LawTerm
 from ..system.equations import Cells
 from ..system.system import System
 from ..typing import Array
@@ -191,9 +190,11 @@ def arguments(system: System, resting: PETSc.Vec, start: Start, broken_slip: flo
     if not isinstance(start, str):
         return _displaced(system, start)
     found = [t.argument(resting.array_r) for t in system.terms]
-    if start == "resting":
-        return found
-    return [_broken(t, a, broken_slip) for t, a in zip(system.terms, found, strict=True)]
+    if start == "broken":  # a large slip in the direction of that at rest; positive for an opening or a penetration
+        for slip, term in zip(found, system.terms, strict=True):
+            sign = np.where((slip < 0) & (term.direction is Direction.SLIP), -1.0, 1.0)
+            slip[:] = sign * broken_slip * np.maximum(np.abs(slip), term.exact.length_scale)
+    return found
 
 
 def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
@@ -203,9 +204,3 @@ def _displaced(system: System, start: Sequence[Formula]) -> list[Array]:
         u = np.column_stack([f.at(term.surface.points) for f in start]) / system.problem.scales.displacement
         found.append(term.argument_of(np.einsum("mkd,md->mk", term.directions, u)))
     return found
-
-
-def _broken(term: LawTerm, slip: Array, far: float) -> Array:
-    """A large slip in the direction of the slip at rest; positive for laws of an opening or a penetration."""
-    sign = np.where(slip < 0, -1.0, 1.0) if term.direction is Direction.SLIP else np.ones_like(slip)
-    return np.asarray(sign * far * np.maximum(np.abs(slip), term.exact.length_scale))

@@ -57,25 +57,21 @@ def _stay_on_kinks(context: SolveContext, x: PETSc.Vec) -> SolveResult:
 
     No smoothing leads to it where a kink has a traction of one sign only, as a literal law has at zero.
     """
-    kinks = [_kinks_at(term.law, term.argument(x.array_r)) for term in context.system.terms]
-    return BranchIteration(context).newton(x, kinks)
-
-
-def _kinks_at(law: Superpotential, argument: Array) -> Array:
-    """The kink of G that each argument is exactly on, else NaN."""
-    return np.where(np.isin(argument, law.concave.kinks), argument, np.nan)
+    arguments = [(term.law.concave.kinks, term.argument(x.array_r)) for term in context.system.terms]
+    return BranchIteration(context).newton(x, [np.where(np.isin(a, kinks), a, np.nan) for kinks, a in arguments])
 
 
 def _drops(context: SolveContext, smoothed: Sequence[Superpotential], x: PETSc.Vec) -> list[Array]:
     """The kink of G on which a vertex is, since its smoothed traction lies between those of both sides, else NaN."""
-    terms = zip(context.system.terms, smoothed, strict=True)
-    return [_drop(term.law, smooth, term.argument(x.array_r)) for term, smooth in terms]
-
-
-def _drop(law: Superpotential, smooth: Superpotential, argument: Array) -> Array:
-    found, between, kinks = np.full(len(argument), np.nan), smooth.concave.left(argument), law.concave.kinks
-    for kink, low, high in zip(kinks, law.concave.left(kinks), law.concave.right(kinks), strict=True):
-        found[(between > low) & (between < high)] = kink
+    found = []
+    for term, smooth in zip(context.system.terms, smoothed, strict=True):
+        concave, between = term.law.concave, smooth.concave.left(term.argument(x.array_r))
+        on = np.full(len(between), np.nan)
+        for kink, low, high in zip(
+            concave.kinks, concave.left(concave.kinks), concave.right(concave.kinks), strict=True
+        ):
+            on[(between > low) & (between < high)] = kink
+        found.append(on)
     return found
 
 

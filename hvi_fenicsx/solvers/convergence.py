@@ -136,17 +136,15 @@ class ConvergenceTest:
         near = self._thresholds.near * self._system.references.at(bounds.surface.blocks)
         return bounds.beyond(sign * x.array_r[dofs]) >= -near
 
-    def rounding(self, x: PETSc.Vec) -> tuple[Array, Array]:
-        """What rounding makes of the norm and the largest traction of the residual at x, by body. Collective.
+    def rounding(self, x: PETSc.Vec) -> Array:
+        """What rounding makes of norm and largest traction of the residual at x, (2, bodies). Collective.
 
         Args:
             x: the displacement.
         """
         sample = self._system.load.duplicate()
         self._system.equations.rounding_sample(x, sample)
-        norm, traction = self._forces(sample.array_r, x)
-        sample.destroy()
-        return self._thresholds.rounding_safety * norm, self._thresholds.rounding_safety * traction
+        return self._thresholds.rounding_safety * np.array(self._forces(sample.array_r, x))
 
     def in_contact(self, x: PETSc.Vec) -> int:
         """Vertices on a bound of the problem. Collective."""

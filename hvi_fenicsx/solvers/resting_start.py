@@ -82,7 +82,6 @@ def _push_onto_bounds(solver: ActiveSetSolver, x: PETSc.Vec, contact: Integers, 
     between = np.isfinite(low) & np.isfinite(high) & (low < high)
     target = np.where(residual.array_r[contact] >= 0.0, low, high)
     x.array[contact[between]] = target[between]
-    residual.destroy()
     return bool(system.comm.allreduce(bool(np.any(between))))
 
 
