@@ -22,7 +22,6 @@ from ..model import Model, PathTable, SolverTable
 from ..paths.load_path import LoadPath
 from ..report.reader import PathResult
 from ..results import ResultFolder
-from ..results.output_folder import existing
 from ..runtime import log
 from ..schema import require_path, unknown
 from ..typing import Array
@@ -138,7 +137,7 @@ class ModelPath(LoadPath):
         """
         require_path("folder", folder)
         comm = self.run.prepared.system.comm
-        with ResultFolder(comm, Path(folder), existing(force=force)) as target:
+        with ResultFolder(comm, Path(folder), force=force) as target:
             path_files.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)
             target.commit(self.run.prepared.scene)
 

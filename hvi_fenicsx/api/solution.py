@@ -23,7 +23,6 @@ from ..report.reader import Result
 from ..report.solution_arrays import ContactPart
 from ..results import ResultFolder, gathering
 from ..results.gathering import contact_parts
-from ..results.output_folder import existing
 from ..results.whole import write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root
@@ -166,7 +165,7 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
         require_path("folder", folder)
-        with ResultFolder(self.problem.domain.mesh.comm, Path(folder), existing(force=force)) as target:
+        with ResultFolder(self.problem.domain.mesh.comm, Path(folder), force=force) as target:
             write_whole(target, self, GIVEN, self.timer, _LOG.warning, pictures=pictures)
             target.commit(self.scene)
 

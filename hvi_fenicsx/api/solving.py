@@ -22,7 +22,6 @@ from ..mesh.shapes import OnlyMesh
 from ..model import Model, is_portable
 from ..paths.load_path import LoadPath
 from ..problem import spaces
-from ..results.output_folder import existing
 from ..runtime import log
 from ..runtime.log import newton_step
 from ..runtime.mpi import time_over
@@ -280,7 +279,7 @@ def study(
         raise InputError(f"study: repeats must be a whole number, 1 or more (is {repeats!r})")
     plan = study_plan.make(_on_its_mesh(model), [_axis(name, values) for name, values in axes.items()])
     measurement = Measurement(plan=plan, comm=ranks, repeats=int(repeats))
-    return measurement.conduct(None if folder is None else Path(folder), existing(force=force))[0]
+    return measurement.conduct(None if folder is None else Path(folder), force=force)[0]
 
 
 def _axis(name: str, values: Any) -> tuple[str, tuple[str, ...]]:

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from .. import console, results
 from ..model import Model, dump_scene, read_scene
 from ..report.page import NAME as PAGE
-from ..results.output_folder import existing, inputs_of, read_finished
+from ..results.output_folder import inputs_of, read_finished
 from ..runtime import log, writing
 from ..runtime.cost import Timer
 from ..runtime.manifest import __version__
@@ -90,8 +90,8 @@ def execute(
     target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / f"{options.scene.stem}{suffix}"))
     if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, done))) is not None:
         return code
-    kept = existing(force=options.force or options.resume)
-    with results.ResultFolder(COMM, target, kept, inputs=[options.scene]) as folder:
+    goes_on = options.force or options.resume
+    with results.ResultFolder(COMM, target, force=goes_on, inputs=[options.scene]) as folder:
         interrupted, run_logs = stop_on_signals(COMM), list[log.RunLog]()
         on_root(COMM, lambda: run_logs.append(log.RunLog(folder.work / "run.log")))
         with display():

@@ -8,7 +8,6 @@ from pathlib import Path
 from .. import results
 from ..errors import ExitCode
 from ..model import read_scene
-from ..results.output_folder import Existing
 from ..runtime.manifest import MARKS
 from ..runtime.mpi import on_root, stop_on_signals
 from ..study import plan
@@ -26,7 +25,6 @@ def execute(options: argparse.Namespace) -> int:
     """
     scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
     planned = plan.make(scene, [plan.read_axis(text) for text in options.axis])
-    existing: Existing = "replace" if options.force else "resume" if options.resume else "refuse"
     interrupted = stop_on_signals(COMM)
     default = Path("results") / f"{options.scene.stem}-study"
     folder = on_root(COMM, lambda: results.resolved(options.out or default))
@@ -34,7 +32,9 @@ def execute(options: argparse.Namespace) -> int:
         plan=planned, comm=COMM, repeats=options.repeat, limit=options.limit, interrupted=interrupted
     )
     with display():
-        study, warnings = measurement.conduct(folder, existing, [options.scene])
+        study, warnings = measurement.conduct(
+            folder, force=options.force, resume=options.resume, inputs=[options.scene]
+        )
         told = [f"warning: {text}" for text in warnings]
         certified = sum(row.converged for row in study.rows)
         ranks = "1 rank" if COMM.size == 1 else f"{COMM.size} ranks"

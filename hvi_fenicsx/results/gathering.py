@@ -58,7 +58,8 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
     """
     problem = solution.problem
     comm, d, owned = problem.domain.mesh.comm, problem.scales.dimension, problem.space.dofmap.index_map.size_local
-    fields = {"points": problem.positions[:owned, :d], "cells": _cells(problem)}
+    fields = {"points": problem.positions[:owned, :d]}
+    fields["cells"] = spaces.global_numbers(problem.space, nodes.linear_cells(problem.space))
     if solution.solve_result is not None:
         u = spaces.values(problem.space, solution.solve_result.u.x.array)
         fields["displacement"] = np.asarray(u[:owned], dtype=np.float64) * problem.scales.displacement
@@ -71,11 +72,6 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
     found |= {"regions": _regions(problem), "loads": _loads(problem)}
     found["parts"] = contact_parts(problem, () if solution.examination is None else solution.examination.states)
     return None if comm.rank else SolutionArrays(degree=nodes.degree(problem.space), **found)
-
-
-def _cells(problem: Problem) -> Integers:
-    """The cells that this rank owns by their global nodes, at degree 2 their parts, (c, d+1)."""
-    return spaces.global_numbers(problem.space, nodes.linear_cells(problem.space))
 
 
 def _facets(problem: Problem, facets: Entities) -> Integers:
@@ -140,16 +136,12 @@ def contact_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str,
 
 def _sorted(name: str, columns: dict[str, Array], others: dict[str, Any], d: int) -> ContactPart:
     """A part in the order of the table. Rank 0 only."""
-    vertices, facets = others["vertices"], np.unique(others["facets"], axis=0)  # ranks may know the same facets
-    points = np.column_stack([columns[axis] for axis in "xyz"[:d]])
-    s = {}
-    if d == 2:
-        order, s["s"] = along(points, vertices, others["edges"])
-    else:
-        order = lexicographic(points)
+    vertices, points = others["vertices"], np.column_stack([columns[axis] for axis in "xyz"[:d]])
+    order, s = along(points, vertices, others["facets"]) if d == 2 else (lexicographic(points), None)
+    facets = np.unique(np.sort(others["facets"], axis=1), axis=0)  # ranks may know the same facets
     return ContactPart(
         name=name,
-        columns=s | {name: values[order] for name, values in columns.items()},
+        columns=({} if s is None else {"s": s}) | {name: values[order] for name, values in columns.items()},
         facets=facets[np.isin(facets, vertices).all(axis=1)],
         **{name: others[name][order] for name in ("vertices", "weight", "normal", "drops")},
     )
@@ -158,11 +150,10 @@ def _sorted(name: str, columns: dict[str, Array], others: dict[str, Any], d: int
 def _others(problem: Problem, state: ContactState) -> dict[str, Any]:
     """What this rank knows of a part besides, in any order."""
     scales, space, surface = problem.scales, problem.space, state.surface
-    facets = spaces.global_numbers(space, nodes.linear_facets(space, surface.facets))
+    pairs = nodes.linear_facets(space, surface.facets)
     return {
         "vertices": spaces.global_numbers(space, surface.blocks),
-        "facets": np.sort(facets, axis=1),
-        "edges": _edges(problem, surface) if scales.dimension == 2 else facets,
+        "facets": spaces.global_numbers(space, _turned(problem, surface, pairs) if scales.dimension == 2 else pairs),
         "weight": surface.weights * scales.length ** (scales.dimension - 1),
         "normal": surface.normals,
         "drops": _drops(state) * scales.displacement,
@@ -202,29 +193,15 @@ def _drops(state: ContactState) -> Array:
     return np.concatenate([np.empty((len(state.surface.weights), 0)), *each], axis=1)
 
 
-def _edges(problem: Problem, surface: Surface) -> Integers:
-    """A part's facets that this rank knows by their global ends, the body to their left, at degree 2 halves; (k, 2).
-
-    Args:
-        problem: what was solved.
-        surface: the part.
-    """
-    mesh, space = problem.domain.mesh, problem.space
-    facets = np.asarray(surface.facets, dtype=np.int32)
-    if not len(facets):
-        return np.empty((0, 2), dtype=np.int64)
-    on = nodes.facet_nodes(space, facets)
-    mesh.topology.create_connectivity(1, 2)
-    cells = [mesh.topology.connectivity(1, 2).links(f)[0] for f in facets]
-    x = problem.points[:, :2]
-    first, last = x[on[:, 0]], x[on[:, 1]]
-    inwards = x[space.dofmap.list[cells][:, :3]].mean(axis=1) - first
-    along = last - first
-    left = along[:, 0] * inwards[:, 1] - along[:, 1] * inwards[:, 0] > 0
-    dofs = np.where(left[:, None], on[:, :2], on[:, 1::-1])
-    if nodes.degree(space) == 2:
-        dofs = np.vstack([np.column_stack([dofs[:, 0], on[:, 2]]), np.column_stack([on[:, 2], dofs[:, 1]])])
-    return spaces.global_numbers(space, dofs)
+def _turned(problem: Problem, surface: Surface, pairs: Entities) -> Entities:
+    """The edges of a part (k, 2), at degree 2 halves, with the body to their left."""
+    topology, space, x = problem.domain.mesh.topology, problem.space, problem.points[:, :2]
+    topology.create_connectivity(1, 2)
+    to_cells = topology.connectivity(1, 2)
+    cells = to_cells.array[to_cells.offsets[surface.facets]].repeat(nodes.degree(space))
+    ahead, inwards = x[pairs[:, 1]] - x[pairs[:, 0]], x[space.dofmap.list[cells, :3]].mean(axis=1) - x[pairs[:, 0]]
+    left = ahead[:, 0] * inwards[:, 1] - ahead[:, 1] * inwards[:, 0] > 0
+    return np.where(left[:, None], pairs, pairs[:, ::-1])
 
 
 def lexicographic(points: Array) -> npt.NDArray[np.intp]:
@@ -258,24 +235,14 @@ def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, 
     inner = np.unique(edges[:, 1])
     found = [chain if chain[0] in inner else _oriented(chain, rank) for chain in chains(edges, rank)]
     found += [np.array([alone]) for alone in np.setdiff1d(np.arange(len(points)), edges)]
-    return _measured(points, sorted(found, key=lambda chain: int(np.min(rank[chain]))), rank)
+    found.sort(key=lambda chain: int(np.min(rank[chain])))
+    order = np.concatenate(found)
+    s = np.cumsum(np.concatenate([np.append(0.0, np.linalg.norm(np.diff(points[c], axis=0), axis=1)) for c in found]))
+    first = np.sort(np.unique(order, return_index=True)[1])  # a vertex where two chains touch belongs to the first
+    order, s = order[first], s[first]
+    return order, s - s[np.argmin(rank[order])]
 
 
 def _oriented(chain: Integers, rank: Integers) -> Integers:
     """An open chain from the lower of its ends."""
     return chain if rank[chain[0]] <= rank[chain[-1]] else chain[::-1]
-
-
-def _measured(points: Array, ordered: list[Integers], rank: Integers) -> tuple[Integers, Array]:
-    """All chains one after the other; a vertex where two of them touch belongs to the first."""
-    order: dict[int, float] = {}
-    end = 0.0
-    for i, chain in enumerate(ordered):
-        steps = np.linalg.norm(np.diff(points[chain], axis=0), axis=1)
-        s = end + np.concatenate([[0.0], np.cumsum(steps)])
-        if i == 0:
-            s -= s[int(np.argmin(rank[chain]))]
-        for vertex, length in zip(chain, s, strict=True):
-            order.setdefault(int(vertex), float(length))
-        end = float(s[-1])
-    return np.array(list(order), dtype=np.int64), np.array(list(order.values()))

@@ -15,7 +15,7 @@ import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from mpi4py import MPI
 
@@ -27,7 +27,6 @@ from ..runtime.mpi import on_root
 from ..runtime.processes import SIGNALS
 from .moving import FolderLock, discard, is_folder, move_in
 
-Existing = Literal["refuse", "replace", "resume"]
 _WAYS = {
     "result": "--force (force=True in Python) replaces it",
     "study": "--resume keeps its finished points, --force begins anew",
@@ -35,15 +34,6 @@ _WAYS = {
 """What a user may do with a folder that is there, by its kind."""
 _UNFINISHED = "--resume goes on with it, --force begins anew"
 """And with one that a killed process has left."""
-
-
-def existing(*, force: bool) -> Existing:
-    """What to do with a folder of this kind that is there already.
-
-    Args:
-        force: whether it may be replaced.
-    """
-    return "replace" if force else "refuse"
 
 
 def resolved(target: Path) -> Path:
@@ -67,7 +57,7 @@ class ResultFolder:
     Args:
         comm: the ranks that write.
         target: where the result goes; a symbolic link stands for what it points to.
-        existing: what to do with a result that is there already.
+        force: whether a result that is there already is replaced, or gone on with.
         inputs: files that must not be replaced.
         kind: what goes into it.
 
@@ -85,7 +75,8 @@ class ResultFolder:
         self,
         comm: MPI.Comm,
         target: Path,
-        existing: Existing = "refuse",
+        *,
+        force: bool = False,
         inputs: Iterable[Path] = (),
         kind: Kind = "result",
     ) -> None:
@@ -93,9 +84,9 @@ class ResultFolder:
         self._staged, self._left = False, False
         self._announced, self._made = list[str](), list[Path]()
         self._lock: FolderLock | None = None
-        self.target, self.work = on_root(comm, lambda: self._opened(resolved(target), existing, inputs))
+        self.target, self.work = on_root(comm, lambda: self._opened(resolved(target), inputs, force=force))
 
-    def _opened(self, target: Path, existing: Existing, inputs: Iterable[Path]) -> tuple[Path, Path]:
+    def _opened(self, target: Path, inputs: Iterable[Path], *, force: bool) -> tuple[Path, Path]:
         """Lock the folder and make the hidden one. Rank 0 only."""
         around = target if os.path.ismount(target) else target.parent
         self.target, self.work = target, around / f".{target.name}.hvi-new"
@@ -105,7 +96,7 @@ class ResultFolder:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 self._lock = FolderLock(target)
                 self._recover(was_left=self._lock.was_left)
-                self._check(existing, inputs)
+                self._check(inputs, force=force)
                 self.work.mkdir()
                 self._staged = True
         except BaseException:
@@ -127,7 +118,7 @@ class ResultFolder:
         if half.exists() and (manifest.read(self.target) is not None or [*self.target.iterdir()] == [half]):
             half.unlink()
 
-    def _check(self, existing: Existing, inputs: Iterable[Path]) -> None:
+    def _check(self, inputs: Iterable[Path], *, force: bool) -> None:
         """Refuse a folder that may not be written, or whose files may not be replaced."""
         if not self.target.exists():
             return
@@ -143,7 +134,7 @@ class ResultFolder:
             return
         if found.kind != self.kind:
             raise self._refused(f"holds a {found.kind}, and this is a {self.kind}; choose a new or empty folder")
-        if existing == "refuse":
+        if not force:
             finished = (self.target / MARKS[self.kind]).exists()
             state = f"already holds a {self.kind}" if finished else f"holds an unfinished {self.kind}"
             raise self._refused(f"{state}; {_WAYS[self.kind] if finished else _UNFINISHED}, --out DIR writes beside")

@@ -23,7 +23,6 @@ from ..report import page
 from ..report.solution_arrays import ReportError
 from ..results import ResultFolder
 from ..results.gathering import solution_arrays
-from ..results.output_folder import Existing
 from ..results.summary import summary
 from ..results.whole import write_table
 from ..runtime import log, writing
@@ -99,13 +98,14 @@ class Measurement:
     _exact: tuple[Point | None, Fields | None] = (None, None)
 
     def conduct(
-        self, target: Path | None, existing: Existing = "refuse", inputs: Iterable[Path] = ()
+        self, target: Path | None, *, force: bool = False, resume: bool = False, inputs: Iterable[Path] = ()
     ) -> tuple[Study, list[str]]:
         """Solve, measure and write a study; the same on all ranks. Collective.
 
         Args:
             target: the folder where it goes; None: nowhere.
-            existing: what to do with a study that is in the folder.
+            force: whether a study that is in the folder is begun anew.
+            resume: whether it is gone on with.
             inputs: files that must not be replaced.
 
         Returns:
@@ -117,10 +117,14 @@ class Measurement:
             StudyInterruptedError: it was asked to stop; finished points are kept.
         """
         plan, comm = self.plan, self.comm
-        into = nullcontext() if target is None else ResultFolder(comm, target, existing, inputs, kind="study")
+        into = (
+            nullcontext()
+            if target is None
+            else ResultFolder(comm, target, force=force or resume, inputs=inputs, kind="study")
+        )
         with into as folder:
             if folder is not None:
-                on_root(comm, lambda: self.resume(folder.announce(JOURNAL), anew=existing == "replace"))
+                on_root(comm, lambda: self.resume(folder.announce(JOURNAL), anew=force))
             self.run()
             study = on_root(comm, lambda: evaluate(plan, self.known, comm.size))
             if folder is None:

@@ -69,7 +69,7 @@ def killed(chance: random.Random, span: float, file: Path, out: Path) -> None:
 def assert_whole(out: Path) -> None:
     """Every file is there and speaks of one scene, after a kill between the moves once the rest is moved."""
     if not (out / "summary.json").exists():
-        ResultFolder(MPI.COMM_SELF, out, "replace").discard()
+        ResultFolder(MPI.COMM_SELF, out, force=True).discard()
     found = manifest.read(out)
     assert found is not None
     assert found.damaged(out) is None

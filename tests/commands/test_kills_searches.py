@@ -63,7 +63,7 @@ def killed(words: list[object], chance: random.Random, span: float) -> None:
 
 def assert_sound(out: Path) -> None:
     """Every file that the manifest lists is as it was written; the summary is there, or the run is unfinished."""
-    ResultFolder(MPI.COMM_SELF, out, "replace").discard()  # goes on where a kill between the moves left the folder
+    ResultFolder(MPI.COMM_SELF, out, force=True).discard()  # goes on where a kill between the moves left the folder
     found = manifest.read(out)
     if found is None:
         assert list(out.iterdir()) == []

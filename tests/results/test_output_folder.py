@@ -14,14 +14,13 @@ import pytest
 from mpi4py import MPI
 
 from hvi_fenicsx import InputError
-from hvi_fenicsx.results import output_folder
 from hvi_fenicsx.results.output_folder import ResultFolder
 from hvi_fenicsx.runtime import manifest
 
 
-def written(out: Path, existing: output_folder.Existing = "replace", **files: str) -> tuple[str, ...]:
+def written(out: Path, *, force: bool = True, **files: str) -> tuple[str, ...]:
     """A result of these files, by their names before the ending; what became of the files of others."""
-    folder = ResultFolder(MPI.COMM_SELF, out, existing)
+    folder = ResultFolder(MPI.COMM_SELF, out, force=force)
     try:
         work = folder.work
         for name, text in files.items():
@@ -33,7 +32,7 @@ def written(out: Path, existing: output_folder.Existing = "replace", **files: st
 
 def nested(out: Path, text: str, *names: str) -> tuple[str, ...]:
     """A result with results in it, as a search for equilibria makes them."""
-    folder = ResultFolder(MPI.COMM_SELF, out, "replace")
+    folder = ResultFolder(MPI.COMM_SELF, out, force=True)
     try:
         work = folder.work
         (work / "summary.json").write_text(text)
@@ -148,7 +147,7 @@ def killed_at(
         finish: what is done with them, in which the process is killed, or when the folder is closed.
     """
     calls = itertools.count()
-    folder = ResultFolder(MPI.COMM_SELF, out, "replace")
+    folder = ResultFolder(MPI.COMM_SELF, out, force=True)
     fill(folder.work)
 
     def counted(real: Any) -> Any:
@@ -204,7 +203,7 @@ def test_killed_at_any_call_the_result_is_the_old_or_the_new_one_and_the_next_ru
             assert all((out / f"{name}.json").read_text() == now for name in kinds[now])
             assert intact(out)
         with pytest.raises(InputError, match="already holds a result"):
-            written(out, "refuse", summary="3")
+            written(out, force=False, summary="3")
         assert intact(out)
         now = (out / "summary.json").read_text()
         assert names(out) == sorted([*(f"{n}.json" for n in kinds[now]), "manifest.json", "notes.txt"])
@@ -227,7 +226,7 @@ def test_killed_at_any_call_results_within_a_result_are_those_of_one(
 
     seen = []
     for out in killed_everywhere(tmp_path, monkeypatch, lambda out: nested(out, "1", "one", "two"), fill=fill):
-        ResultFolder(MPI.COMM_SELF, out, "replace").discard()
+        ResultFolder(MPI.COMM_SELF, out, force=True).discard()
         now = (out / "summary.json").read_text()
         inside = ["one", "two"] if now == "1" else ["one", "three"]
         assert names(out) == sorted([*inside, "manifest.json", "summary.json"])

@@ -13,9 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
-from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from ...typing import Array, Mask
@@ -27,8 +25,6 @@ PATH_CAPTION = (
     "The load path: force (under a moment the load factor) over mean displacement of the driven part. Solid: stable; "
     "dashed: unstable, which a test cannot hold; dotted: jumps; dots: events on the way, some where they are many."
 )
-_DOTS = 40
-"""So many events have a dot at most."""
 MOST = 16
 """Equilibria in the picture, those of lowest energy."""
 EQUILIBRIA_CAPTION = (
@@ -36,6 +32,8 @@ EQUILIBRIA_CAPTION = (
     "of each along the contact parts, vertex by vertex."
 )
 _PIECES = (BLUE, ORANGE, GREEN, PURPLE)
+_BESIDE = {-1: (VERMILION, "on a kink or drop"), -2: (PALE, "without a law")}
+"""What is on no piece of a law: its colour and its words."""
 _KINDS, _OTHER = {"minimiser": ("o", INK), "saddle": ("^", "white")}, ("s", "white")
 """The mark of each kind of equilibrium, and its face."""
 
@@ -106,8 +104,8 @@ def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: Sequence[U
     words = f"peak {load} at {number(x[peak], 4)} {units[0].name}"
     axes.plot(x[peak], y[peak], marker=CARETDOWN, color=PURPLE, label=words, **{**look, "ms": 12})
     if len(dots):
-        few, small = -(-len(dots) // _DOTS), {**look, "ms": 3.4, "mew": 0, "zorder": 4}
-        axes.plot(x[dots], y[dots], marker="o", color=INK, alpha=0.8, markevery=few, label="event", **small)
+        small = {**look, "ms": 3.4, "mew": 0, "zorder": 4}
+        axes.plot(x[dots], y[dots], marker="o", color=INK, alpha=0.8, markevery=0.02, label="event", **small)
     if len(turns := np.flatnonzero(events == "turn")):
         axes.plot(x[turns], y[turns], marker="s", color=INK, label="turn", **look)
     if end != "reached":
@@ -121,13 +119,12 @@ def equilibria_chart(result: EquilibriaResult) -> Figure:
         result: the search; it found something.
     """
     rows = result.rows[:MOST]
-    states = [result.state(row) for row in rows]
     fig = figure(1.8 + 0.62 * len(rows))
     titled(fig, result.title, *_search_subject(result, len(rows)))
     energies, strips = fig.subplots(1, 2, width_ratios=(2, 3))
     _energies(energies, result, rows)
-    _strips(strips, rows, states)
-    _legend(fig, sorted({row["kind"] for row in rows}), states)
+    _strips(strips, rows, [result.state(row) for row in rows])
+    fig.legend(loc="outside lower center", ncols=4, fontsize=10, handlelength=1.2)
     return fig
 
 
@@ -144,9 +141,10 @@ def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None
     values = np.array(result.energies[: len(rows)]) - result.energies[0]
     unit = unit_for(float(values[-1]), result.unit)
     values = np.asarray(values / unit.size)
-    for i, (row, value) in enumerate(zip(rows, values, strict=True)):
-        mark, face = _KINDS.get(row["kind"], _OTHER)
-        axes.plot(value, i, mark, color=INK, mfc=face, ms=9, clip_on=False)
+    kinds = np.array([row["kind"] for row in rows])
+    for kind in np.unique(kinds).tolist():
+        (mark, face), own = _KINDS.get(kind, _OTHER), np.flatnonzero(kinds == kind)
+        axes.plot(values[own], own, mark, color=INK, mfc=face, ms=9, clip_on=False, label=kind)
     spread = float(values[-1]) or 1.0
     axes.set(xlim=(-0.06 * spread, 1.06 * spread), ylim=(len(rows) - 0.5, -0.5))
     axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
@@ -158,11 +156,17 @@ def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None
 def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) -> None:
     """A strip for each equilibrium: the piece of the law at each vertex, and a line below where it has lifted off."""
     longest = max(map(len, states))
-    for i, (row, vertices) in enumerate(zip(rows, states, strict=True)):
-        at, colours = np.arange(len(vertices)), [_colour(vertex) for vertex in vertices]
-        axes.bar(at, 0.52, 1.0, i - 0.26, color=colours, ec="white", lw=0.8 if longest < 80 else 0.2)
-        lifted = np.flatnonzero([_is_lifted(vertex) for vertex in vertices])
-        axes.hlines(np.full(len(lifted), i + 0.34), lifted - 0.5, lifted + 0.5, color=INK, lw=3.0)
+    vertices = [(i, at, vertex) for i, state in enumerate(states) for at, vertex in enumerate(state)]
+    y, x = (np.array([vertex[k] for vertex in vertices]) for k in (0, 1))
+    pieces = np.array([_piece(vertex) for *_, vertex in vertices])
+    for piece in np.unique(pieces).tolist():
+        own, plain = pieces == piece, (_PIECES[piece % len(_PIECES)], f"piece {piece + 1} of the law")
+        colour, words = _BESIDE.get(piece, plain)
+        look: dict[str, Any] = {"color": colour, "ec": "white", "lw": 0.8 if longest < 80 else 0.2, "label": words}
+        axes.bar(x[own], 0.52, 1.0, y[own] - 0.26, **look)
+    if any(off := [vertex["contact"] == "0" for *_, vertex in vertices]):
+        axes.hlines(y[off] + 0.34, x[off] - 0.5, x[off] + 0.5, color=INK, lw=3.0, label="lifted off")
+    for i, row in enumerate(rows):
         words = f"{row['kind']}, {row['broken']} broken"
         axes.text(0.0, i - 0.3, words, transform=axes.get_yaxis_transform(), va="bottom", size=10, color=GREY)
     axes.set(xlim=(-0.5, longest - 0.5), ylim=(len(rows) - 0.5, -0.5), yticks=[])
@@ -171,31 +175,7 @@ def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) ->
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _is_lifted(vertex: Row) -> bool:
-    return vertex["contact"] in ("0", "false", "False")
-
-
-def _branch(vertex: Row) -> str:
+def _piece(vertex: Row) -> int:
     """The piece that the laws of a vertex are on: of two laws the later one, or the kink that one of them is on."""
-    found = [vertex[column] for column in ("branch_t", "branch_n") if vertex[column]]
-    return "-1" if "-1" in found else max(found, key=int, default="")
-
-
-def _colour(vertex: Row) -> str:
-    branch = _branch(vertex)
-    return {"": PALE, "-1": VERMILION}.get(branch) or _PIECES[int(branch) % len(_PIECES)]
-
-
-def _legend(fig: Figure, kinds: Sequence[str], states: Sequence[Sequence[Row]]) -> None:
-    vertices = [vertex for state in states for vertex in state]
-    found = {_branch(vertex): _colour(vertex) for vertex in vertices}
-    handles: list[Patch | Line2D] = []
-    for kind in kinds:
-        mark, face = _KINDS.get(kind, _OTHER)
-        handles.append(Line2D([], [], marker=mark, color=INK, mfc=face, ls="", label=kind))
-    for branch in sorted(set(found) - {""}, key=int):
-        words = "on a kink or drop" if branch == "-1" else f"piece {int(branch) + 1} of the law"
-        handles.append(Patch(color=found[branch], label=words))
-    if any(map(_is_lifted, vertices)):
-        handles.append(Line2D([], [], color=INK, lw=3.0, label="lifted off"))
-    fig.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=10, handlelength=1.2)
+    found = [int(vertex[column]) for column in ("branch_t", "branch_n") if vertex[column]]
+    return -1 if -1 in found else max(found, default=-2)

@@ -124,20 +124,12 @@ def _worth_seeing(part: ContactPart) -> ContactPart:
 
 def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     """A curve, with what the laws say of it."""
-    s, values = np.asarray(part["s"] / length.size, dtype=np.float64), np.asarray(field.values / field.unit.size)
+    s, values = np.asarray(part["s"] / length.size), np.asarray(field.values / field.unit.size)
     axes.plot(s, values, color=field.colour, marker="o" if len(s) <= MARKED else "", ms=3.6)
-    note = ""
     if field.kind == "slip":
-        note = _dropping(axes, s, field, part.drops)
+        axes.set_title(_dropping(axes, s, field, part.drops), loc="right", size=11.5, color=GREY)
     elif field.kind == "pressure":
         axes.fill_between(s, values, color=field.colour, alpha=0.15, lw=0)
-        off = part.lifted
-        axes.plot(s[off], values[off], "o", mfc="white", mec=field.colour, ms=6, zorder=5)
-        extreme = float(field.values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else 0.0
-        note = f"largest {'tension ' if extreme < 0.0 else ''}{field.unit.text(abs(extreme))}"
-    else:
-        note = _fallen(axes, part["branch_t" if field.kind == "friction" else "branch_n"] > 0, s, values, field.colour)
-    axes.set_title(note, loc="right", size=11.5, color=GREY)
     everywhere: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "color": ORANGE, "alpha": 0.16, "lw": 0}
     lifted: Any = part.lifted  # matplotlib takes arrays, which its types do not say
     axes.fill_between(s, 0.0, 1.0, where=lifted, **everywhere)
@@ -156,34 +148,20 @@ def _dropping(axes: Axes, s: Array, field: Field, drops: Array) -> str:
     return _drops_in_words(shown if shown.size else drops, reached=shown.size > 0) if drops.size else ""
 
 
-def _fallen(axes: Axes, fallen: Mask, s: Array, values: Array, colour: str) -> str:
-    """Mark the vertices that have left the law's first piece; says what the mark means."""
-    if not fallen.any():
-        return ""
-    axes.plot(s[fallen], values[fallen], "o", mfc="white", mec=colour, ms=6)
-    return f"hollow: past the drop ({np.count_nonzero(fallen)} of {len(fallen)} vertices)"
-
-
 def _maps(result: Result, part: ContactPart) -> Figure:
     """A map of each field, one below the other, of the part laid flat."""
     geometry = next(geometry for geometry in part_geometries(result) if geometry.part.name == part.name)
     flat, fields = laid_flat(geometry, result.body), list(_fields(result, part))
     wide, tall = (float(side) for side in np.maximum(np.ptp(flat.points, axis=0), 1e-12))
-    columns = 2 if tall > 0.9 * wide and len(fields) > 1 else 1
-    rows = -(-len(fields) // columns)
-    height = float(np.clip((WIDTH / columns - 2) * tall / wide, 0.8, 8.5 / rows))
-    fig = figure(rows * (height + 0.9) + 0.4)
+    height = float(np.clip((WIDTH - 2) * tall / wide, 0.8, 8.5 / len(fields)))
+    fig = figure(len(fields) * (height + 0.9) + 0.4)
     heading(fig, result, f"on “{part.name}”")
-    panels = fig.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes, field in zip(panels.flat, fields, strict=False):
+    panels = fig.subplots(len(fields), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axes, field in zip(panels, fields, strict=True):
         _map(fig, axes, flat, part, field)
-    for axes in panels.flat[len(fields) :]:
-        axes.set_axis_off()
-    for axes in panels[:, 0]:
         axes.set_ylabel(f"{flat.names[1]} in {flat.unit.name}")
-    for axes in panels[-1]:
-        axes.set_xlabel(f"{flat.names[0]} in {flat.unit.name}")
-    said = [*_drop_lines(panels[0, 0], flat, part)]
+    panels[-1].set_xlabel(f"{flat.names[0]} in {flat.unit.name}")
+    said = [*_drop_lines(panels[0], flat, part)]
     said += [f"grey: lifted, up to {quantity(part.largest_gap, 'm')}"] if part.idle.any() else []
     fig.supxlabel("; ".join([*said, *([flat.how] if flat.how else [])]), size=12, color=GREY)
     return fig
