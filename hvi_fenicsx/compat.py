@@ -57,7 +57,7 @@ def local_entities(
     mesh.topology.create_connectivity(dimension, 0)
     mesh.topology.create_connectivity(dimension, mesh.topology.dim)
     found = _mesh.meshtags_from_entities(mesh, dimension, graph.adjacencylist(vertices), values.astype(np.int32))
-    return np.asarray(found.indices), np.asarray(found.values)
+    return found.indices, found.values
 
 
 def refine(mesh: _mesh.Mesh, edges: npt.NDArray[np.int32] | None) -> tuple[_mesh.Mesh, npt.NDArray[np.int32]]:

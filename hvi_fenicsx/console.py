@@ -12,7 +12,7 @@ from .model import PathTable
 from .paths.load_path import LoadPath
 from .problem import effect_summary
 from .reduced import loading
-from .rigid import AnyBody, LoadFactors, Mode
+from .rigid import LoadFactors, Mode
 from .runtime.log import percent
 from .solvers import nested_iteration, quadratic
 from .solvers.convergence import Counts
@@ -49,16 +49,16 @@ def warnings(found: Iterable[str]) -> Iterator[str]:
 def existence(prepared: Preparation) -> str:
     """One line on kernel, state, margin and load factors."""
     s = prepared.solvability
-    bodies = prepared.problem.bodies.bodies
     trouble = f" ({s.trouble})" if s.trouble else ""
-    parts = [f"{s.state}{trouble}; rigid motions that the supports leave: {motions(s.kernel, bodies)}"]
+    parts = [f"{s.state}{trouble}; rigid motions that the supports leave: {motions(s.kernel)}"]
     if s.direction is not None:
         parts.append(f"escape by {s.direction.name}")
     if s.margin is not None:
         parts.append(f"margin {s.margin:.3g}")
     if s.free:
-        free = motions(s.free, bodies)
-        parts.append(f"undetermined, neither held nor driven: {free} (the solution that moves least is returned)")
+        parts.append(
+            f"undetermined, neither held nor driven: {motions(s.free)} (the solution that moves least is returned)"
+        )
     if s.never_held:
         parts.append("held at no load factor")
     if math.isfinite(s.held_from) and not s.never_held and s.held_from > 0.0:
@@ -69,17 +69,10 @@ def existence(prepared: Preparation) -> str:
     return "; ".join(parts)
 
 
-def motions(found: Sequence[Mode], bodies: Sequence[AnyBody]) -> str:
-    """Rigid motions: a few by their names, more by their number.
-
-    Args:
-        found: the motions.
-        bodies: all bodies, whose motions they are.
-    """
+def motions(found: Sequence[Mode]) -> str:
+    """Rigid motions: a few by their names, more by their number."""
     if len(found) <= _LISTED:
         return ", ".join(mode.name for mode in found) or "none"
-    if len(found) == sum(body.motions for body in bodies):
-        return f"all {len(found)}" + (f" of {len(bodies)} bodies" if len(bodies) > 1 else "")
     return f"{len(found)} (`hvi check --json` lists them)"
 
 

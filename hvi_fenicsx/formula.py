@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from .class_registry import closest
+from .class_registry import hint
 from .errors import InputError
 from .typing import Array
 
@@ -52,20 +52,17 @@ class SpatialValue(ABC):
 
     Attributes:
         source: what stands for it in files: a number, a formula, or a few words.
+        everywhere: whether it is known at all points; else it belongs to a mesh, and on others is known at its
+            vertices only.
     """
 
-    __slots__ = ()
     source: float | str
+    everywhere = True
 
     @property
     def is_number(self) -> bool:
         """Whether it is a plain number."""
         return isinstance(self.source, float)
-
-    @property
-    def everywhere(self) -> bool:
-        """Whether it is known at all points; else it belongs to a mesh, and on others is known at its vertices only."""
-        return True
 
     def check_mesh(self, mesh: Any) -> None:  # noqa: B027
         """Refuse a mesh that it does not belong to.
@@ -106,15 +103,8 @@ class Computed(SpatialValue):
         everywhere: whether it is known at all points.
     """
 
-    __slots__ = ("_at", "_everywhere", "source")
-
     def __init__(self, source: str, at: Callable[[Array], Array], *, everywhere: bool = True) -> None:
-        self.source, self._at, self._everywhere = source, at, everywhere
-
-    @property
-    @override
-    def everywhere(self) -> bool:
-        return self._everywhere
+        self.source, self._at, self.everywhere = source, at, everywhere
 
     @override
     def at(self, points: Array) -> Array:
@@ -140,8 +130,6 @@ class Formula(SpatialValue):
         InputError: not a finite number, not a formula, or a formula with anything but coordinates, numbers,
             ``pi``, the operators ``+ - * / **``, comparisons within ``a if c else b`` and :data:`FUNCTIONS`.
     """
-
-    __slots__ = ("_tree", "source")
 
     def __init__(self, source: float | int | str) -> None:
         if isinstance(source, bool) or not isinstance(source, int | float | str):
@@ -250,8 +238,8 @@ def _checked(node: ast.expr, text: str, depth: int = 0) -> ast.expr:
         case ast.Name(id=name) if name in COORDINATES:
             return node
         case ast.Name(id=name):
-            hint = f"; {name} is a function: write {name}(...)" if name in FUNCTIONS else ""
-            raise InputError(f"{name!r} in {text!r} is not known; a formula may use x, y, z and pi{hint}")
+            call = f"; {name} is a function: write {name}(...)" if name in FUNCTIONS else ""
+            raise InputError(f"{name!r} in {text!r} is not known; a formula may use x, y, z and pi{call}")
         case ast.BinOp(left=left, op=op, right=right) if isinstance(op, _OPERATORS):
             one, other = inner(left, right)
             return ast.BinOp(one, op, _exponent(right, other, text) if isinstance(op, ast.Pow) else other)
@@ -279,9 +267,8 @@ def _call(name: str, arguments: list[ast.expr]) -> ast.expr:
 
 def _check_call(name: str, count: int, text: str) -> None:
     if name not in FUNCTIONS:
-        close = closest(name, FUNCTIONS)
-        hint = f"did you mean {close}? " if close else ""
-        raise InputError(f"function {name!r} in {text!r} is not known; {hint}allowed: {', '.join(FUNCTIONS)}")
+        known = f"is not known{hint(name, FUNCTIONS)}; allowed: {', '.join(FUNCTIONS)}"
+        raise InputError(f"function {name!r} in {text!r} {known}")
     wanted = 2 if name in _OF_TWO else 1
     if count != wanted:
         raise InputError(f"{name} in {text!r} takes {wanted} {'argument' if wanted == 1 else 'arguments'}, not {count}")

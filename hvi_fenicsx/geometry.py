@@ -50,7 +50,7 @@ class CircularArc:
 
     def nearest(self, x: Array) -> Array:
         """The points of the circle nearest to the points x, both of shape (n, 2), m."""
-        away = x - np.asarray(self.centre)
+        away = x - self.centre
         return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
 
     def moved(self, origin: Array, rotation: Array) -> CircularArc:
@@ -60,7 +60,7 @@ class CircularArc:
             origin: where the origin of coordinates comes to lie, m, (2,).
             rotation: (2, 2).
         """
-        x, y = rotation @ np.asarray(self.centre) + origin
+        x, y = rotation @ self.centre + origin
         return CircularArc((float(x), float(y)), self.radius)
 
 

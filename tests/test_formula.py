@@ -117,7 +117,7 @@ REFUSED = {
     "dunder name": ("__import__", "'__import__' in '__import__' is not known"),
     "call of a foreign function": ("open(x)", "function 'open'"),
     "import": ("__import__('os')", "function '__import__'"),
-    "misspelt function": ("sqr(x)", "did you mean sqrt?"),
+    "misspelt function": ("sqr(x)", "did you mean 'sqrt'?"),
     "call of a call": ("sin(x)(x)", "is not allowed"),
     "keyword": ("sin(x=1)", "is not allowed"),
     "star": ("max(*x)", "takes 2 arguments, not 1"),

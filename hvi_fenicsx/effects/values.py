@@ -38,8 +38,6 @@ class PythonFunction(SpatialValue):
         function: the function.
     """
 
-    __slots__ = ("_function", "source")
-
     def __init__(self, function: Callable[[Array], Any]) -> None:
         self._function = function
         self.source = f"Python function {getattr(function, '__name__', type(function).__name__)}"
@@ -72,16 +70,11 @@ class Expression(SpatialValue):
         mesh: its own.
     """
 
-    __slots__ = ("_expression", "_mesh", "source")
+    everywhere = False
 
     def __init__(self, expression: Any, mesh: dmesh.Mesh) -> None:
         self._expression, self._mesh = expression, mesh
         self.source = f"UFL expression {textwrap.shorten(str(expression), 40, placeholder='...')}"
-
-    @property
-    def everywhere(self) -> bool:
-        """Only on its own mesh."""
-        return False
 
     def check_mesh(self, mesh: dmesh.Mesh) -> None:
         """Refuse another mesh than a body's.
@@ -146,8 +139,6 @@ class Expression(SpatialValue):
 
 class VectorFunction(PythonFunction):
     """A Python function of space with all components, (d, n)."""
-
-    __slots__ = ()
 
     def components(self, count: int) -> tuple[PythonFunction, ...]:
         """Each of ``count`` components."""

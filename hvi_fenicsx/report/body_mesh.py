@@ -38,7 +38,7 @@ class BodyMesh:
     @cached_property
     def extents(self) -> Array:
         """How far the body reaches along each axis, m, (3,)."""
-        return np.asarray(np.ptp(self.points[self.outermost], axis=0))
+        return np.ptp(self.points[self.outermost], axis=0)
 
     @property
     def size(self) -> float:
@@ -51,8 +51,8 @@ class BodyMesh:
         first, *others = self.cells.T
         sides = np.stack([self.points[other] - self.points[first] for other in others], axis=1)
         if self.dimension == 2:
-            return np.asarray(np.abs(np.cross(sides[:, 0], sides[:, 1])[:, 2]) / 2)
-        return np.asarray(np.abs(np.linalg.det(sides)) / 6)
+            return np.abs(np.cross(sides[:, 0], sides[:, 1])[:, 2]) / 2
+        return np.abs(np.linalg.det(sides)) / 6
 
     @property
     def boundary(self) -> Integers:
@@ -81,10 +81,10 @@ class BodyMesh:
         _, first, count = np.unique(self._keys(facets), return_index=True, return_counts=True)
         alone = np.sort(first[count == 1])
         inner = self.points[self.cells.T.ravel()[alone]] - self.points[facets[alone, 0]]
-        inward = np.einsum("ki,ki->k", self._area_vectors(facets[alone]), inner) > 0.0
+        inward = np.einsum("ki,ki->k", self.area_vectors(facets[alone]), inner) > 0.0
         return np.where(inward[:, None], facets[alone, ::-1], facets[alone]), alone % len(self.cells)
 
-    def _area_vectors(self, facets: Integers) -> Array:
+    def area_vectors(self, facets: Integers) -> Array:
         """The normals (k, 3) of facets, as long as their lengths or areas; to the right of an edge in the plane."""
         first, *others = (self.points[corner] for corner in facets.T)
         if len(others) == 1:
@@ -93,25 +93,18 @@ class BodyMesh:
 
     def sizes(self, facets: Integers) -> Array:
         """The length or the area of facets, m or m², (k,)."""
-        return np.asarray(np.linalg.norm(self._area_vectors(facets), axis=1))
+        return np.linalg.norm(self.area_vectors(facets), axis=1)
 
     def normals(self, facets: Integers) -> Array:
         """Outward unit normals at the vertices of facets of the boundary; zero at others, (n, 3)."""
-        summed, vectors = np.zeros(self.points.shape), self._area_vectors(facets)
-        if self.dimension == 2:  # long edges turn the normal no more than short ones
-            vectors = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+        summed, vectors = np.zeros(self.points.shape), self.area_vectors(facets)
         for corner in facets.T:
             np.add.at(summed, corner, vectors)
-        return np.asarray(summed / np.maximum(np.linalg.norm(summed, axis=1), np.finfo(float).tiny)[:, None])
-
-    def mean_normal(self, facets: Integers) -> Array:
-        """The mean outward normal of facets, (3,): 1 long where they are plane, 0 where they close on themselves."""
-        vectors = self._area_vectors(facets)
-        return np.asarray(vectors.sum(axis=0) / (np.linalg.norm(vectors, axis=1).sum() or 1.0))
+        return summed / np.maximum(np.linalg.norm(summed, axis=1), np.finfo(float).tiny)[:, None]
 
     def oriented(self, facets: Integers) -> Integers:
         """These facets (j, 2|3) as they are in the boundary; those inside of the body are left out."""
-        return np.asarray(self.boundary[np.isin(self._keys(self.boundary), self._keys(facets))])
+        return self.boundary[np.isin(self._keys(self.boundary), self._keys(facets))]
 
     def _keys(self, facets: Integers) -> Integers:
         """One number for each set of corners, (k,)."""

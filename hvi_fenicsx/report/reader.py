@@ -215,7 +215,7 @@ class PathResult(Finished):
     @cached_property
     def stable(self) -> Mask:
         """Which rows are stable, (rows,)."""
-        return np.asarray(self.columns["stable"] == 1.0)
+        return self.columns["stable"] == 1.0
 
     @property
     def largest_force(self) -> float:

@@ -37,7 +37,6 @@ Singles = npt.NDArray[np.float32]
 FILE = "solution.npz"
 _OF_PART = {"vertices": "vertices", "facets": "facets", "weights": "weight", "normals": "normal", "drops": "drops"}
 """The attributes of a part that are no columns, by their keys."""
-_SIDE, _REGION, _LOAD, _PART = "side:", "region:", "load:", "part:"
 NOTHING = 1e-6
 """A pressure, or a length, so small beside the largest is none."""
 
@@ -184,7 +183,7 @@ class ContactPart:
             quantity: "slip" or "friction".
         """
         along = getattr(self, quantity).reshape(len(self), -1)
-        return np.asarray(np.einsum("mk,mkd->md", along, self.tangents))
+        return np.einsum("mk,mkd->md", along, self.tangents)
 
     def _tangential(self, column: str) -> Array:
         first = self[f"{column}1"]
@@ -240,15 +239,14 @@ class SolutionArrays:
 
 def _members(arrays: SolutionArrays) -> Iterator[tuple[str, Any]]:
     """The arrays by their keys, in the order of the file; those that are None are left out."""
-    plain = {key: value for key, value in vars(arrays).items() if not isinstance(value, Mapping)}
-    yield from ((key, value) for key, value in plain.items() if value is not None)
-    yield from ((f"{_SIDE}{name}", facets) for name, facets in arrays.sides.items())
-    yield from ((f"{_REGION}{name}", cells) for name, cells in arrays.regions.items())
+    yield from ((key, value) for key, value in vars(arrays).items() if not isinstance(value, Mapping | None))
+    yield from ((f"side:{name}", facets) for name, facets in arrays.sides.items())
+    yield from ((f"region:{name}", cells) for name, cells in arrays.regions.items())
     for name, load in arrays.loads.items():
-        yield from ((f"{_LOAD}{name}:{key}", value) for key, value in vars(load).items())
+        yield from ((f"load:{name}:{key}", value) for key, value in vars(load).items())
     for name, part in arrays.parts.items():
         own = {key: getattr(part, attribute) for key, attribute in _OF_PART.items()}
-        yield from ((f"{_PART}{name}:{key}", value) for key, value in {**own, **part.columns}.items())
+        yield from ((f"part:{name}:{key}", value) for key, value in {**own, **part.columns}.items())
 
 
 def save(path: Path, arrays: SolutionArrays) -> None:
@@ -261,9 +259,8 @@ def save(path: Path, arrays: SolutionArrays) -> None:
     Raises:
         NotWrittenError: it cannot be written.
     """
-    members: dict[str, Any] = {key: np.asarray(value) for key, value in _members(arrays)}
     with writing.whole(path) as aside, aside.open("wb") as stream:
-        np.savez(stream, **members)
+        np.savez(stream, **dict(_members(arrays)))
 
 
 def load(path: Path) -> SolutionArrays:
@@ -285,26 +282,21 @@ def load(path: Path) -> SolutionArrays:
 
 def _of_members(members: Mapping[str, Any]) -> SolutionArrays:
     """The arrays from those by their keys."""
-    plain = {key: value for key, value in members.items() if ":" not in key}
+    found: dict[str, dict[str, Any]] = {kind: {} for kind in ("", "side", "region", "load", "part")}
+    for key, value in members.items():
+        kind, _, name = key.partition(":") if ":" in key else ("", "", key)
+        if kind in ("load", "part"):
+            name, _, own = name.rpartition(":")
+            found[kind].setdefault(name, {})[own] = value
+        else:
+            found[kind][name] = value
     return SolutionArrays(
-        **plain | {"degree": int(members["degree"])},
-        sides=_named(members, _SIDE),
-        regions=_named(members, _REGION),
-        loads={name: LoadArrays(**own) for name, own in _grouped(members, _LOAD).items()},
-        parts={name: _part(name, own) for name, own in _grouped(members, _PART).items()},
+        **found[""] | {"degree": int(members["degree"])},
+        sides=found["side"],
+        regions=found["region"],
+        loads={name: LoadArrays(**own) for name, own in found["load"].items()},
+        parts={name: _part(name, own) for name, own in found["part"].items()},
     )
-
-
-def _named(members: Mapping[str, Any], kind: str) -> dict[str, Any]:
-    return {key.removeprefix(kind): value for key, value in members.items() if key.startswith(kind)}
-
-
-def _grouped(members: Mapping[str, Any], kind: str) -> dict[str, dict[str, Any]]:
-    found: dict[str, dict[str, Any]] = {}
-    for key, value in _named(members, kind).items():
-        name, own = key.rsplit(":", 1)
-        found.setdefault(name, {})[own] = value
-    return found
 
 
 def _part(name: str, members: dict[str, Any]) -> ContactPart:

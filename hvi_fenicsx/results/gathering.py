@@ -62,7 +62,7 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
     fields["cells"] = spaces.global_numbers(problem.space, nodes.linear_cells(problem.space))
     if solution.solve_result is not None:
         u = spaces.values(problem.space, solution.solve_result.u.x.array)
-        fields["displacement"] = np.asarray(u[:owned], dtype=np.float64) * problem.scales.displacement
+        fields["displacement"] = u[:owned] * problem.scales.displacement
     elif (mode := solution.solvability.direction) is not None:
         fields["escape_mode"] = problem.bodies.motion(np.asarray(problem.points / problem.scales.length), mode)[:owned]
     if stress is not None:

@@ -20,7 +20,7 @@ def summary(solution: Solution) -> dict[str, Any]:
     wanted = solution.scene.solver
     return plain(
         {
-            **_frame(solution, solution.dofs),
+            **common(solution, solution.dofs),
             "converged": solution.converged,
             "reason": solution.reason,
             "exit_code": solution.exit_code,
@@ -45,22 +45,19 @@ def summary(solution: Solution) -> dict[str, Any]:
     )
 
 
-def common(prepared: Preparation) -> dict[str, Any]:
+def common(of: Solution | Preparation, dofs: int) -> dict[str, Any]:
     """The entries that every summary has. Collective; the same on all ranks.
 
     Args:
-        prepared: the scene, assembled.
+        of: what was found, or the scene, assembled.
+        dofs: the number of unknowns.
     """
-    return plain(_frame(prepared, prepared.system.dofs))
-
-
-def _frame(of: Solution | Preparation, dofs: int) -> dict[str, Any]:
     comm = of.problem.domain.mesh.comm
     return {
         "scene": of.scene.title,
         "dofs": dofs,
         "ranks": comm.size,
-        "solvability": of.solvability.summary(),
+        "solvability": plain(of.solvability.summary()),
         "time": {name: largest(comm, value) for name, value in of.timer.report().items()},
         "peak_memory_mb": cost.peak_memory(comm),
         "versions": manifest.versions(),
@@ -78,12 +75,8 @@ def _iterations(solution: Solution) -> dict[str, int] | None:
     if solution.solve_result is None:
         return None
     counts = solution.solve_result.counts
-    return {
-        "newton": counts.newton,
-        "linear": counts.linear,
-        "levels": solution.solve_result.levels,
-        "branch": counts.branch,
-    }
+    found = {key: int(getattr(counts, key)) for key in ("newton", "linear", "branch")}
+    return found | {"levels": solution.solve_result.levels}
 
 
 def _estimate(solution: Solution) -> dict[str, float | bool] | None:
@@ -135,8 +128,7 @@ def _resultants(solution: Solution) -> dict[str, list[float]] | None:
 
 
 def _scales(problem: Problem) -> dict[str, float]:
-    s = problem.scales
-    return {"length": s.length, "stress": s.stress, "displacement": s.displacement, "energy": s.energy}
+    return {key: getattr(problem.scales, key) for key in ("length", "stress", "displacement", "energy")}
 
 
 def plain(value: Any) -> Any:

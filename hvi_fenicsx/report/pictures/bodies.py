@@ -49,8 +49,7 @@ def _canvas(result: Result, subject: str, contacts: Mapping[str, Integers]) -> P
     from .space import SpaceCanvas  # loads VTK
 
     outer = [facets for name, facets in contacts.items() if not result.between_bodies(name)]
-    normals = [result.body.mean_normal(facets) * float(result.body.sizes(facets).sum()) for facets in outer]
-    return SpaceCanvas(result, subject, normals)
+    return SpaceCanvas(result, subject, [result.body.area_vectors(facets).sum(axis=0) for facets in outer])
 
 
 def scene(result: Result) -> Figure:

@@ -126,8 +126,10 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     """A curve, with what the laws say of it."""
     s, values = np.asarray(part["s"] / length.size), np.asarray(field.values / field.unit.size)
     axes.plot(s, values, color=field.colour, marker="o" if len(s) <= MARKED else "", ms=3.6)
-    if field.kind == "slip":
-        axes.set_title(_dropping(axes, s, field, part.drops), loc="right", size=11.5, color=GREY)
+    if field.kind == "slip" and part.drops.size:
+        look: dict[str, Any] = {"color": INK, "ls": (0, (4, 3)), "lw": 1.4, "zorder": 4}
+        axes.plot(s, part.drops / field.unit.size, **look, scaley=False)  # where no slip reaches them, out of sight
+        axes.set_title(_drops_in_words(part.drops), loc="right", size=11.5, color=GREY)
     elif field.kind == "pressure":
         axes.fill_between(s, values, color=field.colour, alpha=0.15, lw=0)
     everywhere: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "color": ORANGE, "alpha": 0.16, "lw": 0}
@@ -138,14 +140,6 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     few_ticks(axes, "y")
     axes.grid(axis="y", color="#e6e6e6", lw=0.8)
     axes.set_axisbelow(True)
-
-
-def _dropping(axes: Axes, s: Array, field: Field, drops: Array) -> str:
-    """Draw where the law drops, if slips reach that; says what the lines mean."""
-    low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
-    shown = drops[:, ((drops <= high) & (drops >= low)).any(axis=0)]
-    axes.plot(s, shown / field.unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
-    return _drops_in_words(shown if shown.size else drops, reached=shown.size > 0) if drops.size else ""
 
 
 def _maps(result: Result, part: ContactPart) -> Figure:
@@ -193,29 +187,29 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
 
 def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     """Vectors at the vertices nearest to the nodes of a coarse grid, whatever the mesh."""
-    points = flat.points / flat.unit.size
-    spacing = float(np.max(np.ptp(points, axis=0))) / ARROWS
-    shown = sparse(points, spacing)
+    spacing, unit = float(np.max(np.ptp(flat.points, axis=0))) / ARROWS, flat.unit.size
+    shown = sparse(flat.points, spacing)
     ways = vectors[shown] * 0.9 * spacing / (float(np.linalg.norm(vectors, axis=1).max()) or 1.0)
     look: dict[str, Any] = {"units": "inches", "width": 0.016, "minlength": 0, "color": INK, "alpha": 0.85}
-    axes.quiver(*points[shown].T, *ways.T, angles="xy", scale_units="xy", scale=1.0, pivot="mid", **look)
+    axes.quiver(
+        *flat.points[shown].T / unit, *ways.T / unit, angles="xy", scale_units="xy", scale=1.0, pivot="mid", **look
+    )
 
 
 def _drop_lines(axes: Axes, flat: FlatPart, part: ContactPart) -> Iterator[str]:
     """Draw where the slip is that at which the law drops, and say so."""
     for drop in part.drops.T[part.drops[0] > 0.0]:
         slip = part.size("slip") / drop
-        reached = bool(np.nanmin(slip) < 1.0 < np.nanmax(slip))
-        if reached:
+        if np.nanmin(slip) < 1.0 < np.nanmax(slip):
             axes.tricontour(flat.mesh, slip, [1.0], colors=INK, linestyles="--")
-        yield _drops_in_words(drop, reached=reached)
+        yield _drops_in_words(drop)
 
 
-def _drops_in_words(drops: Array, *, reached: bool) -> str:
+def _drops_in_words(drops: Array) -> str:
     """Where a law drops, in words: at one slip, or at one for each vertex."""
     least, most = float(np.abs(drops).min()), float(np.abs(drops).max())
-    at = "at " + quantity(most, "m") if least == most else f"between {quantity(least, 'm')} and {quantity(most, 'm')}"
-    return f"dashed: the law drops {at}" if reached else f"the law drops {at}, not reached"
+    words = quantity(most, "m") if least == most else f"{quantity(least, 'm')} to {quantity(most, 'm')}"
+    return f"the law drops (dashed) at {words}"
 
 
 CLOSED = 0.5
@@ -253,7 +247,7 @@ class FlatPart:
 
     def along(self, vectors: Array) -> Array:
         """The components of vectors (m, 3) along the coordinates, (m, 2)."""
-        return np.asarray(np.einsum("md,mwd->mw", vectors, self.ways))
+        return np.einsum("md,mwd->mw", vectors, self.ways)
 
 
 def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
@@ -264,8 +258,8 @@ def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
         body: the body.
     """
     points, triangles = geometry.part.points, geometry.row[geometry.facets]
-    mean = body.mean_normal(geometry.facets)
-    if float(np.linalg.norm(mean)) < CLOSED:
+    mean = body.area_vectors(geometry.facets).sum(axis=0) / body.sizes(geometry.facets).sum()
+    if np.linalg.norm(mean) < CLOSED:
         return _unrolled(points, triangles, geometry.part.normal, ~geometry.part.idle)
     seen = int(np.argmax(np.abs(mean)))
     kept = [i for i in range(3) if i != seen]

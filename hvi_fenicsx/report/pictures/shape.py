@@ -48,12 +48,12 @@ class DeformedBody:
     @cached_property
     def points(self) -> Array:
         """Where the vertices are drawn."""
-        return np.asarray((self.body.points + self.factor * self.displacement) * self.stretch)
+        return (self.body.points + self.factor * self.displacement) * self.stretch
 
     @cached_property
     def at_rest(self) -> Array:
         """Where the vertices of the body at rest are drawn."""
-        return np.asarray(self.body.points * self.stretch)
+        return self.body.points * self.stretch
 
     @property
     def as_drawn(self) -> BodyMesh:
@@ -75,7 +75,7 @@ class DeformedBody:
     @cached_property
     def amount(self) -> Array:
         """|u|, m."""
-        return np.asarray(np.linalg.norm(self.displacement, axis=1))
+        return np.linalg.norm(self.displacement, axis=1)
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def sparse(points: Array, spacing: float) -> Integers:
     place = (points - low) * count / np.where(extent > 0.0, extent, 1.0)
     node = np.round(place)
     order = np.argsort(np.round(np.linalg.norm(place - node, axis=1), 6), kind="stable")
-    return np.asarray(order[np.unique(node[order], axis=0, return_index=True)[1]])
+    return order[np.unique(node[order], axis=0, return_index=True)[1]]
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,7 @@ class Side:
     @property
     def normal(self) -> Array:
         """The mean outward normal (3,): short for a side that closes on itself, as a hole's does."""
-        return np.asarray(self.normals.mean(axis=0))
+        return self.normals.mean(axis=0)
 
 
 @dataclass(frozen=True)
@@ -257,7 +257,7 @@ class LoadedSide:
     def sheared(self) -> Mask:
         """Where the load is along the side, so that an arrow to it would lie on it, (m,)."""
         across = np.abs(np.einsum("ki,ki->k", self.traction, self.side.normals))
-        return np.asarray(across <= SHEAR * np.linalg.norm(self.traction, axis=1))
+        return across <= SHEAR * np.linalg.norm(self.traction, axis=1)
 
 
 @dataclass(frozen=True)
@@ -332,4 +332,4 @@ def _traction(load: LoadArrays | None, side: Side) -> Array:
         own = np.searchsorted(load.vertices, side.vertices[at])
         traction[at, : load.traction.shape[1]] = load.traction[own]
         traction[at] -= load.pressure[own, None] * side.normals[at]
-    return np.asarray(np.nan_to_num(traction))
+    return np.nan_to_num(traction)

@@ -43,7 +43,7 @@ class SpaceCanvas(Canvas):
         Args:
             result: whose body it is.
             subject: what the picture shows.
-            normals: of the parts that are to be seen, (3,).
+            normals: of the parts that are to be seen, as long as their areas, (3,).
         """
         super().__init__(result, subject)
         self.plotter = pyvista.Plotter(off_screen=True, border=False)
@@ -54,7 +54,7 @@ class SpaceCanvas(Canvas):
 
     @override
     def project(self, points: Array) -> Array:
-        return np.asarray(points @ np.column_stack([self.right, self.up]))
+        return points @ np.column_stack([self.right, self.up])
 
     def _skin(
         self, rest: Array, points: Array, facets: Integers, *, width: int = 3, edges: str = INK, **look: Any
