@@ -128,7 +128,9 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     axes.plot(s, values, color=field.colour, marker="o" if len(s) <= MARKED else "", ms=3.6)
     if field.kind == "slip" and part.drops.size:
         look: dict[str, Any] = {"color": INK, "ls": (0, (4, 3)), "lw": 1.4, "zorder": 4}
-        axes.plot(s, part.drops / field.unit.size, **look, scaley=False)  # where no slip reaches them, out of sight
+        seen = axes.dataLim.frozen()
+        axes.plot(s, part.drops / field.unit.size, **look)
+        axes.dataLim.set(seen)  # where no slip reaches a drop, it is out of sight
         axes.set_title(_drops_in_words(part.drops), loc="right", size=11.5, color=GREY)
     elif field.kind == "pressure":
         axes.fill_between(s, values, color=field.colour, alpha=0.15, lw=0)
