@@ -175,13 +175,13 @@ def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBo
         forces: the loads of rigid motions by name.
         body: the body.
     """
-    held = [normals(problem, body, b.surface) for b in problem.bounds if _bilateral(b)]
+    bounded = [(_bilateral(b), normals(problem, body, b.surface)) for b in problem.bounds]  # all ranks, in one order
     loads, force = _works(problem, forces, body)
     return RigidProblem(
         body=body,
         loads=loads,
-        fixed=(prescribed(problem, body), *held),
-        contact=tuple(normals(problem, body, b.surface) for b in problem.bounds if not _bilateral(b)),
+        fixed=(prescribed(problem, body), *(rows for bilateral, rows in bounded if bilateral)),
+        contact=tuple(rows for bilateral, rows in bounded if not bilateral),
         resistances=tuple(
             _resistance(problem, body, term) for term in problem.terms if acts_on(problem, body, term.surface)
         ),
