@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -314,54 +314,51 @@ class BubbleStiffness:
 def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     """The diagonal of the bubbles' stiffness at the blocks that this rank owns, (n, d). Collective.
 
-    On a cell in which the material is constant it is a sum of the energies of the affine functions λ_a and λ_a + λ_b
-    (:func:`energy_shares`); what a foundation adds is that of a constant, by the mean of the bubble's square. At a
-    bubble's own point no other bubble has a value, so a linear form whose quadrature points are these takes each
-    energy to the bubbles that have a share in it.
+    On a cell in which the material is constant it is Σ G_ab a(x_a, x_b), G_ab being the mean of the product of a
+    bubble's derivatives by the reference coordinates x_a and x_b; what a foundation adds is that of a constant, by the
+    mean of the bubble's square. At a bubble's own point no other bubble has a value, so a linear form whose quadrature
+    points are these takes to each bubble its share of each energy.
 
     Args:
         problem: whose elastic operator it is.
         bubbles: the space of bubbles.
     """
-    v, integrals = ufl.TestFunction(bubbles), []
-    for form, height, shares in _energies(problem):
-        each = [_over_cells(_energy(problem, form, height, axis)) for axis in range(problem.scales.dimension)]
+    d, v, integrals = problem.scales.dimension, ufl.TestFunction(bubbles), []
+    for form, heights, shares in _energies(problem):
+        each = [_over_cells(_energy(problem, form, heights, axis)) for axis in range(d)]
         for along in zip(*each, strict=True):
             density = ufl.dot(ufl.as_vector([integral.integrand() for integral in along]), v)
-            for share in sorted(set(shares.values())):
+            for share in sorted(set(shares.values()) - {0.0}):
                 rule = _rule([index for index, own in shares.items() if own == share])
                 integrals.append(along[0].reconstruct(integrand=share * density, metadata=rule))
     return nodal(ufl.Form(integrals))
 
 
-def _energies(problem: Problem) -> Iterator[tuple[Any, Any, Mapping[Index, float]]]:
-    """Functions whose energies make up those of a cell's bubbles: the form, the function, the bubbles' shares.
-
-    The energies of λ_a + λ_b and of the others' sum are one, since all together are constant.
-    """
-    d, cell = problem.scales.dimension, problem.space.mesh.topology.cell_name()
-    hats, of_bubbles = np.vstack([-np.ones(d), np.eye(d)]), of_cell(nodes.degree(problem.space), cell)
-    slopes = [*hats, *(hats[a] + hats[b] for a, b in itertools.combinations(range(d + 1), 2))]
-    upward = [tuple((one * np.sign(one[np.flatnonzero(one)[0]])).tolist()) for one in slopes]
-    of_slopes: dict[tuple[float, ...], dict[Index, float]] = {}
-    for index in of_bubbles:
-        for number, share in energy_shares(index, cell):
-            shares = of_slopes.setdefault(upward[number], {})
-            shares[index] = shares.get(index, 0.0) + share * 16 / ((d + 1) * (d + 2))
-    mesh = problem.space.mesh
+def _energies(problem: Problem) -> Iterator[tuple[Any, tuple[Any, Any], dict[Index, float]]]:
+    """The forms whose sum is a bubble's energy, the two functions that each is taken of, and the bubbles' shares."""
+    mesh, d = problem.space.mesh, problem.scales.dimension
+    cell, degree = mesh.topology.cell_name(), nodes.degree(problem.space)
+    barycentric, weights = quadrature(cell, 4 * degree)
+    values = {index: shape(index, barycentric) for index in of_cell(degree, cell)}
+    slopes = {
+        index: [shape(index, barycentric, a) - shape(index, barycentric, 0) for a in range(1, d + 1)]
+        for index in values
+    }
     place = ufl.JacobianInverse(mesh) * (ufl.SpatialCoordinate(mesh) - ufl.classes.CellVertices(mesh)[0, :])
-    for affine, shares in of_slopes.items():
-        yield problem.bulk.material, ufl.dot(ufl.as_vector(affine), place), shares
+    for a, b in itertools.combinations_with_replacement(range(d), 2):
+        count = 1.0 if a == b else 2.0
+        means = {index: round(count * float(weights @ (own[a] * own[b])), 12) for index, own in slopes.items()}
+        yield problem.bulk.material, (place[a], place[b]), means
     if problem.bulk.foundation is not None:
-        squares = {index: _mean_square(index, cell) for index in of_bubbles}
-        yield problem.bulk.foundation, fem.Constant(mesh, 1.0), squares
+        squares = {index: round(float(weights @ own**2), 12) for index, own in values.items()}
+        yield problem.bulk.foundation, (1.0, 1.0), squares
 
 
-def _energy(problem: Problem, form: Any, height: Any, axis: int) -> Any:
-    """The form of the energy of a function along an axis, in UFL."""
+def _energy(problem: Problem, form: Any, heights: tuple[Any, Any], axis: int) -> Any:
+    """A bilinear form of two functions along an axis, in UFL."""
     d, arguments = problem.scales.dimension, problem.bulk.form.arguments()
-    moved = ufl.as_vector([height if i == axis else 0.0 for i in range(d)])
-    return ufl.replace(form, dict.fromkeys(arguments, moved))
+    moved = (ufl.as_vector([height if i == axis else 0.0 for i in range(d)]) for height in heights)
+    return ufl.replace(form, dict(zip(arguments, moved, strict=True)))
 
 
 def _over_cells(form: Any) -> list[Any]:
@@ -374,40 +371,6 @@ def _rule(places: list[Index]) -> dict[str, Any]:
     points = [[part / sum(index) for part in index[1:]] for index in places]
     weights = [1 / math.factorial(len(point)) for point in points]
     return {"quadrature_rule": "custom", "quadrature_points": points, "quadrature_weights": weights}
-
-
-@functools.cache
-def energy_shares(index: Index, cell: str) -> list[tuple[int, float]]:
-    """The energy of a bubble as a sum of those of affine functions: numbers and shares, times (d + 1)(d + 2)/16.
-
-    The gradient is Σ ∂φ/∂λ_a ∇λ_a, so a(φ, φ) = Σ G_ab a(λ_a, λ_b), G_ab being the mean of ∂φ/∂λ_a ∂φ/∂λ_b.
-
-    Args:
-        index: of the bubble.
-        cell: the name of the cell's shape.
-
-    Returns:
-        First of λ_a by a, then of λ_a + λ_b by pairs a < b; those that are zero are left out.
-    """
-    barycentric, weights = quadrature(cell, 4 * sum(index))
-    slopes = [shape(index, barycentric, corner) for corner in range(len(index))]
-    mean = np.array([[np.sum(weights * a * b) for b in slopes] for a in slopes])
-    pairs = itertools.combinations(range(len(index)), 2)
-    shares = [2 * mean[a, a] - mean[a].sum() for a in range(len(index))] + [mean[a, b] for a, b in pairs]
-    rounded = np.round(np.array(shares) * len(index) * (len(index) + 1) / 16, 12)
-    return [(number, float(share)) for number, share in enumerate(rounded) if share]
-
-
-@functools.cache
-def _mean_square(index: Index, cell: str) -> float:
-    """The mean of the square of a bubble over a cell.
-
-    Args:
-        index: of the bubble.
-        cell: the name of the cell's shape.
-    """
-    barycentric, weights = quadrature(cell, 2 * sum(index))
-    return float(np.round(np.sum(weights * shape(index, barycentric) ** 2), 12))
 
 
 @dataclass(frozen=True, kw_only=True)
