@@ -277,18 +277,15 @@ def follow(system: System, interrupted: Callable[[], bool]) -> PathStart | None:
     except (InputError, SolverError):
         return None
     found = _on_first_rank(system, condensation.problem, interrupted)
-    start = None if found is None else _expanded(condensation, found)
+    start = None
+    if found is not None:
+        last, x = found.borne, None if found.x is None else condensation.expand(found.x)
+        start = PathStart(x=x, reason=found.reason)
+        if last is not None:
+            borne = Borne(u=condensation.displacement(last.x, last.factor), factor=last.factor)
+            start = replace(start, borne=borne)
     condensation.free()
     return start
-
-
-def _expanded(condensation: Condensation, found: FullLoad) -> PathStart:
-    """The same of the whole body. Collective."""
-    borne = None
-    if (last := found.borne) is not None:
-        borne = Borne(u=condensation.displacement(last.x, last.factor), factor=last.factor)
-    x = None if found.x is None else condensation.expand(found.x)
-    return PathStart(x=x, reason=found.reason, borne=borne)
 
 
 def _on_first_rank(system: System, problem: CondensedProblem, interrupted: Callable[[], bool]) -> FullLoad | None:

@@ -12,7 +12,7 @@ import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -210,22 +210,10 @@ def raise_python_error(error: PETSc.Error) -> None:
         raise cause
 
 
-class Solver(Protocol):
-    """What solves a system."""
-
-    def apply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve the system. Collective.
-
-        Args:
-            x: the load.
-            y: where the solution goes.
-        """
-
-
 class _Context:
     """The context of the PC, which refers to its owner weakly: nothing would free a circle via PETSc."""
 
-    def __init__(self, owner: Solver) -> None:
+    def __init__(self, owner: Any) -> None:
         self._owner = weakref.ref(owner)
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -235,11 +223,12 @@ class _Context:
         owner.apply(x, y)
 
 
-def applied_by(owner: Solver, matrix: PETSc.Mat) -> PETSc.PC:
+def applied_by(owner: Any, matrix: PETSc.Mat) -> PETSc.PC:
     """The PC. Collective.
 
     Args:
-        owner: what applies it; it must not have a method ``destroy``, which petsc4py would call with every PC.
+        owner: its method ``apply(x, y)`` solves for y of the load x; it must not have a method ``destroy``, which
+            petsc4py would call with every PC.
         matrix: what it preconditions.
     """
     pc = PETSc.PC().create(matrix.comm)
