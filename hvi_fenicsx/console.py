@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from .certify.certificate import Examination
@@ -198,7 +199,7 @@ def as_data(prepared: Preparation, factors: Mapping[str, LoadFactors]) -> dict[s
         "dofs": prepared.system.dofs,
         "solvability": prepared.solvability.summary(),
         "load_factors": {name: found.summary() for name, found in factors.items()},
-        "effects": [summary.as_dict() for summary in effect_summary.summaries(prepared.problem)],
+        "effects": [asdict(summary) for summary in effect_summary.summaries(prepared.problem)],
         "solver": solver(prepared),
         "warnings": list(prepared.warnings),
     }

@@ -58,11 +58,11 @@ class ContactField(Observable):
     @property
     def known_from_one_mesh(self) -> bool:
         """See :attr:`.Quantity.known_from_one_mesh`."""
-        return not self._last.prepared.problem.bulk.averages_dilatation
+        return not self._last.prepared.problem.bulk.averaged
 
     def add(self, level: AdaptiveLevel) -> None:
         """See :meth:`.Quantity.add`."""
-        if level.prepared.problem.bulk.averages_dilatation:
+        if level.prepared.problem.bulk.averaged:
             super().add(level)
         else:
             Quantity.add(self, level)

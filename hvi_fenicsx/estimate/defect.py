@@ -311,7 +311,7 @@ class VertexStiffness(BubbleStiffness):
         self.at_nodes = fem.Function(problem.space)
         bulk, moved = problem.bulk, self._in + self.at_nodes
         self.pressures = bulk.pressures(self.at_nodes)
-        self._dilated = [forms.compiled(form) for form in bulk.dilated(moved)]
+        self._dilated = [forms.compiled(part.dilated(moved)) for part in bulk.dilatations]
         tests = ufl.TestFunction(problem.space), ufl.TestFunction(bubbles)
         self._on_nodes, self._action = (
             forms.compiled(bulk.between(moved, v) + bulk.pressed(self.pressures, v)) for v in tests

@@ -111,7 +111,7 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
 
 def _discretisation(traces: LawTraces, inverse: DualNorm, energy: float) -> tuple[ErrorField | None, Array]:
     """The error, where it is known as a field, and η_K² of the owned cells; a(u_h, u_h) is the energy. Collective."""
-    if traces.problem.bulk.averages_dilatation:
+    if traces.problem.bulk.averaged:
         return None, defect.squares(traces, inverse)
     stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), DEFAULT.coupled[traces.degree - 1]
     if limit and not within_facets(traces):

@@ -75,7 +75,7 @@ class MeshBodies:
             mode: which body moves, and how.
         """
         every = self.fields(points, np.arange(len(points)), self.bodies[mode.body])
-        field = np.einsum("n,mnd->md", np.asarray(mode.coefficients), every)
+        field = np.einsum("n,mnd->md", mode.coefficients, every)
         return np.where((self.labels == mode.body)[:, None], field, 0.0)
 
 
@@ -170,16 +170,10 @@ def _names(domain: Domain, cells: Integers, bodies: Sequence[RigidBody]) -> list
         inside = np.concatenate(agree(domain.mesh.comm, np.unique(cells[domain.regions[name]])))
         if len(within := np.unique(inside)) == 1:
             regions.setdefault(int(within[0]), []).append(name)
-    return [
-        f"body {_listed(regions[i])}" if i in regions else f"body {i + 1} at {_point(body)}"
-        for i, body in enumerate(bodies)
-    ]
-
-
-def _listed(regions: Sequence[str]) -> str:
-    """Names of regions in words, without the regions `upper.core` of a body `upper` that is among them."""
-    return ", ".join(f'"{name}"' for name in regions if name.rpartition(".")[0] not in regions)
-
-
-def _point(body: RigidBody) -> str:
-    return "(" + ", ".join(f"{c:.4g}" for c in body.centre[: body.dimension] * body.length) + ")"
+    found = []
+    for i, body in enumerate(bodies):
+        own = regions.get(i, [])  # without the regions `upper.core` of a body `upper` that is among them
+        listed = ", ".join(f'"{name}"' for name in own if name.rpartition(".")[0] not in own)
+        at = ", ".join(f"{c:.4g}" for c in body.centre[: body.dimension] * body.length)
+        found.append(f"body {listed or f'{i + 1} at ({at})'}")
+    return found

@@ -133,7 +133,11 @@ def _problem(
         linear={**linear, **strains},
         conditions=conditions,
         fixed=fixed,
-        prescribed=_prescribed(context, contributions),
+        prescribed=tuple(
+            PrescribedComponent(c.component, context.part_facets[str(where)], c.value)
+            for where, _, contribution in contributions
+            for c in contribution.conditions
+        ),
         bounds=bounds,
         terms=terms,
         surfaces=tuple(surfaces.values()),
@@ -175,11 +179,3 @@ def _by_name(contributions: Sequence[PlacedContribution], kind: str) -> dict[str
             name = load_name(where, effect)
             found[name] = found[name] + form if name in found else form
     return found
-
-
-def _prescribed(context: DomainForms, contributions: Sequence[PlacedContribution]) -> tuple[PrescribedComponent, ...]:
-    return tuple(
-        PrescribedComponent(c.component, context.part_facets[str(where)], c.value)
-        for where, _, contribution in contributions
-        for c in contribution.conditions
-    )

@@ -13,7 +13,7 @@ second side ends.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,29 +138,22 @@ class Coupling:
     matrix: PETSc.Mat
     inverse: PETSc.Mat
 
-    def relative(self, u: Array) -> Array:
-        """T⁻¹ u of a local array, of which the owned values count; a local array. Collective."""
-        return self._local(self.inverse.mult, u)
+    def product(self, multiply: Callable[[PETSc.Vec, PETSc.Vec], None], values: Array) -> Array:
+        """A product with a local array, of which the owned values count, in its shape, ghosts updated. Collective.
 
-    def forces(self, values: Array) -> Array:
-        """Tᵀ f: forces on u, at the owned vertices (n, d), as forces on û. Collective."""
-        return self._local(self.matrix.multTranspose, values)[: values.size].reshape(values.shape)
-
-    def forces_on_bodies(self, values: Array) -> Array:
-        """T⁻ᵀ f: forces on û, at the owned vertices (n, d), as forces on the vertices of the bodies. Collective."""
-        return self._local(self.inverse.multTranspose, values)[: values.size].reshape(values.shape)
-
-    def _local(self, product: object, values: Array) -> Array:
-        """A product with a local array, as a local array with ghosts updated."""
+        Args:
+            multiply: by one of the matrices or its transpose.
+            values: of the owned vertices first.
+        """
         function = fem.Function(self.space)
         right, left = self.matrix.createVecs()
         right.array[:] = values.ravel()[: right.local_size]
-        product(right, left)  # type: ignore[operator]
+        multiply(right, left)
         function.x.array[: left.local_size] = left.array_r
         function.x.scatter_forward()
         right.destroy()
         left.destroy()
-        return np.array(function.x.array)
+        return function.x.array[: values.size].reshape(values.shape)
 
 
 def coupled(space: fem.FunctionSpace, interfaces: Sequence[RelativeRows]) -> Coupling | None:
@@ -177,7 +170,7 @@ def coupled(space: fem.FunctionSpace, interfaces: Sequence[RelativeRows]) -> Cou
     for one in interfaces:
         over = np.divide(1.0, one.weights, out=np.zeros(size), where=one.weights > 0.0)
         rows = csr_array((one.first - one.second).multiply(over[:, None]))
-        diagonal = np.asarray(rows.diagonal())
+        diagonal = rows.diagonal()
         own = diags_array(diagonal[start:end], offsets=0) @ eye_array(size, format="csr")[start:end]
         rest, scale = rows[start:end] - own, diagonal[start:end]
         unit = diags_array((scale != 0.0).astype(float), offsets=0) @ eye_array(size, format="csr")[start:end]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -57,13 +57,9 @@ class EffectSummary:
     terms: str
     bounds: int
     unknowns: int
-    output: tuple[str, ...]
+    output: list[str]
     solver: str
     role: Role
-
-    def as_dict(self) -> dict[str, object]:
-        """For ``check --json``."""
-        return {**asdict(self), "output": list(self.output)}
 
 
 def summaries(problem: Problem) -> list[EffectSummary]:
@@ -82,7 +78,7 @@ def _summary(problem: Problem, made: PlacedContribution, *, brings: bool) -> Eff
         terms=", ".join(_terms(contribution)) or "none",
         bounds=_bounded(problem, where) if contribution.bounds else 0,
         unknowns=total if brings else -_prescribed(problem, where, contribution),
-        output=tuple(_output(effect, contribution)),
+        output=list(_output(effect, contribution)),
         solver=_solver(contribution),
         role=role_of(effect, contribution),
     )
@@ -129,21 +125,15 @@ def _solver(contribution: Contribution) -> str:
 
 def table(found: Sequence[EffectSummary]) -> Iterator[str]:
     """The summaries as lines of aligned columns."""
-    rows = [("effect", "terms", "bounds", "unknowns", "output", "solver"), *map(_row, found)]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    rows = [("effect", "terms", "bounds", "unknowns", "output", "solver")]
+    for one in found:
+        bounds = f"{one.bounds:,}" if one.bounds else "none"
+        unknowns = f"{one.unknowns:+,}" if one.unknowns else "none"
+        outputs = ", ".join(one.output) or "none"
+        rows.append((f"{one.effect} on {one.where or 'the body'}", one.terms, bounds, unknowns, outputs, one.solver))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-
-
-def _row(summary: EffectSummary) -> tuple[str, ...]:
-    return (
-        f"{summary.effect} on {summary.where or 'the body'}",
-        summary.terms,
-        f"{summary.bounds:,}" if summary.bounds else "none",
-        f"{summary.unknowns:+,}" if summary.unknowns else "none",
-        ", ".join(summary.output) or "none",
-        summary.solver,
-    )
 
 
 def role_of(effect: Effect, contribution: Contribution) -> Role:

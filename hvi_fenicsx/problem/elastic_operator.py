@@ -119,7 +119,7 @@ class Bulk:
         form: a(u, v) in UFL, but for the volumetric part that is averaged by vertex.
         material: the part of ``form`` that depends on ε(u) and ε(v) only: a material's, not an elastic support's.
         foundation: the other part of it; None where there is none.
-        averaged: the volumetric parts that are averaged by vertex.
+        averaged: the volumetric parts that are averaged by vertex, in nearly incompressible regions.
         strains: linear forms of ε(v) (thermal strain) by the name of their load; no rigid motion feels them.
         across: parts of ∫ σ_33 q dx in a plane body (:attr:`.Contribution.across`).
         origin: what the operator is made from: two bulks of one mesh with equal origins have equal matrices.
@@ -159,11 +159,6 @@ class Bulk:
     def without_dilatation(self) -> Bulk:
         """The operator without what is averaged by vertex."""
         return replace(self, averaged=(), shared=None)
-
-    @property
-    def averages_dilatation(self) -> bool:
-        """Whether div u is averaged by vertex anywhere (nearly incompressible regions)."""
-        return bool(self.averaged)
 
     @property
     def volumetric_ratio(self) -> float:
@@ -279,14 +274,6 @@ class Bulk:
     def pressures(self, u: fem.Function) -> list[fem.Function]:
         """The averaged volumetric stress of each region in ``averaged``, P1 fields. Collective."""
         return [part.pressure(u) for part in self.dilatations]
-
-    def dilated(self, v: Any) -> list[Any]:
-        """The UFL forms ∫ φ_i div v dx of the regions in ``averaged``, φ_i being scalar P1.
-
-        Args:
-            v: a displacement of any space, or a sum of such.
-        """
-        return [part.dilated(v) for part in self.dilatations]
 
     def pressed(self, pressures: Sequence[fem.Function], v: Any) -> Any:
         """The UFL form of the work of averaged volumetric stresses in v.

@@ -91,23 +91,6 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
     )
 
 
-def check_facing(pair: Pair, overlaps: Overlaps) -> None:
-    """Refuse two sides that do not lie over each other anywhere.
-
-    Args:
-        pair: the sides.
-        overlaps: the intersections of their facets.
-
-    Raises:
-        InputError: there are none.
-    """
-    if not len(overlaps.areas):
-        raise InputError(
-            f'interface.{pair.name}.between: "{pair.sides.first}" and "{pair.sides.second}" do not face each other: '
-            "nowhere does a normal of the first meet a facet of the second; name sides that lie over each other"
-        )
-
-
 def check_carried(pair: Pair, overlaps: Overlaps, kept: Mask, busy: Mask) -> None:
     """Refuse an interface without a node that carries something, or a part of it that nothing carries.
 
@@ -204,7 +187,11 @@ def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken
     """
     pair = pairs[name]
     overlaps = facet_overlaps.overlaps(pair.first, pair.second)
-    check_facing(pair, overlaps)
+    if not len(overlaps.first):
+        raise InputError(
+            f'interface.{name}.between: "{pair.sides.first}" and "{pair.sides.second}" do not face each other: '
+            "nowhere does a normal of the first meet a facet of the second; name sides that lie over each other"
+        )
     others = [taken, pair.second.nodes.ravel()]
     others += [side.nodes.ravel() for n, p in pairs.items() if n != name for side in (p.first, p.second)]
     busy, covered = np.isin(pair.first.nodes, np.concatenate(others)), pair.covered(overlaps)

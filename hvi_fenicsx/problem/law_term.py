@@ -38,7 +38,7 @@ class LawTerm:
         length: what the law acts on is this length of the k components; None: the signed component, k = 1.
         free: 1 where a component is not prescribed, (m, d).
         mixity: how the energy of separation depends on the mode; None: it does not.
-        energies: by what the law is multiplied where it does, frozen at a state: changed by :meth:`freeze`, (m,).
+        energies: by what the law is multiplied where it does, frozen at a state: these numbers may change, (m,).
     """
 
     surface: Surface
@@ -64,14 +64,6 @@ class LawTerm:
             return self.energies
         share = self.length.slip_share(components, near)
         return np.where(np.isnan(share), self.energies, self.mixity.energy(np.nan_to_num(share)))
-
-    def freeze(self, energies: Array) -> None:
-        """Multiply the law by others from now on.
-
-        Args:
-            energies: by vertex, (m,).
-        """
-        self.energies[:] = energies
 
     @property
     def weights(self) -> Array:
@@ -112,18 +104,16 @@ class LawTerm:
         Args:
             components: along the directions, (m, k).
         """
-        size = components[:, 0] if self.length is None else self.length.of(components)
-        return size if np.all(self.stretch == 1.0) else self._off_rounding(size / self.stretch)
-
-    def _off_rounding(self, argument: Array) -> Array:
-        """Arguments (m,), on a convex kink where only rounding keeps them off: a bound may hold them there."""
-        for kink in self.law.convex.kinks:
-            argument = np.where(np.abs(argument - kink) <= DEFAULT.rounding * np.abs(kink), kink, argument)
+        argument = components[:, 0] if self.length is None else self.length.of(components)
+        if np.any(self.stretch != 1.0):
+            argument = argument / self.stretch
+            for kink in self.law.convex.kinks:  # a bound may hold it there, where only rounding keeps it off
+                argument = np.where(np.abs(argument - kink) <= DEFAULT.rounding * np.abs(kink), kink, argument)
         return argument
 
     def reach(self, near: float | Array) -> Array:
         """Distances of displacements, one for all or (m,), as distances of what j acts on, (m,)."""
-        return np.asarray(near / self.stretch, dtype=np.float64)
+        return near / self.stretch
 
     def gradient(self, components: Array) -> Array:
         """The derivative of the argument times stretch by the components (m, k); zero where a length is zero."""
@@ -149,7 +139,7 @@ class LawTerm:
             derivative: of j at u, (m,).
         """
         along = self.gradient(self.slip(u)) * (self.weights * derivative)[:, None]
-        return np.asarray(np.einsum("mk,mkd->md", along, self.directions) * self.free)
+        return np.einsum("mk,mkd->md", along, self.directions) * self.free
 
     def rate(self, u: Array, derivative: Array, second: Array) -> Array:
         """The tangent K of j', (m, d, d): times the weights it is that of the forces.

@@ -230,7 +230,7 @@ class Problem:
     @functools.cached_property
     def _relative_motions(self) -> tuple[Array, ...]:
         """The basis motions of each body at all local vertices, relative on interfaces, (n, motions, d) each."""
-        points, every = np.asarray(self.points / self.scales.length), np.arange(len(self.points), dtype=np.int32)
+        points, every = self.points / self.scales.length, np.arange(len(self.points))
         found = []
         for body in self.bodies:
             mine = (self.bodies.labels == body.index)[:, None, None]
@@ -248,7 +248,7 @@ class Problem:
         """
         if self.coupling is not None:
             return self._relative_motions[body.index][blocks]
-        return self.bodies.fields(np.asarray(self.points[blocks] / self.scales.length), blocks, body)
+        return self.bodies.fields(self.points[blocks] / self.scales.length, blocks, body)
 
     def interface_of(self, surface: Surface) -> Interface | None:
         """The interface whose first side it is; None for a part of the boundary.
@@ -260,15 +260,15 @@ class Problem:
 
     def relative(self, u: Array) -> Array:
         """A displacement as what bounds and laws see: relative on interfaces; both local arrays. Collective."""
-        return u if self.coupling is None else self.coupling.relative(u)
+        return u if self.coupling is None else self.coupling.product(self.coupling.inverse.mult, u)
 
     def combined(self, forces: Array) -> Array:
         """Forces by owned vertex (n, d) as those that bounds and laws balance: Tᵀ f. Collective."""
-        return forces if self.coupling is None else self.coupling.forces(forces)
+        return forces if self.coupling is None else self.coupling.product(self.coupling.matrix.multTranspose, forces)
 
     def on_bodies(self, forces: Array) -> Array:
         """Forces of bounds and laws by owned vertex (n, d) as those that act on the bodies. Collective."""
-        return forces if self.coupling is None else self.coupling.forces_on_bodies(forces)
+        return forces if self.coupling is None else self.coupling.product(self.coupling.inverse.multTranspose, forces)
 
 
 class FactoredProblem:
@@ -286,13 +286,13 @@ class FactoredProblem:
         for number in (number for number, name in enumerate(names) if name in scaled):
             conditions[number], values = _scaled_condition(problem, number)
             self._values.append((values, values.x.array.copy()))
-        moved = [bounds.move is not None and bounds.move.name in scaled for bounds in problem.bounds]
         bounds = [
-            replace(once, lower=once.lower.copy(), upper=once.upper.copy()) if moves else once
-            for once, moves in zip(problem.bounds, moved, strict=True)
+            replace(once, lower=once.lower.copy(), upper=once.upper.copy())
+            if once.move is not None and once.move.name in scaled
+            else once
+            for once in problem.bounds
         ]
-        pairs = zip(bounds, problem.bounds, strict=True)
-        self._bounds = [(own, once) for own, once in pairs if own is not once]
+        self._bounds = [(own, once) for own, once in zip(bounds, problem.bounds, strict=True) if own is not once]
         self._problem = replace(
             problem,
             linear=self._times_factor(problem.linear, scaled),

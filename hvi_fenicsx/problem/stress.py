@@ -53,7 +53,7 @@ def von_mises(sigma: Array) -> Array:
     first, second, third = (sigma[:, i, i] for i in range(3))
     apart = (first - second) ** 2 + (second - third) ** 2 + (third - first) ** 2
     shear = sigma[:, 0, 1] ** 2 + sigma[:, 1, 2] ** 2 + sigma[:, 0, 2] ** 2
-    return np.asarray(np.sqrt(apart / 2 + 3 * shear))
+    return np.sqrt(apart / 2 + 3 * shear)
 
 
 def space_of_stress(space: fem.FunctionSpace, shape: tuple[int, ...] = ()) -> fem.FunctionSpace:
@@ -103,7 +103,7 @@ def stress_of_parts(bulk: Bulk, u: fem.Function) -> Array:
     if values.shape[1] == 1:
         return values[:, 0]
     found = np.einsum("pk,ckij->cpij", nodes.middles_of_parts(bulk.space), values)
-    return np.asarray(found.reshape(-1, 3, 3))
+    return found.reshape(-1, 3, 3)
 
 
 def _nearest(space: fem.FunctionSpace, work: Any) -> Array:
@@ -122,7 +122,7 @@ def _nearest(space: fem.FunctionSpace, work: Any) -> Array:
         right.append(works.values())
         mass.append(masses.values().reshape(len(right[0]), basis))
     if basis == 1:  # a division, a tenth of the time
-        return np.asarray(np.stack(right, axis=1) / mass[0][:, None])
+        return np.stack(right, axis=1) / mass[0][:, None]
     return np.asarray(np.linalg.solve(np.stack(mass, axis=1), np.stack(right, axis=1)))
 
 

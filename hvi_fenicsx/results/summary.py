@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "estimate": _estimate(solution),
             "accuracy": None,
             "warnings": list(solution.warnings),
-            "effects": [summary.as_dict() for summary in effect_summary.summaries(problem)],
+            "effects": [asdict(summary) for summary in effect_summary.summaries(problem)],
             "scales": _scales(problem),
         }
     )

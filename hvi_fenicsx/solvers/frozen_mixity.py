@@ -51,7 +51,7 @@ def settled(task: SolveTask, found: LevelSolution) -> LevelSolution:
         if change <= found.system.thresholds.margin * task.options.tolerance:
             break
         for term, energies in zip(found.system.terms, anew, strict=True):
-            term.freeze(energies)
+            term.energies[:] = energies
         first = found.system.unknowns(found.result.u)
         found = nested_iteration.solve_from(task, found.system, first, found.levels)
         counts.add(found.result.counts)
@@ -66,7 +66,7 @@ def freeze(problem: Problem, u: fem.Function) -> None:
         u: the displacement, nondimensional, ghosts updated.
     """
     for term, energies in zip(problem.terms, _energies(problem, u), strict=True):
-        term.freeze(energies)
+        term.energies[:] = energies
 
 
 def _energies(problem: Problem, u: fem.Function) -> list[Array]:

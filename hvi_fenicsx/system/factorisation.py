@@ -128,7 +128,7 @@ def form_of(system: System, own_prefix: str = "") -> FactorForm:
         own_prefix: of the options of its factorisation: the form with pressures suits no solver that the user chose.
     """
     quadratic = nodes.degree(system.problem.space) > 1
-    if quadratic and system.problem.bulk.averages_dilatation and not _is_chosen(own_prefix):
+    if quadratic and system.problem.bulk.averaged and not _is_chosen(own_prefix):
         return SaddlePointForm(system)
     return FactorForm(system)
 

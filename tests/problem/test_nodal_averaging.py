@@ -76,8 +76,8 @@ def test_no_locking_beside_quadratic_elements() -> None:
 
 
 def test_plain_p1_is_kept_where_it_does_not_lock() -> None:
-    assert not solve(scene(4, 0.3)).problem.bulk.averages_dilatation
-    assert solve(scene(4, 0.46)).problem.bulk.averages_dilatation
+    assert not solve(scene(4, 0.3)).problem.bulk.averaged
+    assert solve(scene(4, 0.46)).problem.bulk.averaged
 
 
 @pytest.mark.parametrize("load", [1.0, 3.0])
