@@ -24,8 +24,7 @@ from .contribution import (
     Contribution,
     Direction,
     NormalBounds,
-    ObstacleForce,
-    ObstacleMove,
+    ObstacleMotion,
     Towards,
 )
 from .elasticity import Anisotropic, Isotropic, Orthotropic

@@ -23,7 +23,7 @@ from ..geometry import ROUNDING
 from ..schema import ExistingFile, Finite, Positive, Table, choose, refusal
 from ..typing import Array
 from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, Sides, from_python
-from .contribution import Contribution, NormalBounds, ObstacleForce, ObstacleMove
+from .contribution import Contribution, NormalBounds, ObstacleMotion
 from .values import FormulaField, Value, as_value, require_components
 
 Vector = Annotated[
@@ -162,9 +162,9 @@ class Obstacle(Table):
         move = force = None
         if self.displacement is not None:
             before = self.model_copy(update={"displacement": None}).lower()
-            move = ObstacleMove(vector=self.displacement, before=before, straight=self.moves_straight)
+            move = ObstacleMotion(self.displacement, before, self.moves_straight)
         if self.force is not None:
-            force = ObstacleForce(vector=self.force, ahead=self.moved(1.0).lower(), straight=self.moves_straight)
+            force = ObstacleMotion(self.force, self.moved(1.0).lower(), self.moves_straight)
         return NormalBounds(lower=self.lower(), upper=None, towards=self, move=move, force=force)
 
     def table(self, context: Any = None) -> dict[str, Any]:

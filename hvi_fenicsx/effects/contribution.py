@@ -96,32 +96,17 @@ class Towards(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class ObstacleMove:
-    """The displacement of an obstacle.
+class ObstacleMotion:
+    """What moves an obstacle: a displacement, or a force along which it slides.
 
     Attributes:
-        vector: m.
-        before: the lower bound without it, m.
-        straight: whether the bound changes in proportion to it.
-    """
-
-    vector: tuple[float, ...]
-    before: SpatialValue
-    straight: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ObstacleForce:
-    """The force that presses an obstacle, which slides along it.
-
-    Attributes:
-        vector: N/m in 2D, N in 3D.
-        ahead: the lower bound where it has moved by a metre, m.
+        vector: m; of a force N/m in 2D, N in 3D.
+        lower: the lower bound without the displacement, or where it has slid by a metre along the force, m.
         straight: whether the bound changes in proportion to the way.
     """
 
     vector: tuple[float, ...]
-    ahead: SpatialValue
+    lower: SpatialValue
     straight: bool
 
 
@@ -142,8 +127,8 @@ class NormalBounds:
     upper: SpatialValue | None
     towards: Towards | None = None
     measured: bool = False
-    move: ObstacleMove | None = None
-    force: ObstacleForce | None = None
+    move: ObstacleMotion | None = None
+    force: ObstacleMotion | None = None
 
 
 ONE = Formula(1)

@@ -336,12 +336,14 @@ class Cohesion(LawEffect):
 
     def check(self, dimension: int) -> None:
         """The law is known for δ ≥ 0 alone, and bonds do not push apart."""
-        if not self.law.even:
-            reason = "is one-sided; cohesion acts on δ, which is never negative: leave one_sided out"
-            raise InputError(f'law = "{self.law.name}" {reason}')
-        if self.mixity is not None and float(self.law.right(np.zeros(1))[0]) > 0.0:
-            reason = "has a traction at rest, where there is no mode yet; with mixity let it rise from 0 on a short way"
-            raise InputError(f'law = "{self.law.name}" {reason}')
-        if self.law.c4 > 0.0:
-            reason = "has negative tractions, which would push the sides apart; use adhesion and friction instead"
+        wrong = {
+            "is one-sided; cohesion acts on δ, which is never negative: leave one_sided out": not self.law.even,
+            "has a traction at rest, where there is no mode yet; with mixity let it rise from 0 on a short way": (
+                self.mixity is not None and float(self.law.right(np.zeros(1))[0]) > 0.0
+            ),
+            "has negative tractions, which would push the sides apart; use adhesion and friction instead": (
+                self.law.c4 > 0.0
+            ),
+        }
+        for reason in (text for text, holds in wrong.items() if holds):
             raise InputError(f'law = "{self.law.name}" {reason}')

@@ -305,9 +305,5 @@ class Temperature(OneValue):
 
 def _heated(context: FormContext, where: str | None) -> list[tuple[Elasticity, Any]]:
     """The materials in a region, with the measures of where they overlap it."""
-    found = []
-    for region, material in context.materials:
-        cells = context.cells(where, region)
-        if isinstance(material, Elasticity) and cells is not None:
-            found.append((material, cells))
-    return found
+    found = ((m, context.cells(where, region)) for region, m in context.materials)
+    return [(m, cells) for m, cells in found if isinstance(m, Elasticity) and cells is not None]

@@ -89,17 +89,17 @@ def mesh(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> dmesh.M
         return compat.simplex_mesh(comm, simplices, _points(comm, size, cells), kind)
     parts = [part_of_rank(cells, comm.size, rank) for rank in range(comm.size)]
     lower, upper = parts[comm.rank]
-    own, counts = vertices(comm, parts), upper - lower
+    (places, local, index_map), counts = vertices(comm, parts), upper - lower
     numbers = _simplices(np.zeros_like(counts), counts, counts)
-    lines = [np.linspace(0.0, s, n + 1)[at] for s, n, at in zip(size, cells, own.places.T, strict=True)]
+    lines = [np.linspace(0.0, s, n + 1)[at] for s, n, at in zip(size, cells, places.T, strict=True)]
     whole = comm.size == 1  # dolfinx alone can say which facets ranks share
     return compat.mesh_of_cells(
         comm,
         np.column_stack(lines),
-        own.local[numbers],
-        index_map=(own.owned, own.ghosts, own.owners),
-        inputs=_flat(own.places, cells),
-        facets=facets(numbers, _steps(counts), len(own.local)) if whole else None,
+        local[numbers],
+        index_map=index_map,
+        inputs=_flat(places, cells),
+        facets=facets(numbers, _steps(counts), len(local)) if whole else None,
     )
 
 
@@ -199,31 +199,17 @@ Box = tuple[Integers, Integers]
 """The first cell of a part, and the one after the last, (d,) both."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PartVertices:
-    """The vertices of one rank's part.
-
-    Attributes:
-        places: their integer coordinates in the grid, those that the rank owns first, (n, d).
-        local: the local number of each vertex of the part's own grid, x running fastest, (n,).
-        owned: how many the rank owns.
-        ghosts: the global numbers of the others, (g,).
-        owners: the ranks that own these, (g,).
-    """
-
-    places: Integers
-    local: Entities
-    owned: int
-    ghosts: Integers
-    owners: Entities
-
-
-def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> PartVertices:
+def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> tuple[Integers, Entities, tuple[int, Integers, Entities]]:
     """The vertices of this rank's part. Collective.
 
     Args:
         comm: the ranks.
         parts: of all ranks; those without cells have no vertices.
+
+    Returns:
+        Their integer coordinates in the grid, those that the rank owns first, (n, d); the local number of each vertex
+        of the part's own grid, x running fastest, (n,); how many the rank owns, the global numbers of the others, and
+        their owners.
     """
     owner = _owners(parts, comm.rank)
     own = owner == comm.rank
@@ -237,7 +223,7 @@ def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> PartVertices:
     for rank in np.unique(others):
         at = others == rank
         ghosts[at] = first[rank] + _numbers_of_owner(parts, int(rank), places[owned:][at])
-    return PartVertices(places=places, local=local, owned=owned, ghosts=ghosts, owners=others)
+    return places, local, (owned, ghosts, others)
 
 
 def _counts(part: Box) -> Integers:

@@ -83,7 +83,9 @@ def coarsen(domain: Domain, factor: float) -> Domain | None:
     mesh = compat.simplex_mesh(comm, mine, points[: len(points) * (comm.rank == 0)], domain.mesh.topology.cell_name())
     sides, regions = _sides(domain, mesh, surface), _regions(domain, mesh, cells)
     coarse = replace(domain, mesh=mesh, sides=sides, regions=regions, shared=None)
-    return coarse if _similar(domain, coarse) else None
+    before, after = measures(domain), measures(coarse)
+    similar = all(abs(after[name] - size) <= DEFAULT.remeshed_size * size for name, size in before.items())
+    return coarse if similar else None
 
 
 def _sample(domain: Domain) -> _CellSample:
@@ -232,12 +234,6 @@ def _sides(domain: Domain, mesh: dmesh.Mesh, surface: _Surface) -> dict[str, Ent
 def _regions(domain: Domain, mesh: dmesh.Mesh, cells: _CellSample) -> dict[str, Entities]:
     within = cells.within[_nearest(cells.midpoints, owned_corners(mesh).mean(axis=1))]
     return {name: np.flatnonzero(within[:, i]).astype(np.int32) for i, name in enumerate(sorted(domain.regions))}
-
-
-def _similar(fine: Domain, coarse: Domain) -> bool:
-    """Whether volume and areas differ by little, and no region is lost. Collective."""
-    (before, after) = (measures(domain) for domain in (fine, coarse))
-    return all(abs(after[name] - size) <= DEFAULT.remeshed_size * size for name, size in before.items())
 
 
 def measures(domain: Domain) -> dict[tuple[str, str], float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from dolfinx import mesh as dmesh
 from .. import compat
 from ..errors import InputError
 from ..geometry import spot
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, refuse
 from ..typing import Entities
 from . import curved
 from .domain import Domain
@@ -102,10 +102,9 @@ def _check_folds(mesh: dmesh.Mesh) -> None:
     d = mesh.geometry.dim
     points, cells = mesh.geometry.x[:, :d], compat.geometry_dofmap(mesh)[:, : d + 1].astype(np.int64)
     folded = folded_cells(points, cells)
-    middles = [spot(points[cells[k]].mean(axis=0)) for k in folded[:1]]
-    found = [middle for rank in agree(mesh.comm, middles) for middle in rank]
-    if found:
-        raise InputError(f"body: the mesh is folded at {found[0]}: cells lie over each other there; move its vertices")
+    middles = (spot(points[cells[k]].mean(axis=0)) for k in folded[:1])
+    text = "cells lie over each other there; move its vertices"
+    refuse(mesh.comm, (f"body: the mesh is folded at {middle}: {text}" for middle in middles))
 
 
 def _named(mesh: dmesh.Mesh, tags: Any, dimension: int, names: Mapping[str, int]) -> dict[str, Entities]:
@@ -126,17 +125,7 @@ def _named(mesh: dmesh.Mesh, tags: Any, dimension: int, names: Mapping[str, int]
 
 
 def _check_outer(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> None:
-    found = [side for rank in agree(mesh.comm, list(_with_inner_facets(mesh, sides))) for side in rank]
-    if found:
-        raise InputError(
-            f"body: the side {found[0]!r} has facets inside of the body; tag facets of its surface only "
-            "(dolfinx.mesh.exterior_facet_indices)"
-        )
-
-
-def _with_inner_facets(mesh: dmesh.Mesh, sides: Mapping[str, Entities]) -> Iterator[str]:
-    d = mesh.topology.dim
-    offsets = mesh.topology.connectivity(d - 1, d).offsets
-    for name, facets in sides.items():
-        if np.any(np.diff(offsets)[facets] > 1):
-            yield name
+    cells = np.diff(mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim).offsets)
+    text = "has facets inside of the body; tag facets of its surface only (dolfinx.mesh.exterior_facet_indices)"
+    inner = (name for name, facets in sides.items() if np.any(cells[facets] > 1))
+    refuse(mesh.comm, (f"body: the side {name!r} {text}" for name in inner))

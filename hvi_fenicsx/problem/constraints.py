@@ -10,7 +10,7 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..effects import Condition, Effect, NormalBounds, ObstacleForce, Towards, load_name
+from ..effects import Condition, Effect, NormalBounds, ObstacleMotion, Towards, load_name
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..geometry import spot
@@ -152,18 +152,18 @@ def _bounds(
     upper = open_by - value(bounds.lower) if bounds.lower else value(None)
     move = None
     if bounds.move is not None:
-        by = upper + value(bounds.move.before) if bounds.move.straight else np.zeros(len(upper))
+        by = upper + value(bounds.move.lower) if bounds.move.straight else np.zeros(len(upper))
         move = BoundsMove(name=load_name(where.part, effect), by=by, straight=bounds.move.straight)
     force = None
     if bounds.force is not None:
-        ahead = -value(bounds.force.ahead) if bounds.force.straight else upper
+        ahead = -value(bounds.force.lower) if bounds.force.straight else upper
         force = _pressed(load_name(where.part, effect), bounds.force, ahead - upper, scales)
         if not any(agree(context.domain.mesh.comm, bool(np.any(force.rate < 0.0)))):
             raise InputError(f"boundary.{force.name}: the force moves the obstacle away from the body; turn it round")
     return Bounds(where, -value(bounds.upper), upper, move, force)
 
 
-def _pressed(name: str, stated: ObstacleForce, moved: Array, scales: Scales) -> BoundsForce:
+def _pressed(name: str, stated: ObstacleMotion, moved: Array, scales: Scales) -> BoundsForce:
     """The force on an obstacle, nondimensional.
 
     Args:
