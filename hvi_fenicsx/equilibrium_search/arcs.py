@@ -113,17 +113,17 @@ class ArcTable:
     @cached_property
     def before(self) -> Array:
         """The traction at the end of each arc; at the anchor where that is infinite."""
-        return np.asarray(self.tractions + self.slopes * (_finite(self.high, self.anchors) - self.anchors))
+        return self.tractions + self.slopes * (_finite(self.high, self.anchors) - self.anchors)
 
     @cached_property
     def after(self) -> Array:
         """The traction at the begin of each arc; at the anchor where that is infinite."""
-        return np.asarray(self.tractions + self.slopes * (_finite(self.low, self.anchors) - self.anchors))
+        return self.tractions + self.slopes * (_finite(self.low, self.anchors) - self.anchors)
 
     @cached_property
     def last(self) -> Array:
         """Where the chains end, (n,)."""
-        return np.asarray(np.where(self.low < INF, self.high, -INF).max(axis=1))
+        return np.where(self.low < INF, self.high, -INF).max(axis=1)
 
     @cached_property
     def ends(self) -> Array:
@@ -188,7 +188,7 @@ class ArcTable:
         before, after = self._around_ends
         marks[:, 0::2] = self.ends + before / scale[:, None]
         marks[:, 1::2] = self.ends + after / scale[:, None]
-        return np.asarray(np.maximum((marks <= z[:, None]).sum(axis=1) - 1, 0), dtype=np.int64)
+        return np.maximum((marks <= z[:, None]).sum(axis=1) - 1, 0)
 
     @cached_property
     def _around_ends(self) -> tuple[Array, Array]:
@@ -211,11 +211,11 @@ class ArcTable:
     @cached_property
     def rounding(self) -> Array:
         """The size of a jump of the traction that is rounding, (n,)."""
-        return np.asarray(LIMITS.rounding * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1))
+        return LIMITS.rounding * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1)
 
     def at(self, x: Array) -> Integers:
         """The arc that holds x, of the two at a joint the left one; (n,)."""
-        return np.asarray((self.high[:, :-1] < x[:, None]).sum(axis=1), dtype=np.int64)
+        return (self.high[:, :-1] < x[:, None]).sum(axis=1)
 
     def around(self, x: Array) -> tuple[Array, Array]:
         """The begin and the end of the arcs that hold x, (n,) each."""
@@ -226,7 +226,7 @@ class ArcTable:
         """φᵢ(xᵢ), (n,)."""
         rows, k = np.arange(len(x)), self.at(x)
         d = x - self.anchors[rows, k]
-        return np.asarray(self.values[rows, k] + (self.tractions[rows, k] + 0.5 * self.slopes[rows, k] * d) * d)
+        return self.values[rows, k] + (self.tractions[rows, k] + 0.5 * self.slopes[rows, k] * d) * d
 
     def meets(self, low: Array, high: Array) -> Mask:
         """Which arcs have more than a point in common with a box, (n, m); where the box is a point, its arc.
@@ -239,7 +239,7 @@ class ArcTable:
         points = np.flatnonzero(low >= high)
         inside[points] = False
         inside[points, self.at(low)[points]] = True
-        return np.asarray(inside)
+        return inside
 
     def drops(self, low: Array, high: Array) -> Array:
         """The largest drop of the traction strictly inside a box, (n,); 0 where it only rises.
@@ -251,7 +251,7 @@ class ArcTable:
         inside = (self.high[:, :-1] > low[:, None]) & (self.high[:, :-1] < high[:, None])
         fall = np.where(inside, self.before[:, :-1] - self.after[:, 1:], 0.0)
         fall = np.where(fall > self.rounding[:, None], fall, 0.0)
-        return np.asarray(fall.max(axis=1, initial=0.0))
+        return fall.max(axis=1, initial=0.0)
 
     def least_slope(self, low: Array, high: Array) -> Array:
         """The least slope of the arcs that meet a box, (n,).
@@ -260,16 +260,16 @@ class ArcTable:
             low: of the box, (n,).
             high: of the box, (n,).
         """
-        return np.asarray(np.where(self.meets(low, high), self.slopes, np.inf).min(axis=1))
+        return np.where(self.meets(low, high), self.slopes, np.inf).min(axis=1)
 
     def rates(self, t: Array) -> tuple[Array, Array]:
         """The tractions right of and left of t, (n,) each."""
         rows = np.arange(len(t))
-        behind, k = np.asarray((self.high <= t[:, None]).sum(axis=1), dtype=np.int64), self.at(t)
+        behind, k = (self.high <= t[:, None]).sum(axis=1), self.at(t)
         after, before = (
             self.tractions[rows, i] + self.slopes[rows, i] * (t - self.anchors[rows, i]) for i in (behind, k)
         )
-        return np.asarray(after), np.asarray(before)
+        return after, before
 
 
 def _finite(ends: Array, others: Array) -> Array:

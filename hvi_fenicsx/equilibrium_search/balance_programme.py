@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -21,15 +22,6 @@ from .relaxation import Relaxation
 from .scalar_problem import Box, ScalarProblem
 from .thresholds import EPSILON, LIMITS
 from .weighed_balance import Graphs, Split, weighed
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Points:
-    """Points of the graphs: unknown, displacement and traction, (m,) each."""
-
-    owner: Integers
-    x: Array
-    t: Array
 
 
 class BalanceProgramme:
@@ -44,45 +36,45 @@ class BalanceProgramme:
 
     def __init__(self, problem: ScalarProblem, split: Split, low: Array, high: Array) -> None:
         self._problem, self._split, self._low, self._high = problem, split, low, high
-        self._points = _points(Graphs.of(problem, low, high), split.diagonal)
+        self._owner, self._x, self._t = _points(Graphs.of(problem, low, high), split.diagonal)
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
         below, above = np.flatnonzero(low <= problem.lower), np.flatnonzero(high >= problem.upper)
         self._pushed = np.concatenate([below, above])
         self._push = np.concatenate([-np.ones(below.size), np.ones(above.size)])
         self._bounds = np.concatenate([problem.lower[below], problem.upper[above]])
         self._force_scale, self._unit = self._scales()
-        self._programme = self._made()
+        self.programme = self._made()
 
     def _scales(self) -> tuple[Array, float]:
         """The scale of each force, and that of the energy."""
-        n, points = self._problem.size, self._points
+        n = self._problem.size
         most, least = np.full(n, -np.inf), np.full(n, np.inf)
-        np.maximum.at(most, points.owner, points.t)
-        np.minimum.at(least, points.owner, points.t)
+        np.maximum.at(most, self._owner, self._t)
+        np.minimum.at(least, self._owner, self._t)
         forces = np.maximum(most - least, np.abs(self._problem.stiffness) @ self._half)
         forces = np.maximum(forces, LIMITS.enough * float(forces.max()) + 1e-300)
         largest = np.maximum(np.abs(most), np.abs(least)) + np.abs(self._problem.force)
         return forces, float(largest @ self._half) + 1e-300
 
     def _made(self) -> Programme:
-        problem, n, points, scale, unit = self._problem, self._problem.size, self._points, self._force_scale, self._unit
-        matrix, middle, half, owner = self._split.matrix, self._middle, self._half, self._points.owner
-        away = points.x - middle[owner]
+        problem, n, scale, unit = self._problem, self._problem.size, self._force_scale, self._unit
+        matrix, middle, half, owner = self._split.matrix, self._middle, self._half, self._owner
+        away = self._x - middle[owner]
         along = np.divide(away, half[owner], out=np.zeros_like(away), where=half[owner] > 0.0)
         pull = 2.0 * (matrix @ middle) - problem.force
-        cost = self._split.diagonal[owner] * points.x**2 + points.x * points.t + pull[owner] * away
+        cost = self._split.diagonal[owner] * self._x**2 + self._x * self._t + pull[owner] * away
         price = scale * float(np.max(np.abs([self._low, self._high]))) / (LIMITS.enough * unit)
         pushing = self._push * self._bounds * scale[self._pushed] / unit
         spare, each = np.zeros(len(self._push) + 2 * n), np.arange(n)
         ones = np.ones(n)
         return Programme(
             matrix=problem.stiffness * half / scale[:, None],
-            curvature=np.asarray(2.0 * (matrix * half) * half[:, None] / unit),
+            curvature=2.0 * (matrix * half) * half[:, None] / unit,
             force=(problem.force - problem.stiffness @ middle) / scale,
             owner=np.concatenate([owner, self._pushed, each, each]),
             factors=np.stack(
                 [
-                    np.concatenate([points.t / scale[owner], self._push, ones, -ones]),
+                    np.concatenate([self._t / scale[owner], self._push, ones, -ones]),
                     np.concatenate([-along, spare]),
                     np.concatenate([np.ones(len(owner)), spare]),
                 ]
@@ -90,10 +82,6 @@ class BalanceProgramme:
             cost=np.concatenate([cost / unit, pushing, price, price]),
             start=np.concatenate([1.0 / np.bincount(owner, minlength=n)[owner], np.ones(len(spare))]),
         )
-
-    def iterates(self) -> Iterator[Iterate]:
-        """The steps of the method."""
-        return iterates(self._programme, LIMITS.most_steps, LIMITS.zero, LIMITS.nearly)
 
     def weights(self, here: Iterate) -> tuple[Array, Array]:
         """The weights and the point of an iterate, (n,) each.
@@ -104,8 +92,8 @@ class BalanceProgramme:
         return -here.duals[0] * self._unit / self._force_scale, self._middle + self._half * here.x
 
 
-def _points(graphs: Graphs, diagonal: Array) -> _Points:
-    """The ends of arcs, and some points between them where h is convex."""
+def _points(graphs: Graphs, diagonal: Array) -> tuple[Integers, Array, Array]:
+    """The ends of arcs, and some points between them where h is convex: unknown, displacement, traction, (m,) each."""
     owner, k = np.nonzero(graphs.meets)
     begin, end = graphs.begin[owner, k], graphs.end[owner, k]
     inner = np.flatnonzero((diagonal[owner] + graphs.slope[owner, k] > 0.0) & (end > begin))
@@ -114,45 +102,37 @@ def _points(graphs: Graphs, diagonal: Array) -> _Points:
     x = np.concatenate([begin, end, *(begin[inner] + share * (end - begin)[inner] for share in quarters)])
     each = np.concatenate(which)
     owner, k = owner[each], k[each]
-    return _Points(owner=owner, x=x, t=graphs.offset[owner, k] + graphs.slope[owner, k] * x)
+    return owner, x, graphs.offset[owner, k] + graphs.slope[owner, k] * x
 
 
-class BalanceTest:
-    """The test for one problem.
+def left_of(relaxation: Relaxation, cell: Box, cut: Callable[[], bool]) -> Box | None:
+    """What is left of a cell; None if no stationary point is in it.
 
     Args:
         relaxation: of the problem.
+        cell: the cell.
+        cut: whether to be content with less of a proof, asked at each step of the programme.
     """
-
-    def __init__(self, relaxation: Relaxation) -> None:
-        self._relaxation, self._problem = relaxation, relaxation.problem
-
-    def smaller(self, cell: Box, cut: Callable[[], bool] = lambda: False) -> Box | None:
-        """What is left of a cell; None if no stationary point is in it.
-
-        Args:
-            cell: the cell.
-            cut: whether to be content with less of a proof, asked at each step of the programme.
-        """
-        split = Split.of(self._problem, self._relaxation.diagonal(cell.low, cell.high))
-        if not np.isfinite(split.short):
-            return cell
-        programme, best = BalanceProgramme(self._problem, split, cell.low, cell.high), None
-        for step, here in enumerate(programme.iterates()):
-            if cut():
+    problem = relaxation.problem
+    split = Split.of(problem, relaxation.diagonal(cell.low, cell.high))
+    if not np.isfinite(split.short):
+        return cell
+    programme, best = BalanceProgramme(problem, split, cell.low, cell.high), None
+    for step, here in enumerate(iterates(programme.programme)):
+        if cut():
+            break
+        if step % 3 == 0 and 4 * step >= LIMITS.most_steps:
+            proof = weighed(problem, split, (cell.low, cell.high), *programme.weights(here))
+            if proof.excludes:
+                return None
+            if best is not None and not proof.total > best.total + LIMITS.enough * abs(best.total):
                 break
-            if step % 3 == 0 and 4 * step >= LIMITS.most_steps:
-                proof = weighed(self._problem, split, (cell.low, cell.high), *programme.weights(here))
-                if proof.excludes:
-                    return None
-                if best is not None and not proof.total > best.total + LIMITS.enough * abs(best.total):
-                    break
-                if np.isfinite(proof.total):
-                    best = proof
-        if best is None:
-            return cell
-        ends = best.smaller(cell.low, cell.high)
-        return None if ends is None else Box.around(*ends, cell.x)
+            if np.isfinite(proof.total):
+                best = proof
+    if best is None:
+        return cell
+    ends = best.smaller(cell.low, cell.high)
+    return None if ends is None else Box.around(*ends, cell.x)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,11 +163,10 @@ class Programme:
 
     def prices(self, duals: Array) -> Array:
         """What the equations' duals (3, n) make of each column, (m,)."""
-        return np.asarray((self.factors * duals[:, self.owner]).sum(axis=0))
+        return (self.factors * duals[:, self.owner]).sum(axis=0)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Iterate:
+class Iterate(NamedTuple):
     """Where the method is.
 
     Attributes:
@@ -202,37 +181,20 @@ class Iterate:
     shares: Array
     reduced: Array
 
-    @property
-    def _parts(self) -> tuple[Array, ...]:
-        return self.x, self.duals, self.shares, self.reduced
 
-    def moved(self, step: tuple[Array, ...], close: float) -> Iterate:
-        """The iterate after a step, or the share of it that leaves shares and reduced costs positive.
-
-        Args:
-            step: the changes.
-            close: how near the first of these may come to zero, as a share of the way there.
-        """
-        way = min(close * _most(self.shares, step[2]), close * _most(self.reduced, step[3]))
-        x, duals, shares, reduced = (part + way * change for part, change in zip(self._parts, step, strict=True))
-        return Iterate(x=x, duals=duals, shares=shares, reduced=reduced)
-
-
-def iterates(programme: Programme, most_steps: int, enough: float, close: float) -> Iterator[Iterate]:
+def iterates(programme: Programme) -> Iterator[Iterate]:
     """The steps of the method, until it ends or rounding stops it.
 
     Args:
         programme: the programme.
-        most_steps: how many at most.
-        enough: mean product of shares and reduced costs, and residual, that end the steps.
-        close: share of the way to the next zero of a share or a reduced cost.
     """
     n, z = len(programme.force), programme.start
     here = Iterate(x=np.zeros(n), duals=np.zeros((3, n)), shares=z, reduced=np.maximum(np.abs(programme.cost), 1.0))
-    for _ in range(most_steps):
+    for _ in range(LIMITS.most_steps):
         yield here
         rest = _rest(programme, here)
-        if here.shares @ here.reduced < enough * len(z) and max(float(np.abs(r).max()) for r in rest) < enough:
+        off = max(float(here.shares @ here.reduced) / len(z), *(float(np.abs(r).max()) for r in rest))
+        if off < LIMITS.zero:
             return
         try:
             with np.errstate(over="ignore", invalid="ignore"):
@@ -241,7 +203,8 @@ def iterates(programme: Programme, most_steps: int, enough: float, close: float)
             return
         if not all(np.all(np.isfinite(change)) for change in step):
             return
-        here = here.moved(step, close)
+        way = LIMITS.nearly * min(_most(here.shares, step[2]), _most(here.reduced, step[3]))
+        here = Iterate(*(part + way * change for part, change in zip(here, step, strict=True)))
 
 
 def _rest(programme: Programme, here: Iterate) -> tuple[Array, Array, Array]:
@@ -275,7 +238,7 @@ class _Newton:
         for i, j in np.ndindex(3, 3):
             blocks[:, i, j] = np.bincount(owner, factors[i] * factors[j] * self._ratio, n)
         size = np.trace(blocks, axis1=1, axis2=2)
-        return np.asarray(np.linalg.inv(blocks + (4.0 * EPSILON * (size + 1.0))[:, None, None] * np.eye(3)))
+        return np.linalg.inv(blocks + (4.0 * EPSILON * (size + 1.0))[:, None, None] * np.eye(3))
 
     def step(self) -> tuple[Array, Array, Array, Array]:
         """The changes of x, duals, shares and reduced costs."""
@@ -294,7 +257,7 @@ class _Newton:
         return dx, du, (wanted - self._z * ds) / self._s, ds
 
     def _times(self, right: Array) -> Array:
-        return np.asarray(np.einsum("nij,jn->in", self._inverse, right))
+        return np.einsum("nij,jn->in", self._inverse, right)
 
 
 def _most(values: Array, change: Array) -> float:

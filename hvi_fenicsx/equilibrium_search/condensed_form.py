@@ -240,13 +240,13 @@ def _apart(places: Array) -> Array:
     order = np.argsort(places, kind="stable")
     ordered = places[order]
     begins = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > LIMITS.rounding * np.abs(ordered))
-    return np.asarray(places[np.minimum.reduceat(order, begins)])
+    return places[np.minimum.reduceat(order, begins)]
 
 
 def _middle_tractions(law: Superpotential, begin: Array, end: Array) -> Array:
     """Tractions in the middles that give the energies at both ends, (n,)."""
     ends = 0.5 * (law.right(begin) + law.left(end))
-    return np.asarray(2.0 * (law.value(end) - law.value(begin)) / (end - begin) - ends)
+    return 2.0 * (law.value(end) - law.value(begin)) / (end - begin) - ends
 
 
 def _samples(begin: Array, end: Array) -> tuple[Array, Array]:
@@ -269,7 +269,7 @@ def _slopes_apart(law: Superpotential, x: Array, traction: Array) -> Array:
     step, ends = np.diff(x, axis=1), law.derivatives(x.ravel())[1].reshape(x.shape)
     apart = np.abs(np.stack([ends[:, 1:], ends[:, :-1]]) - np.diff(traction, axis=1) / step).max(axis=0)
     rounding = 4.0 * np.finfo(float).eps * np.abs(traction[:, 1:]) / step
-    return np.asarray(apart + np.abs(np.diff(ends, axis=1)) + rounding)
+    return apart + np.abs(np.diff(ends, axis=1)) + rounding
 
 
 def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
@@ -282,7 +282,7 @@ def _errors(law: Superpotential, begin: Array, end: Array) -> Array:
     span = np.abs(np.diff(traction, axis=1)) + _rises(law, x)
     between = step * np.minimum(0.25 * span, 0.125 * step * _slopes_apart(law, x, traction))
     most = np.maximum(difference[:, 1:], difference[:, :-1]) + between
-    return np.asarray(most.max(axis=1) + np.finfo(float).eps * np.abs(value).max(axis=1))
+    return most.max(axis=1) + np.finfo(float).eps * np.abs(value).max(axis=1)
 
 
 def _polyline(law: Superpotential, begin: Array, end: Array, share: Array) -> tuple[Array, Array]:

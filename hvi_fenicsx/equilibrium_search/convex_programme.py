@@ -147,7 +147,7 @@ class _Programme:
         """What is left of b - Ax - t with the t ∈ ∂φ(x) that makes it least, (n,)."""
         force = self._b - self._a @ x
         low, high = self._chains.interval(x)
-        return np.asarray(force - np.clip(force, low, high))
+        return force - np.clip(force, low, high)
 
     def _stationary(self, x: Array) -> bool:
         largest = float(np.max(np.abs(self._b), initial=1e-300))

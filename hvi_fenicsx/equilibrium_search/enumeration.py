@@ -18,7 +18,7 @@ from scipy.optimize import linprog
 
 from ..typing import Array, Integers, Mask
 from . import stationarity
-from .balance_programme import BalanceTest
+from .balance_programme import left_of
 from .convex_programme import envelopes, minimise
 from .relaxation import Relaxation
 from .rigid_balance import RigidBalance
@@ -49,7 +49,7 @@ class Enumeration:
     def __post_init__(self) -> None:
         self.points = PointList(LIMITS.same)
         self._balance, self._forces = RigidBalance(self.problem), ForceIntervals(self.problem)
-        self._weighed = BalanceTest(Relaxation(self.problem))
+        self._relaxation = Relaxation(self.problem)
 
     def start(self) -> None:
         """Begin with a cell that is far larger than the problem's displacements."""
@@ -94,7 +94,7 @@ class Enumeration:
     def _smaller(self, cell: Box) -> Box | None:
         """The cell made smaller; None if no stationary point is in it."""
         for _ in range(LIMITS.most_rounds):
-            if (tight := self._tightened(cell)) is None or (left := self._weighed.smaller(tight, self.cut)) is None:
+            if (tight := self._tightened(cell)) is None or (left := left_of(self._relaxation, tight, self.cut)) is None:
                 return None
             gained = shorter(tight.low, tight.high, left.low, left.high).any()
             cell = left
@@ -174,7 +174,7 @@ def some_solution(matrix: Array, right: Array, sides: Array) -> Array | None:
         linprog(np.full(n, sign), A_eq=matrix / size, b_eq=right / size, bounds=sides, method="highs")
         for sign in (1.0, -1.0)
     ]
-    return None if any(e.status != 0 for e in ends) else np.asarray(0.5 * (ends[0].x + ends[1].x))
+    return None if any(e.status != 0 for e in ends) else 0.5 * (ends[0].x + ends[1].x)
 
 
 def at_bounds(problem: ScalarProblem, cell: Box) -> Mask:
@@ -185,7 +185,7 @@ def at_bounds(problem: ScalarProblem, cell: Box) -> Mask:
         cell: the cell.
     """
     ends = (cell.low <= problem.lower) | (cell.high >= problem.upper)
-    return np.asarray(ends & (cell.low < cell.high))
+    return ends & (cell.low < cell.high)
 
 
 def _far(problem: ScalarProblem, pivots: Integers, cell: Box) -> list[Box]:

@@ -221,7 +221,7 @@ class LengthProgramme:
     @cached_property
     def _far(self) -> Array:
         """The longest vector, openings that do not count included, (m,)."""
-        return np.asarray(np.linalg.norm(np.max(np.abs(self._sides), axis=0), axis=1))
+        return np.linalg.norm(np.max(np.abs(self._sides), axis=0), axis=1)
 
     @cached_property
     def _stiffness(self) -> Array:

@@ -39,7 +39,7 @@ class Lengths:
     @cached_property
     def there(self) -> Mask:
         """Which components there are, (m, 3)."""
-        return np.asarray(self.factors != 0.0)
+        return self.factors != 0.0
 
     @cached_property
     def members(self) -> Integers:
@@ -52,7 +52,7 @@ class Lengths:
         Args:
             x: the unknowns, (n,).
         """
-        return np.asarray(self.factors * x[self.unknowns])
+        return self.factors * x[self.unknowns]
 
     def felt(self, vectors: Array) -> Array:
         """The vectors without openings that are negative, (m, 3).
@@ -70,7 +70,7 @@ class Lengths:
         Args:
             x: the unknowns, (n,).
         """
-        return np.asarray(np.linalg.norm(self.felt(self.vectors(x)), axis=1))
+        return np.linalg.norm(self.felt(self.vectors(x)), axis=1)
 
     def along(self, forces: Array) -> Array:
         """Forces on unknowns as forces along the vectors' components, (m, 3).
@@ -221,4 +221,4 @@ def left_out(lengths: Lengths, x: Array, along: Array, bounds: tuple[Array, Arra
     low, high = (b[lengths.unknowns] for b in bounds)
     out = (z == 0.0) & lengths.there & ((at <= low) & (push < 0.0) | (at >= high) & (push > 0.0))
     out[:, 0] |= lengths.opens & ((z[:, 0] < 0.0) | (z[:, 0] == 0.0) & (along[:, 0] < 0.0))
-    return np.asarray(out)
+    return out

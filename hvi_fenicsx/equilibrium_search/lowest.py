@@ -238,7 +238,7 @@ class LevelSet:
     def _separated(self, motions: Array) -> Array:
         """The same motions, those that bounds cannot hold apart from others, as these may have no limit."""
         bounded = np.isfinite(self.problem.lower) | np.isfinite(self.problem.upper)
-        return np.asarray(motions @ np.linalg.svd(motions[bounded])[2].T) if bounded.any() else motions
+        return motions @ np.linalg.svd(motions[bounded])[2].T if bounded.any() else motions
 
     def _way(self, c: Array) -> float:
         """How much larger c·x can be than at the minimiser, by forces each a quarter of the one before."""
@@ -289,7 +289,7 @@ def descend(
         x, energy = found, after
         if energy - goal > LIMITS.most_steps * fall:
             break
-    return np.asarray(x), energy
+    return x, energy
 
 
 def _minimiser(problem: ScalarProblem, low: Array, high: Array, x: Array, cut: Callable[[], bool]) -> Array:

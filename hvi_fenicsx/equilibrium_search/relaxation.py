@@ -138,7 +138,7 @@ class Relaxation:
         """Orthonormal columns that S maps to zero, (n, k)."""
         values, vectors = np.linalg.eigh(self.problem.stiffness)
         zero = LIMITS.zero * max(float(values[-1]), 0.0)
-        return np.asarray(vectors[:, values <= zero])
+        return vectors[:, values <= zero]
 
     def _curvature(self, low: Array, high: Array, seen: Array) -> Curvature:
         """D on a box; ``seen``: where envelopes were not tight, (n + m,), all zero where nothing is known."""
@@ -175,7 +175,7 @@ class Relaxation:
 
     def _inverse(self, matrix: Array, motions: Array) -> Array:
         """The inverse of a matrix that is made regular along rigid motions."""
-        return np.asarray(np.linalg.inv(matrix + self._stiff * motions @ motions.T), dtype=np.float64)
+        return np.linalg.inv(matrix + self._stiff * motions @ motions.T)
 
     def _moved(self, motions: Array) -> Mask:
         """Which arguments a rigid motion moves, (n + m,)."""
@@ -198,7 +198,7 @@ class Relaxation:
         blocks = inverse[lengths.unknowns[:, :, None], lengths.unknowns[:, None, :]]
         blocks = lengths.factors[:, :, None] * blocks * lengths.factors[:, None, :]
         squares = np.concatenate([np.diag(inverse), np.linalg.eigvalsh(blocks)[:, -1]])
-        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+        return np.sqrt(np.maximum(squares, 0.0))
 
     def _free_motions(self, along: Array) -> Array:
         """The rigid motions that a matrix does not resist, orthonormal columns."""
@@ -206,4 +206,4 @@ class Relaxation:
         if not rigid.shape[1]:
             return rigid
         values, vectors = np.linalg.eigh(rigid.T @ along @ rigid)
-        return np.asarray(rigid @ vectors[:, values <= LIMITS.zero * self._stiff])
+        return rigid @ vectors[:, values <= LIMITS.zero * self._stiff]

@@ -121,7 +121,7 @@ class RigidBalance:
         rest[:, self.pivots] -= self.motions
         sizes = np.eye(n) + np.abs(self._flexibility) @ np.abs(stiffness)
         sizes[:, self.pivots] += np.abs(self.motions)
-        return np.asarray(np.abs(rest) + n * EPSILON * sizes)
+        return np.abs(rest) + n * EPSILON * sizes
 
     def tightened(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """A smaller cell with the same stationary points; None if there is none in it.
@@ -217,7 +217,7 @@ def _sum_of_others(parts: Array) -> Array:
     """For each part the sum of all others, some of which may be infinite."""
     infinite = ~np.isfinite(parts)
     if not infinite.any():
-        return np.asarray(parts.sum() - parts)
+        return parts.sum() - parts
     sign = parts[infinite][0]
     finite = np.where(infinite, 0.0, parts)
     alone = infinite.sum() - infinite

@@ -99,7 +99,7 @@ class ScalarProblem:
 
     def diagonal(self, d: Array) -> Array:
         """The diagonal, (n,), of the quadratic form that has dᵢ times the square of each argument, d (n + m,)."""
-        return np.asarray(d[: self.size] + self.lengths.diagonal(d[self.size :], self.size))
+        return d[: self.size] + self.lengths.diagonal(d[self.size :], self.size)
 
     @cached_property
     def arcs(self) -> ArcTable:
@@ -165,4 +165,4 @@ def clipped(x: Array, low: Array, high: Array) -> Array:
         low: of the box, (n + m,).
         high: of the box, (n + m,).
     """
-    return np.asarray(np.clip(x, low[: len(x)], high[: len(x)]))
+    return np.clip(x, low[: len(x)], high[: len(x)])

@@ -85,7 +85,7 @@ class Graphs:
         return cls(
             begin=np.where(meets, begin, 0.0),
             end=np.where(meets, end, 0.0),
-            meets=np.asarray(meets),
+            meets=meets,
             offset=arcs.tractions - arcs.slopes * arcs.anchors,
             slope=arcs.slopes,
         )
@@ -93,7 +93,7 @@ class Graphs:
     def size(self) -> Array:
         """The largest sum of the parts of a traction, (n,)."""
         far = np.maximum(np.abs(self.begin), np.abs(self.end))
-        return np.asarray(np.where(self.meets, np.abs(self.offset) + np.abs(self.slope) * far, 0.0).max(axis=1))
+        return np.where(self.meets, np.abs(self.offset) + np.abs(self.slope) * far, 0.0).max(axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,7 +190,7 @@ def _least(graphs: Graphs, a: Array, b: Array, c: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         turn = np.clip(np.where(a > 0.0, -0.5 * b / a, graphs.begin), graphs.begin, graphs.end)
         values = np.stack([(a * x + b) * x + c for x in (graphs.begin, turn, graphs.end)]).min(axis=0)
-    return np.asarray(np.where(graphs.meets, values, np.inf).min(axis=1))
+    return np.where(graphs.meets, values, np.inf).min(axis=1)
 
 
 def _rounding(
@@ -266,7 +266,7 @@ def shorter(low: Array, high: Array, begin: Array, end: Array) -> Mask:
         begin: where they begin now, (n,).
         end: where they end now, (n,).
     """
-    return np.asarray(end - begin < (1.0 - LIMITS.worthwhile) * (high - low))
+    return end - begin < (1.0 - LIMITS.worthwhile) * (high - low)
 
 
 def widened(low: Array, high: Array, first: Array, last: Array) -> tuple[Array, Array]:

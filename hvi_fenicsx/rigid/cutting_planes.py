@@ -54,7 +54,7 @@ class SlipIntegral:
 
     def subgradient(self, y: Array) -> Array:
         """One subgradient at y, (k,): a vertex without slip contributes the zero of its ball."""
-        return np.asarray(np.tensordot(self.length.gradient(self.rows @ y), self.rows, axes=2))
+        return np.tensordot(self.length.gradient(self.rows @ y), self.rows, axes=2)
 
 
 def merged(rows: Array) -> Array:
@@ -135,7 +135,7 @@ def vertices(frame: Array) -> Array:
     corners = np.vstack(
         [np.linalg.solve(rows, signs.T).T for rows in chosen if np.linalg.cond(rows) * DEFAULT.rounding < 1.0]
     )
-    return np.asarray(corners[np.abs(corners @ frame.T).max(axis=1) <= 1.0 + DEFAULT.rounding])
+    return corners[np.abs(corners @ frame.T).max(axis=1) <= 1.0 + DEFAULT.rounding]
 
 
 def idle(frame: Array, load: Array) -> Polytope:

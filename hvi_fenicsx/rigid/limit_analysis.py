@@ -197,8 +197,8 @@ class Analysis:
             trial = np.linalg.lstsq(self.reduced.frame, short, rcond=None)[0]
             off = max(np.abs(self.reduced.frame @ trial - short).max(), (f.cone @ trial).max(initial=0.0))
             if off <= DEFAULT.rounding and self.programme.evaluate(f, trial) <= limit:
-                return np.asarray(short)
-        return np.asarray(z)
+                return short
+        return z
 
     def _paper(self) -> PaperConditions:
         """The paper's conditions look at the load and the contact alone; the laws enter by c."""

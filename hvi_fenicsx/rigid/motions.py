@@ -252,7 +252,7 @@ def null_space(rows: Array) -> Array:
     if not rows.any():
         return np.eye(n)
     _, values, right = np.linalg.svd(np.vstack([rows, np.zeros((n, n))]), full_matrices=False)
-    return np.asarray(right[values <= DEFAULT.rounding * values[0]].T)
+    return right[values <= DEFAULT.rounding * values[0]].T
 
 
 def natural_basis(basis: Array, count: int) -> Array:

@@ -187,7 +187,7 @@ def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, ReducedProblem
     if rows is None:
         return basis, None
     moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in rows.slips]
-    works = {name: np.asarray(work) @ basis for name, work in problem.loads.items()}
+    works = {name: work @ basis for name, work in problem.loads.items()}
     return basis, ReducedProblem(
         frame=basis,
         contact=rows.contact,
@@ -221,7 +221,7 @@ def unit_rows(rows: Array, tiny: float) -> Array:
         tiny: the length up to which a row is left out.
     """
     length = np.linalg.norm(rows, axis=1)
-    return np.asarray(rows[length > tiny] / length[length > tiny, None])
+    return rows[length > tiny] / length[length > tiny, None]
 
 
 def _trace(part: Resistance, basis: Array) -> Array:
