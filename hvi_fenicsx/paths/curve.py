@@ -204,7 +204,7 @@ class CurvedBranch(Events):
         """How a body moves when points on drops go on: these outwards, all others follow."""
         found, directions = np.zeros_like(self.z), self.directions
         for k in drops:
-            found += (np.sign(directions[k]) or 1.0) * self._gradient(self.here.y, k)
+            found += (np.sign(directions[k]) or 1.0) * self.row(k, self.here.y)[:-1]
         return found - free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (self.points.stiffness @ found))[0]
 
     def _into_cell(self, motion: Array) -> float:

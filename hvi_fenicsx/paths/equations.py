@@ -257,21 +257,22 @@ class CurveEquations(Branch):
             k: the point.
             end: the s of that end.
         """
-        return lambda y: float(self.points.polar(y[:-1])[0][k]) - end, lambda y: np.append(self._gradient(y, k), 0.0)
+        return lambda y: float(self.points.polar(y[:-1])[0][k]) - end, lambda y: self.row(k, y)
 
-    def _gradient(self, y: Array, k: int) -> Array:
-        """How the s of a point changes with the coordinates, (n,)."""
-        points, found = self.points, np.zeros(len(y) - 1)
+    def row(self, k: int, y: Array) -> Array:
+        """How the s of a point changes with the variables, (n + 1,).
+
+        Args:
+            k: the point.
+            y: coordinates and factor, (n + 1,).
+        """
+        points, found = self.points, np.zeros(len(y))
         p = points.radial(k)
         if p is None:
             found[points.unknowns[k]] = 1.0
         else:
             found[points.vectors.groups[p]] = points.polar(y[:-1])[1][points.vectors.owner == p]
         return found
-
-    def row(self, k: int) -> Array:
-        """What the s of a point is as a linear function of the variables, (n + 1,)."""
-        return np.append(self._gradient(self.here.y, k), 0.0)
 
     def at_factor(self, aim: float) -> Condition:
         """A wanted factor."""

@@ -299,7 +299,7 @@ class Crossing:
         else:
             points.enter_next(k, forward=forward)
         as_before = curve.place(y, curve.here.tangent, passed=k) and not slow
-        curve.head(curve.row(k) if as_before else curve.here.tangent, 1.0 if forward or not as_before else -1.0)
+        curve.head(curve.row(k, y) if as_before else curve.here.tangent, 1.0 if forward or not as_before else -1.0)
         self._rests[k] = slow and any(point == k for point, _ in self.passages)
         self.passages.append((k, event_between(before, points.segment(k))))
 
