@@ -57,7 +57,8 @@ def attribute(problem: Problem, u: Array, residual: Array, near: Array) -> Force
     for one, (lower, upper) in zip(bounds, reached, strict=True):
         np.add.at(pressed, one.component()[0], lower | upper)
     free = ~np.isin(np.arange(residual.size), problem.fixed)
-    found = _Vertices(u, near, -residual, *(v.reshape(residual.shape) for v in (free, laws, pressed)))
+    shape = residual.shape
+    found = _Vertices(u, near, -residual, free.reshape(shape), laws.reshape(shape), pressed.reshape(shape))
     blocks = np.flatnonzero(np.any((found.laws + found.pressed > 1) & found.free, axis=1))
     row, shown = np.full(len(near), -1), found.free[blocks]
     row[blocks] = np.arange(len(blocks))
@@ -265,11 +266,12 @@ def nearest_sum(carriers: Sequence[Carrier], wanted: Array) -> tuple[list[Array]
     Returns:
         The forces by carrier, (k, d) each, and what is left, (vertices, d).
     """
-    weights = np.zeros(len(wanted))
-    for carrier in carriers:
-        weights[carrier.rows] += carrier.weights
-    asked = [wanted[c.rows] * (c.weights / weights[c.rows])[:, None] for c in carriers]
-    settled = np.finfo(np.float64).eps * float(np.max(np.abs(wanted), initial=0.0))
+    parts = [c.weights[:, None] * np.sum(c.axes**2, axis=1) for c in carriers]  # of the components in which each acts
+    every = np.full(wanted.shape, np.finfo(np.float64).tiny)
+    for carrier, part in zip(carriers, parts, strict=True):
+        every[carrier.rows] += part
+    asked = [wanted[c.rows] * part / every[c.rows] for c, part in zip(carriers, parts, strict=True)]
+    settled = float(np.finfo(np.float64).eps * np.max(np.abs(wanted), initial=0.0))
     _sweep(carriers, asked, wanted, settled)
     for _ in range(DEFAULT.shared_steps if any(np.any(c.at_rest) for c in carriers) else 0):
         left = _left(carriers, asked, wanted)
