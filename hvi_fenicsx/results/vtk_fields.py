@@ -52,7 +52,7 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
         cells["error"] = _in_parts(problem, estimate.cells / (estimate.energy_norm or 1.0))
     if len(problem.bodies.single()) > 1:
         cells["body"] = _in_parts(problem, problem.bodies.number_at(nodes.owned_cells(problem.space)[:, 0]))
-    grid = _body(problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
+    grid = _grid(problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
     vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", grid)])
 
 
@@ -92,13 +92,11 @@ def _in_parts(problem: Problem, values: npt.NDArray[Any]) -> Array:
     return np.repeat(values.astype(np.float64), nodes.parts_of_cell(problem.space))
 
 
-def _body(problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
-    """This rank's part of the body with fields at all local nodes and in the parts of the owned cells."""
-    return _grid(problem, nodes.linear_cells(problem.space), at_points, in_cells)
-
-
-def _grid(problem: Problem, cells: Entities, at_points: Mapping[str, Array], in_cells: Mapping[str, Array]) -> Grid:
-    """Cells or facets of this rank as a mesh, with fields at all local nodes and, in single precision, in the cells."""
+def _grid(
+    problem: Problem, at_points: Mapping[str, Array], in_cells: Mapping[str, Array], cells: Entities | None = None
+) -> Grid:
+    """Facets or the parts of owned cells, with fields at all local nodes and, in single precision, in the cells."""
+    cells = nodes.linear_cells(problem.space) if cells is None else cells
     used = np.zeros(len(problem.positions), dtype=np.bool_)
     used[cells] = True  # marked, not sorted: that takes a tenth of the time
     return Grid(
@@ -126,7 +124,7 @@ def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, flo
     def entries() -> Iterator[Entry]:
         for number, (time, factor, u) in enumerate(states):
             field = spaces.values(problem.space, u.x.array) * problem.scales.displacement
-            grid = _body(problem, {"displacement": field}, {"factor": np.full(count, factor)})
+            grid = _grid(problem, {"displacement": field}, {"factor": np.full(count, factor)})
             yield time, 0, f"-{number:05d}", grid
 
     vtk_files.write(path, problem.domain.mesh.comm, entries())
@@ -144,7 +142,7 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
         InputError: it cannot be written, on all ranks alike.
     """
     points = np.asarray(problem.points / problem.scales.length)
-    grid = _body(problem, {"escape_mode": problem.bodies.motion(points, mode)}, {})
+    grid = _grid(problem, {"escape_mode": problem.bodies.motion(points, mode)}, {})
     vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", grid)])
 
 
@@ -174,7 +172,7 @@ def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -
     """This rank's facets as a mesh of their own, with some values at all local nodes of the body."""
     mesh, d = problem.domain.mesh, problem.scales.dimension
     owned = facets[facets < mesh.topology.index_map(d - 1).size_local]
-    return _grid(problem, nodes.linear_facets(problem.space, owned), nodal, {})
+    return _grid(problem, nodal, {}, nodes.linear_facets(problem.space, owned))
 
 
 def _second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:

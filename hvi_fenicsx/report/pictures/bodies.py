@@ -17,6 +17,7 @@ from ..reader import Result
 from ..units import quantity, thousands, unit_for
 from .plane import PlaneCanvas
 from .shape import (
+    TINTS,
     DeformedBody,
     PartGeometry,
     deform,
@@ -29,7 +30,7 @@ from .shape import (
     touches,
     undeformed,
 )
-from .style import BLUE, EMBER, GREY, INK, PALE, SLATE, VERMILION
+from .style import BLUE, EMBER, GREY, INK, SLATE, VERMILION
 
 if TYPE_CHECKING:
     from .space import SpaceCanvas
@@ -57,7 +58,7 @@ def scene(result: Result) -> Figure:
     rest, found, areas = undeformed(result.body), list(roles_by_side(result)), regions(result)
     contacts, held = [side for side, roles in found if touches(roles)], held_sides(result)
     canvas = _canvas(result, "the scene", {side.part: side.facets for side in contacts})
-    canvas.show(rest, areas, "#eef2f5" if result.body.dimension == 2 else PALE)
+    canvas.show(rest, areas)
     names = [side.part for side in contacts], [support.side.part for support in held]
     canvas.sides(rest, [side for side, _ in found], *names)
     canvas.supports(rest, held)
@@ -136,14 +137,14 @@ def stress_end(body: BodyMesh) -> float:
 def escape(result: Result) -> Figure:
     """Draw the body, its ghost moved along the motion, and the motion in words."""
     rest, canvas = undeformed(result.body), _canvas(result, "rigid motion", {})
-    canvas.show(rest, [], PALE)
+    canvas.show(rest, [])
     canvas.supports(rest, held_sides(result))
     canvas.loads(rest, loaded_sides(result))
     mover = rest.as_drawn.moving()
     canvas.ghost(mover, *escaping(mover))
     words = f"the body at rest, {rest.stretched}" if rest.stretched else "the body at rest"
     ghost = Patch(fc="#fbe3d3", ec=VERMILION, ls="--", label="its ghost, on its way")
-    canvas.key(Patch(fc=PALE, ec=INK, label=words), ghost)
+    canvas.key(Patch(fc=TINTS[0], ec=INK, label=words), ghost)
     motion_words = str(result.solvability.get("direction") or "a rigid motion").replace(" -", " −")
     canvas.remark(textwrap.fill(f"The load moves the body by {motion_words}", LINE), VERMILION)
     return canvas.finish()

@@ -21,7 +21,7 @@ from ..body_mesh import BodyMesh
 from ..solution_arrays import NOTHING
 from ..units import quantity
 from .canvas import CONTACT, Canvas
-from .shape import ARROW, DeformedBody, HeldSide, PartGeometry, Region, Side, sparse
+from .shape import ARROW, TINTS, DeformedBody, HeldSide, PartGeometry, Region, Side, sparse
 from .style import GREY, INK, ORANGE, PURPLE, VERMILION
 
 LEGIBLE = 5000
@@ -61,13 +61,12 @@ class PlaneCanvas(Canvas):
         x, y = points.T
         self.axes.tripcolor(Triangulation(x, y, cells), values, shading="gouraud", vmin=0.0, zorder=1, **look)
 
-    def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
+    def show(self, shape: DeformedBody, areas: Sequence[Region]) -> None:
         """Draw the body at rest, its regions in their tints.
 
         Args:
             shape: the body.
             areas: its regions.
-            fill: the colour of a body without regions.
         """
         if areas:
             number = np.zeros(len(shape.body.cells))
@@ -76,7 +75,7 @@ class PlaneCanvas(Canvas):
             tints = ListedColormap([area.tint for area in areas])
             corners = np.repeat(number + 0.5, 3)
             self._fill(shape.at_rest[:, :2], shape.body.cells, corners, cmap=tints, vmax=float(len(areas)))
-        self._outline(shape.at_rest, shape.body.outline, fc="none" if areas else fill, ec=INK, lw=1.6, zorder=1)
+        self._outline(shape.at_rest, shape.body.outline, fc="none" if areas else TINTS[0], ec=INK, lw=1.6, zorder=1)
 
     def _outline(self, points: Array, loops: Sequence[Integers], *, fc: str = "none", **look: Any) -> None:
         """Draw closed chains as one path, holes included."""

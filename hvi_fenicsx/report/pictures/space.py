@@ -23,7 +23,7 @@ from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..units import quantity, unit_for
 from .canvas import Canvas
-from .shape import DeformedBody, PartGeometry, Region, Side
+from .shape import TINTS, DeformedBody, PartGeometry, Region, Side
 from .style import GREY, INK, PALE, VERMILION, pressure_scale
 
 ELEVATIONS, AZIMUTHS = (22, -22), (-58, -122, 122, 58)
@@ -121,19 +121,18 @@ class SpaceCanvas(Canvas):
         words += f"; grey: lifted, up to {quantity(max(gaps), 'm')}" if gaps else ""
         self.bar(colours, low / unit.size, high / unit.size, words)
 
-    def show(self, shape: DeformedBody, areas: Sequence[Region], fill: str) -> None:
+    def show(self, shape: DeformedBody, areas: Sequence[Region]) -> None:
         """Draw the body at rest, its regions in their tints.
 
         Args:
             shape: the body.
             areas: its regions.
-            fill: the colour of a body without regions.
         """
         body = shape.body
         owner = np.zeros(len(body.cells), dtype=np.int64)
         for number, area in enumerate(areas):
             owner[area.cells] = number
-        for number, colour in enumerate([area.tint for area in areas] or [fill]):
+        for number, colour in enumerate([area.tint for area in areas] or TINTS[:1]):
             facets = body.boundary[owner[body.behind] == number]
             if len(facets):
                 self._skin(body.points, body.points, facets, color=colour, ambient=0.75, diffuse=0.3)
