@@ -85,7 +85,7 @@ class _Vertices:
     pressed: Integers
 
     def tractions(self, term: LawTerm, own: Integers, forces: Array) -> tuple[Array, Mask]:
-        """Of a law, and where a support hides one of them; its forces at those of its vertices that are shared."""
+        """The tractions of a law, and where a support hides one of them; its forces where its vertices are shared."""
         blocks = term.surface.blocks
         low, high = term.law.interval(term.argument(self.u), term.reach(self.near[blocks]))
         held, covered = (

@@ -307,7 +307,12 @@ class BubbleStiffness:
         return growth
 
     def dot(self, a: Array, b: Array) -> float:
-        """The product of vectors of all ranks, (n, d) each. Collective."""
+        """The product of two vectors over all ranks. Collective.
+
+        Args:
+            a: the one, (n, d).
+            b: the other, (n, d).
+        """
         return float(self.comm.allreduce(float(np.vdot(a, b)), op=MPI.SUM))
 
 

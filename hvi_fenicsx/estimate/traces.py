@@ -450,7 +450,7 @@ class Spread:
 
 
 def _of_carriers(problem: Problem, interface: Interface) -> Spread:
-    """Of an interface, some of whose nodes carry nothing. Collective."""
+    """The way from the carriers of an interface, some of whose nodes carry nothing. Collective."""
     first, weights = interface.first, interface.rows.weights
     own = _numbers(problem.space, interface.surface.blocks)
     known, kept = np.flatnonzero(weights > 0.0), weights[first.nodes] > 0.0
