@@ -13,7 +13,7 @@ from .branch import Branch, Move
 from .curve import CurvedBranch
 from .events import CurveStep, displacement_rate
 from .relations import ContactPoints, Values
-from .vertex_laws import VertexLaw
+from .vertex_laws import VertexLaw, shares
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +155,6 @@ class EnergyBalance:
         for row, (law, k) in enumerate(zip(vertices, at, strict=True)):
             several = self._points.laws[k]
             if len(several) > 1:
-                shares = self._points.shares(int(k), float(values.lengths[k]), float(forces[k]))
-                found[row] = next(share for other, share in zip(several, shares, strict=True) if other is law)
+                parts = shares(several, float(values.lengths[k]), float(forces[k]))
+                found[row] = next(part for other, part in zip(several, parts, strict=True) if other is law)
         return found

@@ -55,7 +55,8 @@ def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int,
     """The segment of a displacement that holds best, and its least force; of a fixed unknown the wanted one."""
     if len(chain) == 1 and chain[0].kind is SegmentKind.BOUND:
         return 0, wanted
-    forces = {n: segment.force_at(x) for n, segment in enumerate(chain) if segment.stands_at(x)}
+    on = [n for n, segment in enumerate(chain) if segment.displacement(segment.coordinate(x, segment.force)) == x]
+    forces = {n: chain[n].force_at(x) for n in on}
     least = min(abs(f) for f in forces.values())
     best = max((n for n in forces if abs(forces[n]) == least), key=lambda n: chain[n].hold)
     return best, forces[best]

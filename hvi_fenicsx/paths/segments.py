@@ -70,10 +70,6 @@ class Segment:
         wanted = (force - self.force) / self.rise if self.rise else x - self.x
         return min(max(wanted, self.low), self.high)
 
-    def stands_at(self, x: float) -> bool:
-        """Whether a displacement is on the segment, to the last digit."""
-        return self.displacement(self.coordinate(x, self.force)) == x
-
     def force_at(self, x: float) -> float:
         """The force at a displacement on the segment; where it stands, the one nearest to zero."""
         return self.force + (self.rise or self.slope) * self.coordinate(x, 0.0)

@@ -305,17 +305,7 @@ class PointStatuses(PointLaws):
             The displacement, 0 where it is rounding.
         """
         x = x if any(law.has_moved(x) for law in self.laws[k]) else 0.0
-        for law, share in zip(self.laws[k], self.shares(k, x, traction), strict=True):
+        for law, share in zip(self.laws[k], shares(self.laws[k], x, traction), strict=True):
             law.remember(x, share)
         self.rebuild(k)
         return x
-
-    def shares(self, k: int, x: float, force: float) -> list[float]:
-        """The tractions of a point's laws that give a force together.
-
-        Args:
-            k: the point.
-            x: along the point's direction.
-            force: of all its laws.
-        """
-        return shares(self.laws[k], x, force)
