@@ -231,11 +231,12 @@ class PathResult(Finished):
         scaled = {str(name).rpartition(".")[0] for name in self.path["scaled"]}
         parts = list(self.path["peak_forces"])
         known = [part for part in parts if part in scaled] or parts
-        ways = {part: [float(np.max(np.abs(values))) for values in self.along(part)] for part in known}
-        largest = [max((way[k] for way in ways.values()), default=0.0) for k in (0, 1)]
-        done = max((u * force for u, force in ways.values()), default=0.0)
-        worked = done > ROUNDING * largest[0] * largest[1]
-        return max(known, key=lambda part: ways[part][0] * (ways[part][1] if worked else 1.0), default=None)
+        return max(known, key=self._way, default=None)
+
+    def _way(self, part: str) -> tuple[float, float]:
+        """The way of a part times its force, and the way."""
+        u, force = (float(np.max(np.abs(values))) for values in self.along(part))
+        return u * force, u
 
     def along(self, part: str) -> tuple[Array, Array]:
         """Mean displacement and force of a part in the direction of its largest force, (rows,) each.

@@ -145,8 +145,6 @@ def _draw(drawing: Drawing) -> None:
         save(drawing.make(), drawing.path, drawing.caption)
     except NotWrittenError as error:
         sys.exit(writing.hand_over(error))
-    except ModuleNotFoundError as error:
-        sys.exit(_complain(f"{drawing.path.name}: needs the package {error.name}, which is not installed here"))
     except Exception as error:  # whatever it is, it is reported in one line
         words = str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}"
         sys.exit(_complain(f"{drawing.path.name}: {words}"))
