@@ -134,9 +134,8 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
         axes.set_title(_drops_in_words(part.drops), loc="right", size=11.5, color=GREY)
     elif field.kind == "pressure":
         axes.fill_between(s, values, color=field.colour, alpha=0.15, lw=0)
-    everywhere: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "color": ORANGE, "alpha": 0.16, "lw": 0}
-    lifted: Any = part.lifted  # matplotlib takes arrays, which its types do not say
-    axes.fill_between(s, 0.0, 1.0, where=lifted, **everywhere)
+    everywhere = axes.get_xaxis_transform()
+    axes.fill_between(s, 0.0, 1.0, where=part.lifted.tolist(), transform=everywhere, color=ORANGE, alpha=0.16, lw=0)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)  # zero is always in sight
     axes.margins(0.015, 0.06)
     few_ticks(axes, "y")
@@ -179,7 +178,7 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
     bar.outline.set_visible(False)  # type: ignore[operator]
     axes.set_title(f"{field.words} in {field.unit.name}", loc="left", size=14, parse_math=True)
     if field.kind != "pressure":
-        _arrows(axes, flat, flat.along(np.nan_to_num(part.vectors(field.kind))))
+        _arrows(axes, flat, np.einsum("md,mwd->mw", np.nan_to_num(part.vectors(field.kind)), flat.ways))
     axes.spines[:].set_visible(False)
     axes.set_aspect("equal")
     wide, tall = np.ptp(flat.points, axis=0)
@@ -246,10 +245,6 @@ class FlatPart:
         """Its facets, in that unit."""
         x, y = self.points.T / self.unit.size
         return Triangulation(x, y, self.facets)
-
-    def along(self, vectors: Array) -> Array:
-        """The components of vectors (m, 3) along the coordinates, (m, 2)."""
-        return np.einsum("md,mwd->mw", vectors, self.ways)
 
 
 def laid_flat(geometry: PartGeometry, body: BodyMesh) -> FlatPart:
