@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ...typing import Integers
+from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..page import said
 from ..reader import Result
@@ -18,8 +19,6 @@ from ..units import quantity, thousands, unit_for
 from .plane import PlaneCanvas
 from .shape import (
     TINTS,
-    DeformedBody,
-    PartGeometry,
     deform,
     escaping,
     held_sides,
@@ -86,40 +85,33 @@ def _inside(result: Result) -> Iterator[str]:
 
 def body(result: Result) -> Figure:
     """Draw the deformed body in the colours of its displacement."""
-    parts = part_geometries(result)
-    shape, canvas = deform(result.body, parts), _canvas(result, "deformed body", _facets(parts))
-    largest = float(shape.amount.max())
-    unit = unit_for(largest, "m")
-    canvas.paint(shape, shape.amount, SLATE, largest)
-    canvas.bar(SLATE, 0.0, largest / unit.size, f"displacement |u|, up to {unit.text(largest)}; {shape.scales}")
-    return _loaded(canvas, result, shape, parts)
+    u = result.body.displacement
+    assert u is not None
+    amount = np.linalg.norm(np.nan_to_num(u), axis=1)
+    return _painted(result, "deformed body", amount, SLATE, float(amount.max()), "displacement |u|, up to", "m")
 
 
 def stress(result: Result) -> Figure:
     """Draw the deformed body, each cell in the colour of its stress."""
-    parts, values = part_geometries(result), result.body.von_mises
+    values, end = result.body.von_mises, stress_end(result.body)
     assert values is not None
-    shape, canvas = deform(result.body, parts), _canvas(result, "stress in the body", _facets(parts))
-    end, largest = stress_end(result.body), float(values.max())
-    unit = unit_for(end, "Pa")
-    peak = f"von Mises stress, {'peak' if end < largest else 'up to'} {unit.text(largest)}"
-    canvas.paint(shape, values, EMBER, end, by_cell=True)
-    canvas.bar(EMBER, 0.0, end / unit.size, f"{peak}; {shape.scales}")
-    return _loaded(canvas, result, shape, parts if result.body.dimension == 2 else [])
+    words = f"von Mises stress, {'peak' if end < values.max() else 'up to'}"
+    return _painted(result, "stress in the body", values, EMBER, end, words, "Pa", by_cell=True)
 
 
-def _facets(parts: Sequence[PartGeometry]) -> dict[str, Integers]:
-    return {geometry.part.name: geometry.facets for geometry in parts}
-
-
-def _loaded(
-    canvas: PlaneCanvas | SpaceCanvas, result: Result, shape: DeformedBody, parts: Sequence[PartGeometry]
-) -> Figure:
-    """Add what acts on a deformed body: in equilibrium, the scene's loads or the part of them that is borne."""
-    factor = 1.0 if result.last_borne is None else float(result.last_borne["factor"])
+def _painted(
+    result: Result, subject: str, values: Array, colours: Colormap, end: float, words: str, unit_name: str,
+    *, by_cell: bool = False,
+) -> Figure:  # fmt: skip
+    """The deformed body in the colours of values, with what acts on it in equilibrium: all loads, or what is borne."""
+    parts, unit = part_geometries(result), unit_for(end, unit_name)
+    shape = deform(result.body, parts)
+    canvas = _canvas(result, subject, {geometry.part.name: geometry.facets for geometry in parts})
+    canvas.paint(shape, values, colours, end, by_cell=by_cell)
+    canvas.bar(colours, 0.0, end / unit.size, f"{words} {unit.text(float(values.max()))}; {shape.scales}")
     canvas.supports(shape, held_sides(result))
-    canvas.contacts(shape, parts)
-    canvas.loads(shape, loaded_sides(result, factor))
+    canvas.contacts(shape, parts if result.body.dimension == 2 or not by_cell else [])
+    canvas.loads(shape, loaded_sides(result, 1.0 if result.last_borne is None else float(result.last_borne["factor"])))
     return canvas.finish()
 
 

@@ -72,11 +72,6 @@ class DeformedBody:
         """What is drawn larger than it is, in words."""
         return ", ".join(words for words in (times(self.factor), self.stretched) if words)
 
-    @cached_property
-    def amount(self) -> Array:
-        """|u|, m."""
-        return np.linalg.norm(self.displacement, axis=1)
-
 
 @dataclass(frozen=True)
 class PartGeometry:
