@@ -168,8 +168,7 @@ def sparse(points: Array, spacing: float) -> Integers:
         spacing: of the grid, m, about.
     """
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
-    count = np.maximum(np.round(extent / spacing), 1.0)
-    place = (points - low) * count / np.where(extent > 0.0, extent, 1.0)
+    place = (points - low) * np.round(extent / spacing) / np.where(extent > 0.0, extent, 1.0)
     node = np.round(place)
     order = np.argsort(np.round(np.linalg.norm(place - node, axis=1), 6), kind="stable")
     return order[np.unique(node[order], axis=0, return_index=True)[1]]
