@@ -164,7 +164,7 @@ class ArcTable:
         k, middle = np.arange(self.low.shape[1]), self.at(zero)[:, None]
         slopes, jumps = np.maximum(self.slopes, 0.0), np.maximum(self.after[:, 1:] - self.before[:, :-1], 0.0)
         jumps = np.where(self.low[:, 1:] < INF, jumps, 0.0)
-        none, start, energy = zero[:, None], self.rates(zero)[1], self.energy(zero)
+        none, start, energy = zero[:, None], self.rates(zero), self.energy(zero)
         right = np.column_stack([np.where(k[:-1] >= middle, jumps, 0.0), none])
         left = np.column_stack([none, np.where(k[1:] <= middle, jumps, 0.0)])[:, ::-1]
         far, near = np.maximum(self.high, 0.0), np.maximum(self.low, 0.0)
@@ -203,8 +203,7 @@ class ArcTable:
         Args:
             x: a point, (n,).
         """
-        rows, k = np.arange(len(x)), self.at(x)
-        inside = self.tractions[rows, k] + self.slopes[rows, k] * (x - self.anchors[rows, k])
+        rows, k, inside = np.arange(len(x)), self.at(x), self.rates(x)
         low = np.where(x <= self.low[:, 0], -INF, inside)
         return low, np.where(x >= self.high[rows, k], self._around_ends[1][rows, k + 1], inside)
 
@@ -262,14 +261,10 @@ class ArcTable:
         """
         return np.where(self.meets(low, high), self.slopes, np.inf).min(axis=1)
 
-    def rates(self, t: Array) -> tuple[Array, Array]:
-        """The tractions right of and left of t, (n,) each."""
-        rows = np.arange(len(t))
-        behind, k = (self.high <= t[:, None]).sum(axis=1), self.at(t)
-        after, before = (
-            self.tractions[rows, i] + self.slopes[rows, i] * (t - self.anchors[rows, i]) for i in (behind, k)
-        )
-        return after, before
+    def rates(self, x: Array) -> Array:
+        """The tractions at x, at a joint those left of it, (n,)."""
+        rows, k = np.arange(len(x)), self.at(x)
+        return self.tractions[rows, k] + self.slopes[rows, k] * (x - self.anchors[rows, k])
 
 
 def _finite(ends: Array, others: Array) -> Array:

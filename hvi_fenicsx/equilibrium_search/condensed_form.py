@@ -10,8 +10,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,11 +45,11 @@ def scalar_problem(
         InputError: a law acts on the length of a vector whose components have other laws.
     """
     far = np.full(problem.size, _far(problem.bonds)) if within is None else within
-    laws = _Laws.of(problem, _graphs(problem.bonds, far, tolerance), problem.constant_at(1.0))
-    vectors = [argument for argument in laws.chains if argument.radial]
-    _refuse_overlap(problem, laws.chains)
-    unknowns = [laws.chains.get(_Argument(unknowns=(i,)), []) for i in range(problem.size)]
-    chains = [*unknowns, *(laws.chains[v] for v in vectors)]
+    laws, constant, error = _laws(problem, far, tolerance)
+    vectors = [argument for argument in laws if argument.factors]
+    _refuse_overlap(problem, laws)
+    unknowns = [laws.get(_Argument((i,)), []) for i in range(problem.size)]
+    chains = [*unknowns, *(laws[v] for v in vectors)]
     whole = tuple(total(one) if one else FREE for one in chains)
     lower, upper = _off_drops(whole[: problem.size], problem.lower, problem.upper, LIMITS.zero)
     return ScalarProblem(
@@ -58,9 +59,9 @@ def scalar_problem(
         upper=upper,
         chains=whole,
         lengths=_lengths(vectors),
-        constant=laws.constant,
-        error=laws.error,
-        farthest=float(np.max(far)) if laws.error else math.inf,
+        constant=constant,
+        error=error,
+        farthest=float(np.max(far)) if error else math.inf,
     )
 
 
@@ -79,44 +80,29 @@ def _off_drops(chains: Sequence[Chain], lower: Array, upper: Array, way: float) 
     return low, high
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Argument:
+class _Argument(NamedTuple):
     """What laws act on: one unknown, or the length of a vector factors * x[unknowns]."""
 
     unknowns: tuple[int, ...]
     factors: tuple[float, ...] = ()
     opens: bool = False
 
-    @property
-    def radial(self) -> bool:
-        return bool(self.factors)
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Laws:
-    """The laws of all bonds.
-
-    Attributes:
-        chains: those that act on an argument.
-        constant: of the energy.
-        error: of the energy, at most.
-    """
-
-    chains: Mapping[_Argument, list[Chain]]
-    constant: float
-    error: float
-
-    @classmethod
-    def of(cls, problem: CondensedProblem, graphs: Iterable[LawGraph], constant: float) -> _Laws:
-        """Gather the laws; the constant is that without them."""
-        found: dict[_Argument, list[Chain]] = {}
-        error = 0.0
-        for bonds, law in zip(map(_frozen, problem.bonds), graphs, strict=True):
-            area = float(bonds.weights.sum())
-            constant, error = constant + area * law.offset, error + area * law.error
-            for argument, sign, weight in _arguments(bonds):
-                found.setdefault(argument, []).append(chain(law.graph, weight, sign))
-        return cls(chains=found, constant=constant, error=error)
+def _laws(
+    problem: CondensedProblem, far: Array, tolerance: float | None
+) -> tuple[dict[_Argument, list[Chain]], float, float]:
+    """The chains on each argument, the constant of the energy, and its error, which laws share by their areas."""
+    found: dict[_Argument, list[Chain]] = {}
+    constant, error = problem.constant_at(1.0), 0.0
+    curved = sum(float(b.weights.sum()) for b in problem.bonds if b.law.graph is None)
+    for bonds in problem.bonds:
+        aim = LIMITS.coarse * bonds.law.energy_scale if tolerance is None else tolerance / (curved or 1.0)
+        law, bonds = law_graph(bonds.law, _argument(bonds, far), aim), _frozen(bonds)
+        area = float(bonds.weights.sum())
+        constant, error = constant + area * law.offset, error + area * law.error
+        for argument, sign, weight in _arguments(bonds):
+            found.setdefault(argument, []).append(chain(law.graph, weight, sign))
+    return found, constant, error
 
 
 def _arguments(bonds: Bonds) -> Iterator[tuple[_Argument, float, float]]:
@@ -125,9 +111,9 @@ def _arguments(bonds: Bonds) -> Iterator[tuple[_Argument, float, float]]:
         weight = float(bonds.weights[k])
         numbers, factors = tuple(int(i) for i in bonds.unknowns[k]), tuple(float(s) for s in bonds.signs[k])
         if bonds.radial:
-            yield _Argument(unknowns=numbers, factors=factors, opens=bonds.opens), 1.0, weight
+            yield _Argument(numbers, factors, bonds.opens), 1.0, weight
         else:
-            yield _Argument(unknowns=numbers), factors[0], weight
+            yield _Argument(numbers), factors[0], weight
 
 
 def _lengths(vectors: Sequence[_Argument]) -> Lengths:
@@ -139,14 +125,6 @@ def _lengths(vectors: Sequence[_Argument]) -> Lengths:
         factors=np.array([[*v.factors, *[0.0] * (3 - len(v.factors))] for v in vectors]),
         opens=np.array([v.opens for v in vectors]),
     )
-
-
-def _graphs(laws: Sequence[Bonds], far: Array, tolerance: float | None) -> Iterator[LawGraph]:
-    """The laws as polylines; those of curved laws share the error by their areas."""
-    area = sum(float(b.weights.sum()) for b in laws if b.law.graph is None)
-    for b in laws:
-        aim = LIMITS.coarse * b.law.energy_scale if tolerance is None else tolerance / (area or 1.0)
-        yield law_graph(b.law, _argument(b, far), aim)
 
 
 def _argument(bonds: Bonds, far: Array) -> float:
@@ -171,7 +149,7 @@ def _frozen(bonds: Bonds) -> Bonds:
 def _refuse_overlap(problem: CondensedProblem, found: Iterable[_Argument]) -> None:
     """A component of a vector must have no other law."""
     taken = Counter(i for argument in found for i in argument.unknowns)
-    several = {i for argument in found if argument.radial for i in argument.unknowns if taken[i] > 1}
+    several = {i for argument in found if argument.factors for i in argument.unknowns if taken[i] > 1}
     if several:
         parts = sorted({b.part for b in problem.bonds if several & set(b.unknowns.ravel().tolist())})
         raise InputError(

@@ -83,9 +83,43 @@ class LowestSearch:
             raise SolverError("no lowest energy: it falls without limit, or only a limit far away was found")
         self._try(first.x)
         level = self.upper + 2.0 * problem.error + LIMITS.accuracy**0.5 * problem.energy_size(first.x)
-        level_set = LevelSet(problem=problem, ends=(low, high), found=first, energy=level, cut=self.cut)
-        self.region = level_set.box(self._relaxation.kernel)
+        self.region = self._level_box(first, level)
         self._enter(replace(Box.around(*self.region, first.x), bound=first.bound))
+
+    def _level_box(self, found: Minimum, energy: float) -> tuple[Array, Array]:
+        """The ends of a box, (n + m,) each, with all points of the region of at most an energy.
+
+        Args:
+            found: the minimum of the relaxation in the region.
+            energy: the energy.
+        """
+        problem, n, (begin, end) = self.problem, self.problem.size, self.region
+        root = np.sqrt(2.0 * max(energy - found.bound, 0.0))
+        reach = root * found.curvature.radii[:n]
+        free = ~np.isfinite(reach)
+        if free.any():
+            motions = _separated(problem, self._relaxation.kernel)
+            ways = np.array([max(self._way(found, energy, c), self._way(found, energy, -c)) for c in motions.T])
+            reach[free] = root * found.curvature.range_radii[:n][free] + np.abs(motions[free]) @ ways
+        return problem.with_lengths(np.maximum(found.x - reach, begin[:n]), np.minimum(found.x + reach, end[:n]))
+
+    def _way(self, found: Minimum, energy: float, c: Array) -> float:
+        """How much larger c·x can be than at the minimiser, by forces each a quarter of the one before."""
+        problem, best, tau = self.problem, np.inf, float(np.max(np.abs(self.problem.force), initial=1e-300))
+        for _ in range(LIMITS.most_steps):
+            pulled = Relaxation(problem.under(problem.force + tau * c), self.cut)
+            least = pulled.solve(Box.around(*self.region, found.x))
+            if self.cut():
+                raise Cut
+            if not problem.is_far(least.x):
+                bound = (energy - least.bound) / tau
+                if bound >= best:
+                    break
+                best = bound
+            tau *= 0.25
+        if not np.isfinite(best):
+            raise SolverError("no lowest energy: a body can move away without end for all that can be shown")
+        return float(best - c @ found.x)
 
     def resume(self, boxes: Iterable[OpenBox], point: Array) -> None:
         """Go on from open boxes and the lowest point.
@@ -196,67 +230,10 @@ class Cut(Exception):
     """The search stops before there is a first box."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LevelSet:
-    """All points of at most an energy.
-
-    Attributes:
-        problem: the problem.
-        ends: of a box that is far larger, (n + m,) each.
-        found: the minimum of the relaxation there.
-        energy: the energy.
-        cut: whether to give up, since the search stops.
-    """
-
-    problem: ScalarProblem
-    ends: tuple[Array, Array]
-    found: Minimum
-    energy: float
-    cut: Callable[[], bool]
-
-    def box(self, kernel: Array) -> tuple[Array, Array]:
-        """The ends of a box (n + m,) that holds them.
-
-        Args:
-            kernel: orthonormal columns of rigid motions, (n, k).
-
-        Raises:
-            SolverError: no finite box was found.
-            Cut: the search stops.
-        """
-        found, n = self.found, self.problem.size
-        root = np.sqrt(2.0 * max(self.energy - found.bound, 0.0))
-        reach = root * found.curvature.radii[:n]
-        free = ~np.isfinite(reach)
-        if free.any():
-            motions = self._separated(kernel)
-            ways = np.array([max(self._way(c), self._way(-c)) for c in motions.T])
-            reach[free] = root * found.curvature.range_radii[:n][free] + np.abs(motions[free]) @ ways
-        low, high = np.maximum(found.x - reach, self.ends[0][:n]), np.minimum(found.x + reach, self.ends[1][:n])
-        return self.problem.with_lengths(low, high)
-
-    def _separated(self, motions: Array) -> Array:
-        """The same motions, those that bounds cannot hold apart from others, as these may have no limit."""
-        bounded = np.isfinite(self.problem.lower) | np.isfinite(self.problem.upper)
-        return motions @ np.linalg.svd(motions[bounded])[2].T if bounded.any() else motions
-
-    def _way(self, c: Array) -> float:
-        """How much larger c·x can be than at the minimiser, by forces each a quarter of the one before."""
-        problem, best, tau = self.problem, np.inf, float(np.max(np.abs(self.problem.force), initial=1e-300))
-        for _ in range(LIMITS.most_steps):
-            pulled = Relaxation(problem.under(problem.force + tau * c), self.cut)
-            least = pulled.solve(Box.around(*self.ends, self.found.x))
-            if self.cut():
-                raise Cut
-            if not problem.is_far(least.x):
-                bound = (self.energy - least.bound) / tau
-                if bound >= best:
-                    break
-                best = bound
-            tau *= 0.25
-        if not np.isfinite(best):
-            raise SolverError("no lowest energy: a body can move away without end for all that can be shown")
-        return float(best - c @ self.found.x)
+def _separated(problem: ScalarProblem, motions: Array) -> Array:
+    """The same motions, those that bounds cannot hold apart from others, as these may have no limit."""
+    bounded = np.isfinite(problem.lower) | np.isfinite(problem.upper)
+    return motions @ np.linalg.svd(motions[bounded])[2].T if bounded.any() else motions
 
 
 def descend(
@@ -296,7 +273,7 @@ def _minimiser(problem: ScalarProblem, low: Array, high: Array, x: Array, cut: C
     """The minimiser of a majorant: with φ = h - g and both convex, g is replaced by its tangent at x."""
     lengths, n, at = problem.lengths, problem.size, problem.arguments(x)
     rising = problem.arcs.convex_part
-    pull = rising.rates(at)[1] - problem.arcs.rates(at)[1]
+    pull = rising.rates(at) - problem.arcs.rates(at)
     force = problem.force + pull[:n]
     begin = np.concatenate([np.minimum(low, at)[:n], np.zeros(len(lengths))])
     chains = rising.on(begin, np.maximum(high, at))

@@ -20,7 +20,7 @@ from scipy.linalg import qr
 from ..typing import Array, Integers
 from .scalar_problem import ScalarProblem
 from .thresholds import EPSILON, LIMITS
-from .weighed_balance import GraphClip, clipped_again
+from .weighed_balance import GraphClip, Graphs, clipped_again
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,12 +144,10 @@ class RigidBalance:
     def _forces(self, low: Array, high: Array) -> tuple[Array, Array]:
         """What laws and bounds can bear in a cell, (n,) each; infinite where a bound can push."""
         problem, arcs = self._problem, self._problem.arcs
-        begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
-        meets = arcs.meets(low, high) | ((low == high)[:, None] & (begin <= end))
-        with np.errstate(invalid="ignore"):
-            ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (begin, end)])
-        least = np.where(meets, ends.min(axis=0), np.inf).min(axis=1)
-        most = np.where(meets, ends.max(axis=0), -np.inf).max(axis=1)
+        graphs = Graphs.of(problem, low, high)
+        ends = np.stack([arcs.tractions + arcs.slopes * (at - arcs.anchors) for at in (graphs.begin, graphs.end)])
+        least = np.where(graphs.meets, ends.min(axis=0), np.inf).min(axis=1)
+        most = np.where(graphs.meets, ends.max(axis=0), -np.inf).max(axis=1)
         wide = LIMITS.rounding * (np.abs(least) + np.abs(most))
         least, most = least - wide, most + wide
         return np.where(low <= problem.lower, -np.inf, least), np.where(high >= problem.upper, np.inf, most)

@@ -305,9 +305,8 @@ class GraphClip:
         Returns:
             low and high; None if one interval is empty.
         """
-        column_least, column_most, arcs = least[:, None], most[:, None], self._arcs
-        begin, end = np.maximum(arcs.low, low[:, None]), np.minimum(arcs.high, high[:, None])
-        first, last = self._on_arcs(begin, end, column_least, column_most, arcs.meets(low, high))
+        column_least, column_most = least[:, None], most[:, None]
+        first, last = self._on_arcs(Graphs.of(self._problem, low, high), column_least, column_most)
         joint_low, joint_high = self._at_joints(low, high, column_least, column_most)
         first = np.minimum(first.min(axis=1), joint_low)
         last = np.maximum(last.max(axis=1), joint_high)
@@ -316,9 +315,9 @@ class GraphClip:
             return None
         return widened(low, high, first, last)
 
-    def _on_arcs(self, begin: Array, end: Array, least: Array, most: Array, meets: Mask) -> tuple[Array, Array]:
+    def _on_arcs(self, graphs: Graphs, least: Array, most: Array) -> tuple[Array, Array]:
         """The ends of what is left of each arc; (inf, -inf) of those that are lost."""
-        arcs, d = self._arcs, self._springs[:, None]
+        arcs, d, begin, end = self._arcs, self._springs[:, None], graphs.begin, graphs.end
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             slope = arcs.slopes + d
             at_begin = arcs.tractions + arcs.slopes * (begin - arcs.anchors) + d * begin
@@ -327,7 +326,7 @@ class GraphClip:
             rises, falls = slope > 0.0, slope < 0.0
             first = np.where(rises, to_least, np.where(falls, to_most, begin))
             last = np.where(rises, to_most, np.where(falls, to_least, end))
-            lost = (np.minimum(at_begin, at_end) > most) | (np.maximum(at_begin, at_end) < least) | ~meets
+            lost = (np.minimum(at_begin, at_end) > most) | (np.maximum(at_begin, at_end) < least) | ~graphs.meets
         first, last = np.clip(first, begin, end), np.clip(last, begin, end)
         return np.where(lost, np.inf, first), np.where(lost, -np.inf, last)
 
@@ -351,10 +350,9 @@ class GraphClip:
         self, low: Array, high: Array, least: Array, most: Array, first: Array, last: Array
     ) -> tuple[Array, Array]:
         """The ends of the range stay where a bound can push there."""
-        problem, rows, arcs = self._problem, np.arange(len(low)), self._arcs
+        problem = self._problem
         for at, bound, upper in ((low, problem.lower, False), (high, problem.upper, True)):
-            k = arcs.at(at)
-            pull = arcs.tractions[rows, k] + arcs.slopes[rows, k] * (at - arcs.anchors[rows, k]) + self._springs * at
+            pull = self._arcs.rates(at) + self._springs * at
             sizes = sum(np.where(np.isfinite(part), np.abs(part), 0.0) for part in (pull, least, most))
             pushes = (most >= pull - LIMITS.rounding * sizes) if upper else (least <= pull + LIMITS.rounding * sizes)
             stays = (at == bound) & pushes

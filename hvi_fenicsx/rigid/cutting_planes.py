@@ -240,17 +240,13 @@ class CuttingPlanes:
             if best.value < aim or gap <= 0.0 or smallest <= gap <= DEFAULT.rounding * self.scale:
                 return replace(best, lower=found.lower)
             smallest = min(smallest, gap)
-            self._cut_towards(found.y, best.y)
+            self._cut(found.y)
+            self._cut(0.5 * (found.y + best.y))  # where G is smooth, half way to the best one halves the rounds
         raise SolverError(f"rigid motions: {DEFAULT.max_rounds} cutting planes left a gap of {smallest:.1e}")
 
     def _cut(self, y: Array) -> None:
         for integral, cuts in zip(self.integrals, self.cuts, strict=True):
             cuts.append(integral.subgradient(y))
-
-    def _cut_towards(self, y: Array, best: Array) -> None:
-        """Cut at y and half way to the best motion known: where G is smooth this halves the rounds."""
-        self._cut(y)
-        self._cut(0.5 * (y + best))
 
     def _solve(self, f: Functional, region: Polytope, active: list[int]) -> Minimum | None:
         """Minimum of the cut model; `value` and `lower` are both the model's."""

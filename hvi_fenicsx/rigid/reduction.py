@@ -113,26 +113,44 @@ class RigidProblem:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReducedProblem:
+class ReducedRows:
+    """What some ranks, or all, have of the reduced problem.
+
+    Attributes:
+        contact: rows of unit length (c, k); contact admits the motions with contact @ y <= 0.
+        slips: the slip integral of each resistance.
+        areas: of each resistance, (p,).
+        traces: ∫ y·y over each resistance's part as a quadratic form, (p, k, k).
+    """
+
+    contact: Array
+    slips: tuple[SlipIntegral, ...]
+    areas: Array
+    traces: Array
+
+    def joined(self, other: ReducedRows) -> ReducedRows:
+        """What both have."""
+        return ReducedRows(
+            contact=np.unique(np.vstack([self.contact, other.contact]), axis=0),
+            slips=tuple(a.joined(b) for a, b in zip(self.slips, other.slips, strict=True)),
+            areas=self.areas + other.areas,
+            traces=self.traces + other.traces,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReducedProblem(ReducedRows):
     """The problem in the k coefficients of the kernel's basis; on the root rank only.
 
     Attributes:
         frame: the basis as rigid coefficients (3|6, k).
-        contact: rows of unit length (c, k); contact admits the motions with contact @ y <= 0.
-        slips: the slip integral of each resistance.
         moments: ∫ direction·y of each resistance, (p, k).
-        areas: of each resistance, (p,).
-        traces: ∫ y·y over each resistance's part as a quadratic form, (p, k, k).
         loads: by name, the work on the basis motions, (k,).
         load_scale: the largest work of the loads on any basis motion, or the sum of the absolute nodal forces.
     """
 
     frame: Array
-    contact: Array
-    slips: tuple[SlipIntegral, ...]
     moments: Array
-    areas: Array
-    traces: Array
     loads: Mapping[str, Array]
     load_scale: float
 
@@ -154,25 +172,6 @@ class ReducedProblem:
         return unit_rows(rows.reshape(-1, rows.shape[2]), tiny)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Rows:
-    """What some ranks have of the reduced problem, as there."""
-
-    contact: Array
-    slips: tuple[SlipIntegral, ...]
-    areas: Array
-    traces: Array
-
-    def joined(self, other: _Rows) -> _Rows:
-        """What both have."""
-        return _Rows(
-            contact=np.unique(np.vstack([self.contact, other.contact]), axis=0),
-            slips=tuple(a.joined(b) for a, b in zip(self.slips, other.slips, strict=True)),
-            areas=self.areas + other.areas,
-            traces=self.traces + other.traces,
-        )
-
-
 def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, ReducedProblem | None]:
     """The kernel's basis (3|6, k) everywhere, and on the root the reduced problem if k > 0. Collective.
 
@@ -183,27 +182,24 @@ def reduce(comm: MPI.Comm, problem: RigidProblem) -> tuple[Array, ReducedProblem
     basis = kernel(comm, problem.body, problem.conditions())
     if basis.shape[1] == 0:
         return basis, None
-    rows = comm.reduce(_own_rows(problem, basis), op=_Rows.joined, root=0)  # in a tree
+    rows = comm.reduce(_own_rows(problem, basis), op=ReducedRows.joined, root=0)  # in a tree
     if rows is None:
         return basis, None
     moments = [g.rows[:, 0].sum(axis=0) if g.rows.shape[1] == 1 else np.zeros(basis.shape[1]) for g in rows.slips]
     works = {name: work @ basis for name, work in problem.loads.items()}
     return basis, ReducedProblem(
+        **vars(rows),
         frame=basis,
-        contact=rows.contact,
-        slips=rows.slips,
         moments=np.array(moments).reshape(len(rows.slips), basis.shape[1]),
-        areas=rows.areas,
-        traces=rows.traces,
         loads=works,
         load_scale=max(problem.force, sum(float(np.abs(work).max()) for work in problem.loads.values())),
     )
 
 
-def _own_rows(problem: RigidProblem, basis: Array) -> _Rows:
+def _own_rows(problem: RigidProblem, basis: Array) -> ReducedRows:
     """What this rank has of the reduced problem."""
     normals = np.vstack([np.zeros((0, basis.shape[1])), *(rows @ basis for rows in problem.cones())])
-    return _Rows(
+    return ReducedRows(
         contact=np.unique(unit_rows(normals, DEFAULT.exact), axis=0),
         slips=tuple(
             SlipIntegral(merged(p.slips @ basis * p.weights[:, None, None]), p.measured) for p in problem.resistances

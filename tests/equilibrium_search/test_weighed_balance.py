@@ -42,7 +42,7 @@ def some_point(problem: ScalarProblem, ends: tuple[Array, Array], random: np.ran
     low, high = ends
     share = random.choice([0.0, 0.3, 0.7, 1.0], size=4) + random.uniform(0.0, 1e-3, size=4)
     x = low + np.clip(share, 0.0, 1.0) * (high - low)
-    t = problem.arcs.rates(np.clip(x, low + 1e-9, high - 1e-9))[0]
+    t = problem.arcs.rates(np.clip(x, low + 1e-9, high - 1e-9))
     push = random.exponential(size=4)
     t = np.where(x == problem.lower, t - push, np.where(x == problem.upper, t + push, t))
     return x, t
