@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from hvi_fenicsx.effects import Effect, Place
 from hvi_fenicsx.formula import FUNCTIONS, Formula
 from hvi_fenicsx.laws.base import registered
-from hvi_fenicsx.mesh.shapes import DomainShape, PlacedShape
+from hvi_fenicsx.mesh.shapes import DomainShape
 from hvi_fenicsx.model.content import PathTable, SolverTable
 from hvi_fenicsx.model.reader import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, TopLevel
 from hvi_fenicsx.schema import OneOf
@@ -28,6 +28,8 @@ _FORMULAS = (
     'A *formula* is a number, or a text in the coordinates x, y, z (m), such as `"-1e6*(1 - 1.8*x)"`. It may contain '
     f"numbers, `pi`, `+ - * / **`, `a if x < 1 else b`, and the functions {', '.join(FUNCTIONS)}."
 )
+_PLACE = ("origin", "angle")
+"""The keys of one of several bodies."""
 _INTRODUCTION = """\
 # Scene reference
 
@@ -62,8 +64,10 @@ def _document() -> Iterator[str]:
     yield _INTRODUCTION.replace("{formulas}", textwrap.fill(_FORMULAS, 116))
     yield from _table("Top level", TopLevel)
     for name, shape in _provided(DomainShape.registry).items():
-        yield from _table(f'`[domain]` with `shape = "{name}"`', shape)
-    yield from _table("`[domain.NAME]`, where there are several bodies", PlacedShape, ["origin", "angle"])
+        yield from _table(
+            f'`[domain]` with `shape = "{name}"`', shape, [k for k in shape.model_fields if k not in _PLACE]
+        )
+    yield from _table("`[domain.NAME]`, where there are several bodies", DomainShape, _PLACE)
     yield from _table("`[material]`, or `[material.NAME]` where there are several", MaterialTable)
     yield from _effects(Place.MATERIAL, 'The keys of `elasticity = "{key}"`')
     yield from _table("`[body]`, or `[body.NAME]`", BodyTable)

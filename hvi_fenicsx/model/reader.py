@@ -172,7 +172,10 @@ def _material(data: Any, info: ValidationInfo) -> Effect:
 def _shape(value: Any, info: ValidationInfo) -> Any:
     if SeveralBodies.named(value):
         return SeveralBodies.model_validate(value, context=info.context)
-    return choose(value, "shape", DomainShape.registry, info.context)
+    found: DomainShape = choose(value, "shape", DomainShape.registry, info.context)
+    if found.origin or found.angle:
+        raise validation_error([Mistake((), "origin and angle place one of several bodies, [domain.NAME]")])
+    return found
 
 
 def _material_keys() -> list[str]:

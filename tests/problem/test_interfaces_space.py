@@ -45,7 +45,7 @@ def placed(scene: Model, rotation: Array) -> Domain:
     bodies: Any = scene.domain
     found = []
     for name, body in bodies.bodies.items():
-        one = body.placed(name, body.form.build(MPI.COMM_WORLD, 3))
+        one = body.placed(name, body.build(MPI.COMM_WORLD, 3))
         found.append(PlacedBody(name=name, domain=one.domain, origin=rotation @ one.origin, rotation=rotation))
     return joined(MPI.COMM_WORLD, found)
 

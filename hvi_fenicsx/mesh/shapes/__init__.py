@@ -6,7 +6,7 @@ from .base import DomainShape
 from .built_in import Rectangle, Box
 from .built_in import LShape, Disk, HalfDisk, NotchedStrip, PlaneShape
 from .given import FixedMesh, MeshFile, Refinements, GivenMesh, OnlyMesh
-from .several import PlacedShape, SeveralBodies
+from .several import SeveralBodies
 # isort: on
 
 load_modules(__name__)

@@ -7,18 +7,23 @@ A new shape is a new subclass of :class:`DomainShape`, best of :class:`.plane.Pl
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+from pydantic import Field, model_validator
 
 from ...class_registry import enter
-from ...schema import Table
+from ...errors import InputError
+from ...schema import LONGEST, Mistake, Table, validation_error
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..domain import Domain
+    from ..joined import PlacedBody
 
 
 FEWEST_ADAPTIVE = 3
@@ -34,7 +39,7 @@ LARGEST_BODY = 200.0
 
 
 class DomainShape(Table):
-    """The shape of a body with its mesh: what one kind of ``[domain]`` table says, in SI.
+    """The shape of a body with its mesh, of one of several bodies also its place; its keys are those of its `shape`.
 
     Class attributes:
         dimension: 2 or 3; None where only the mesh knows it.
@@ -51,12 +56,28 @@ class DomainShape(Table):
     shape: str
     """the name of the shape; a subclass gives it as ``Literal["name"] = "name"``"""
 
+    origin: Annotated[list[Annotated[float, Field(ge=-LONGEST, le=LONGEST)]], Field(max_length=3)] | None = None
+    """where the origin of the shape's own coordinates is, m, a list of 2 or 3; by default it stays"""
+    angle: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    """by which the body is turned about its `origin`, counterclockwise, degrees; in 2D only; by default it is not"""
+
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
         if "shape" not in cls.__annotations__:
             return
         enter(DomainShape.registry, cls, cls.model_fields["shape"].default, "domain shape")
+
+    @model_validator(mode="after")
+    def _place_of_one_dimension(self) -> Self:
+        dimension = self.space_dimension()
+        if self.origin is not None and dimension is not None and len(self.origin) != dimension:
+            text = f"has {len(self.origin)} components; a {self.shape} wants {dimension}"
+            raise validation_error([Mistake(("origin",), text)])
+        if self.angle and dimension == 3:
+            text = "turns plane bodies only; turn a body in space in its mesh file, or leave angle out"
+            raise validation_error([Mistake(("angle",), text)])
+        return self
 
     def space_dimension(self) -> int | None:
         """2 or 3; None where only the opened mesh knows it."""
@@ -134,6 +155,32 @@ class DomainShape(Table):
         Args:
             dimension: of the scene, 2 or 3.
         """
+
+    def placed(self, name: str, domain: Domain) -> PlacedBody:
+        """The meshed body in its place, one of several.
+
+        Args:
+            name: of the body.
+            domain: the body on its mesh, in its own coordinates.
+
+        Raises:
+            InputError: origin or angle do not suit the dimension of a mesh file.
+        """
+        import numpy as np
+
+        from ..joined import PlacedBody
+
+        d = domain.dimension
+        origin = np.array(self.origin or [0.0] * d)
+        if len(origin) != d or (self.angle and d == 3):
+            raise InputError(
+                f"domain.{name}: its mesh has {d} dimensions; origin wants {d} numbers, angle only suits 2"
+            )
+        rotation = np.eye(d)
+        if self.angle:
+            c, s = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
+            rotation = np.array([[c, -s], [s, c]])
+        return PlacedBody(name=name, domain=domain, origin=origin, rotation=rotation)
 
     def implausible(self, length: float) -> tuple[str, ...]:
         """What may be mistakes in its numbers, in sentences. Advice: nothing is refused.
