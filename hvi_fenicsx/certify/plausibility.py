@@ -27,31 +27,13 @@ from .contact_state import ContactState, LawState
 from .thresholds import DEFAULT, PLAUSIBILITY
 
 
-def of_bounds(problem: Problem, part: str) -> str:
-    """The key of the effect that brought a part's bounds.
-
-    Args:
-        problem: as composed.
-        part: with contact.
-    """
-    keys = (
-        effect.key for where, effect, contribution in problem.contributions if where == part and contribution.bounds
-    )
-    return f"boundary.{part}.{next(keys)}"
-
-
-def of_law(problem: Problem, term: LawTerm) -> str:
-    """The key of the effect that brought a law.
-
-    Args:
-        problem: as composed.
-        term: the law.
-    """
-    part = term.surface.part
+def _key(problem: Problem, part: str, direction: Direction | None = None) -> str:
+    """The key of the effect that brought a part's bounds, or its law in a direction."""
     keys = (
         effect.key
         for where, effect, contribution in problem.contributions
-        if where == part and any(law.direction is term.direction for law in contribution.laws)
+        if where == part
+        and (any(law.direction is direction for law in contribution.laws) if direction else bool(contribution.bounds))
     )
     return f"boundary.{part}.{next(keys)}"
 
@@ -112,7 +94,7 @@ def _uneven_parts(problem: Problem) -> Iterator[str]:
         turn = largest_turn(comm, surface)
         if composition.DEFAULT.same < turn < composition.DEFAULT.uneven:
             yield (
-                f"{of_bounds(problem, surface.part)}: the part is nearly flat, its normals turn by up to "
+                f"{_key(problem, surface.part)}: the part is nearly flat, its normals turn by up to "
                 f"{turn:.1e} rad; this unevenness is part of the problem. If it is rounding of the mesh's coordinates, "
                 "state the flat part: contact = { obstacle = { point = [...], normal = [...] } }"
             )
@@ -130,7 +112,7 @@ def _polygons(problem: Problem) -> Iterator[str]:
         if total(comm, len(bent)) > PLAUSIBILITY.mostly_bent * total(comm, len(turns)):
             most = np.degrees(_most(comm, bent))
             yield (
-                f"{of_bounds(problem, surface.part)}: nearly all facets turn from one to the next, by up to "
+                f"{_key(problem, surface.part)}: nearly all facets turn from one to the next, by up to "
                 f"{most:.2g}°, as those of a curved side. They are taken for a polygon, and the pressure of degree 2 "
                 "shows its corners: give a mesh file of second order (gmsh: Mesh.ElementOrder = 2), or use "
                 "solver.degree = 1"
@@ -166,8 +148,9 @@ def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Iterator[st
         if most < PLAUSIBILITY.negligible * load and not _holds(problem, forces, term, DEFAULT.near):
             unit = "N" if problem.scales.dimension == 3 else "N/m"
             yield (
-                f"{of_law(problem, term)}: the law can carry {most * problem.scales.force:.3g} {unit} at "
-                f"most, {most / load:.1e} of the load, and no rigid motion needs it: it cannot matter; are its "
+                f"{_key(problem, term.surface.part, term.direction)}: the law can carry "
+                f"{most * problem.scales.force:.3g} {unit} at most, {most / load:.1e} of the load, "
+                "and no rigid motion needs it: it cannot matter; are its "
                 "tractions in N/m²?"
             )
 
@@ -207,27 +190,14 @@ def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> 
 
 def _strain(problem: Problem, u: fem.Function) -> Iterator[str]:
     """By the edges: of P1, the strain along an edge is its change of length over its length."""
-    comm, scales, d = problem.domain.mesh.comm, problem.scales, problem.scales.dimension
-    values = u.x.array.reshape(-1, d)
-    size = np.sqrt(d) * _most(comm, np.abs(values)) * scales.displacement
-    shortest = problem.once("shortest edge", None, lambda: _shortest_edge(problem))
-    if 2.0 * size <= PLAUSIBILITY.large * shortest:
-        return
-    strain = scales.displacement * max(
-        _most(comm, np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge))
-        for edge, change in zip(
-            _along_edges(problem, problem.points[:, :d]), _along_edges(problem, values), strict=True
-        )
+    d = problem.scales.dimension
+    edges, changes = (_along_edges(problem, field) for field in (problem.points[:, :d], u.x.array.reshape(-1, d)))
+    strain = problem.scales.displacement * max(
+        _most(problem.domain.mesh.comm, np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge))
+        for edge, change in zip(edges, changes, strict=True)
     )
     if strain > PLAUSIBILITY.large:
         yield f"the largest strain is {strain:.3g}, where small strains are assumed; is the modulus in N/m²?"
-
-
-def _shortest_edge(problem: Problem) -> float:
-    """The shortest edge of all cells, m. Collective."""
-    edges = _along_edges(problem, problem.points[:, : problem.scales.dimension])
-    shortest = min(float(np.min(np.einsum("nd,nd->n", edge, edge), initial=np.inf)) for edge in edges)
-    return float(np.sqrt(-largest(problem.domain.mesh.comm, -shortest)))
 
 
 def _along_edges(problem: Problem, values: Array) -> Iterator[Array]:
@@ -257,7 +227,7 @@ def _distant_obstacle(problem: Problem, state: ContactState, size: float) -> Ite
     if np.isfinite(gap) and PLAUSIBILITY.negligible * gap > size > 0:
         metres, displacement = (value * problem.scales.displacement for value in (gap, size))
         yield (
-            f"{of_bounds(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
+            f"{_key(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
             f"displacement {displacement:.3g} m: it is never closed; is it in m?"
         )
 
@@ -277,12 +247,12 @@ def _slip_and_kink(problem: Problem, law: LawState) -> Iterator[str]:
     sizes = f"{most * metres:.3g} m, the law's first kink {kink * metres:.3g} m"
     if DEFAULT.near < most < kink / far:
         yield (
-            f"{of_law(problem, term)}: the largest {what} is {sizes}: "
+            f"{_key(problem, term.surface.part, term.direction)}: the largest {what} is {sizes}: "
             "the law is on its first piece everywhere; are the law's displacements in m?"
         )
     elif beyond > 1.0 - PLAUSIBILITY.large:
         yield (
-            f"{of_law(problem, term)}: the {what} is up to {sizes}: "
+            f"{_key(problem, term.surface.part, term.direction)}: the {what} is up to {sizes}: "
             "the law is far beyond it nearly everywhere; are the law's displacements in m?"
         )
 
@@ -298,7 +268,7 @@ def _wide_smoothing(problem: Problem, law: LawState) -> Iterator[str]:
     if share > PLAUSIBILITY.large:
         most, of_peak = (_most(comm, v) for v in (away * term.multiplier, away / peak))
         yield (
-            f"{of_law(problem, term)}: smoothing changes the traction by up to "
+            f"{_key(problem, term.surface.part, term.direction)}: smoothing changes the traction by up to "
             f"{most * problem.scales.stress:.3g} N/m² ({percent(of_peak)} of the law's peak), "
             f"and by more than {100 * limit:.0f} % on "
             f"{percent(share)} of the part; is a smaller ε meant? (epsilon_absolute is in N/m)"

@@ -6,6 +6,7 @@ constraints are supports and contact.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,14 +50,14 @@ class BubbleBounds:
         return np.asarray(np.sum(e[self.blocks] * self.normals, axis=1))
 
     def updated(self, e: Array, force: Array) -> BubbleBounds:
-        """Held where e leaves the bounds, let go where a force draws away from the bound that holds.
+        """Held where e leaves the bounds or these are one, let go where a force draws away from the bound that holds.
 
         Args:
             e: the bubbles at the points, (k, d).
             force: the force on them, (k, d).
         """
         along, push = np.sum(e * self.normals, axis=1), np.sum(force * self.normals, axis=1)
-        upper = np.where(self.side == 1, push >= 0, along > self.upper)
+        upper = np.where(self.side == 1, push >= 0, along > self.upper) | (self.lower == self.upper)
         lower = np.where(self.side == -1, push <= 0, along < self.lower)
         return replace(self, side=np.where(upper, 1, np.where(lower, -1, 0)).astype(np.int8))
 
@@ -72,39 +73,15 @@ class BubbleBounds:
         r[self.blocks] -= carried[:, None] * self.normals
 
 
-@dataclass(frozen=True)
-class Prescribed:
-    """One prescribed component at the points of a part's bubbles (k of them).
-
-    Attributes:
-        blocks: the bubbles' owned blocks, (k,).
-        component: number of the component.
-        values: what the bubbles are to be, (k,).
-    """
-
-    blocks: Entities
-    component: int
-    values: Array
-
-    def project(self, r: Array) -> None:
-        """Take out of r (n, d) what is prescribed, in place."""
-        r[self.blocks, self.component] = 0.0
-
-
-def prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[Prescribed, ...]:
-    """What prescribed displacements ask of the bubbles. Collective.
-
-    Args:
-        problem: the prescribed displacements.
-        u: the solution, nondimensional.
-        space: the bubbles.
-    """
-    found = []
+def _prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Iterator[BubbleBounds]:
+    """What prescribed displacements ask of the bubbles: equal bounds along an axis. Collective."""
+    d = problem.scales.dimension
     for part in problem.prescribed:
         points = _Points(space, _on(space, part.facets))
         wanted = part.value.at(points.positions(needed=not part.value.is_number)) / problem.scales.displacement
-        found.append(Prescribed(points.blocks, part.component, wanted - points.values(u)[:, part.component]))
-    return tuple(found)
+        values, count = wanted - points.values(u)[:, part.component], len(points.blocks)
+        axes = np.tile(np.eye(d)[part.component], (count, 1))
+        yield BubbleBounds(points.blocks, axes, values, values, np.zeros(count, np.int8))
 
 
 class _Points:
@@ -176,21 +153,8 @@ def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
     return np.unique(found[found < space.dofmap.index_map.size_local]).astype(np.int32)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Constraints:
-    """What the bubbles must meet.
-
-    Attributes:
-        prescribed: what is prescribed.
-        bounds: of the parts with contact.
-    """
-
-    prescribed: tuple[Prescribed, ...]
-    bounds: tuple[BubbleBounds, ...]
-
-
-def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Constraints:
-    """What the bubbles must meet beside a solution. Collective.
+def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[BubbleBounds, ...]:
+    """What the bubbles must meet beside a solution: what is prescribed, and bounds of parts with contact. Collective.
 
     Args:
         problem: what was solved.
@@ -198,8 +162,7 @@ def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> 
         space: the bubbles.
     """
     parts = [b for b in problem.bounds if problem.interface_of(b.surface) is None]
-    bounds = tuple(bubble_bounds(problem, u, part, space) for part in parts)
-    return Constraints(prescribed=prescribed(problem, u, space), bounds=bounds)
+    return *_prescribed(problem, u, space), *(bubble_bounds(problem, u, part, space) for part in parts)
 
 
 class LeastEnergy:
@@ -216,14 +179,13 @@ class LeastEnergy:
         energy: a(e, e).
     """
 
-    def __init__(self, bubbles: fem.Function, stiffness: BubbleStiffness, under: Constraints, load: Array) -> None:
-        self._bubbles, self._stiffness, self._under = bubbles, stiffness, under
-        self.residual, self.energy, self._parts, self._begun = load, 0.0, under.bounds, False
+    def __init__(
+        self, bubbles: fem.Function, stiffness: BubbleStiffness, under: tuple[BubbleBounds, ...], load: Array
+    ) -> None:
+        self._bubbles, self._stiffness = bubbles, stiffness
+        self.residual, self.energy, self._parts, self._begun = load, 0.0, under, False
         self._e = bubbles.x.array[: load.size].reshape(load.shape)
-        bounded, prescribed = ([part.blocks for part in parts] for parts in (under.bounds, under.prescribed))
-        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *bounded, *prescribed]))
-        for given in under.prescribed:
-            self._e[given.blocks, given.component] = given.values
+        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *(part.blocks for part in under)]))
 
     def find(self) -> None:
         """Find them; from the second time on from those that were found before. Collective."""
@@ -262,18 +224,13 @@ class LeastEnergy:
 
     def _guess(self, part: BubbleBounds) -> Array:
         """The bubbles of a part as they are, at first what the diagonal alone makes of the load, (k, d)."""
-        at = part.blocks
         if self._begun:
-            return self._e[at]
-        found = self.residual[at] * self._stiffness.inverse[at]
-        for given in self._under.prescribed:
-            there = np.isin(at, given.blocks)
-            found[there, given.component] = self._e[at[there], given.component]
-        return found
+            return np.asarray(self._e[part.blocks])
+        return np.asarray(self.residual[part.blocks] * self._stiffness.inverse[part.blocks])
 
     def _put_on_bounds(self) -> None:
-        """Put the bubbles on the bounds that hold them; the residual follows, at first what is prescribed, too."""
-        before = self._e[self._special] if self._begun else 0.0
+        """Put the bubbles on the bounds that hold them; the residual follows."""
+        before = self._e[self._special]
         for part in self._parts:
             part.put_on_bounds(self._e)
         step = self._e[self._special] - before
@@ -286,7 +243,7 @@ class LeastEnergy:
 
     def _project(self, r: Array) -> None:
         """Take out of r (n, d) what is held, in place."""
-        for part in (*self._under.prescribed, *self._parts):
+        for part in self._parts:
             part.project(r)
 
 
