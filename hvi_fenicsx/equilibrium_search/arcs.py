@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
@@ -53,9 +53,8 @@ def total(chains: Sequence[Chain]) -> Chain:
     )
 
 
-def _sum(arcs: Iterable[Arc], lo: float, hi: float) -> Arc:
+def _sum(arcs: Sequence[Arc], lo: float, hi: float) -> Arc:
     a = lo if math.isfinite(lo) else hi if math.isfinite(hi) else 0.0
-    arcs = list(arcs)
     return Arc(lo, hi, a, sum(c.at(a) for c in arcs), sum(c.rate(a) for c in arcs), sum(c.slope for c in arcs))
 
 

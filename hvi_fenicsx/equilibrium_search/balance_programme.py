@@ -123,7 +123,7 @@ def left_of(relaxation: Relaxation, cell: Box, cut: Callable[[], bool]) -> Box |
             break
         if step % 3 == 0 and 4 * step >= LIMITS.most_steps:
             proof = weighed(problem, split, (cell.low, cell.high), *programme.weights(here))
-            if proof.excludes:
+            if proof.total > 0.0:
                 return None
             if best is not None and not proof.total > best.total + LIMITS.enough * abs(best.total):
                 break

@@ -72,17 +72,6 @@ class Relaxation:
         self.problem, self._cut = problem, cut
         self._stiff = float(np.trace(problem.stiffness)) / problem.size or 1.0
 
-    def undecided(self, low: Array, high: Array) -> Integers:
-        """Arguments whose law is not convex on a box.
-
-        Args:
-            low: of the box, (n + m,).
-            high: of the box, (n + m,).
-        """
-        arcs = self.problem.arcs
-        wide = high > low
-        return np.flatnonzero(wide & ((arcs.drops(low, high) > 0.0) | (arcs.least_slope(low, high) < 0.0)))
-
     def diagonal(self, low: Array, high: Array) -> Array:
         """The diagonal D of a box, (n + m,).
 
@@ -142,8 +131,9 @@ class Relaxation:
 
     def _curvature(self, low: Array, high: Array, seen: Array) -> Curvature:
         """D on a box; ``seen``: where envelopes were not tight, (n + m,), all zero where nothing is known."""
-        problem, undecided = self.problem, self.undecided(low, high)
+        problem = self.problem
         slope, drops = problem.arcs.least_slope(low, high), problem.arcs.drops(low, high)
+        undecided = np.flatnonzero((high > low) & ((drops > 0.0) | (slope < 0.0)))
         own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
         own[problem.size :] = 0.0
         most = float(seen[undecided].max(initial=0.0))

@@ -106,7 +106,8 @@ class Weighed:
         b: (n, m).
         c: (n, m).
         least: the least of each h, (n,).
-        total: the sum of all least values, less what it may be at a stationary point, and less its rounding.
+        total: the sum of all least values, less what it may be at a stationary point, and less its rounding;
+            above zero no stationary point is in the cell.
         rounding: what was taken off for it.
     """
 
@@ -117,11 +118,6 @@ class Weighed:
     least: Array
     total: float
     rounding: float
-
-    @property
-    def excludes(self) -> bool:
-        """Whether no stationary point is in the cell."""
-        return self.total > 0.0
 
     def smaller(self, low: Array, high: Array) -> tuple[Array, Array] | None:
         """A smaller cell: h is nowhere larger than what all other laws leave it; None if nothing is left.

@@ -55,11 +55,6 @@ class ConcavePart:
         _, sizes, right = np.linalg.svd(np.linalg.qr(np.vstack([np.zeros((k, k)), *rows]), mode="r"))
         return cls(f, programme, right[sizes > DEFAULT.rounding * max(sizes[0], 1e-300)])
 
-    def cones(self) -> Iterator[Array]:
-        """Cones that cover all slips; the edges of each are columns (q, q)."""
-        q = len(self.basis)
-        return (np.diag(signs) for signs in product((1.0, -1.0), repeat=q))
-
     def bound(self, edges: Array) -> Functional:
         """The convex functional that is a lower bound on the motions with slips in a cone, and its region.
 
@@ -178,7 +173,8 @@ class GlobalProgramme(CuttingPlanes):
         numbers, depth = count(), 0
         best = Minimum(give_up, np.empty(0), -np.inf)
         waiting: list[tuple[float, int, Array, Array, int]] = []
-        cones = part.cones()
+        # the first cones cover all slips; the edges of each are columns (q, q)
+        cones: Iterator[Array] = (np.diag(signs) for signs in product((1.0, -1.0), repeat=len(part.basis)))
         for _ in range(DEFAULT.max_rounds):
             for edges in cones:
                 found = super().minimise(part.bound(edges), region, best.value)

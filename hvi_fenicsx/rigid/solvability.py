@@ -163,7 +163,7 @@ def combine(bodies: Sequence[Solvability]) -> Solvability:
 
     The direction is that of the body in the worst state; the other bodies rest.
     """
-    worst = min(bodies, key=lambda body: (WORST_FIRST.index(body.state), _number(body.margin)))
+    worst = min(bodies, key=lambda one: (WORST_FIRST.index(one.state), np.inf if one.margin is None else one.margin))
     kernel = tuple(mode for body in bodies for mode in body.kernel)
     c = float(np.linalg.norm([body.paper.c for body in bodies]))
     if worst.state == "undecided":
@@ -202,7 +202,3 @@ def _combined_margin(margins: Sequence[float | None]) -> float | None:
 
 def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
-
-
-def _number(margin: float | None) -> float:
-    return np.inf if margin is None else margin
