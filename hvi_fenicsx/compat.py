@@ -81,7 +81,7 @@ def refine(mesh: _mesh.Mesh, edges: npt.NDArray[np.int32] | None) -> tuple[_mesh
 def simplex_mesh(
     comm: Any,
     cells: npt.NDArray[Any],
-    points: npt.NDArray[np.float64],
+    points: npt.NDArray[np.floating],
     kind: str,
     *,
     spread: bool = False,
@@ -120,7 +120,7 @@ TAKES_TOPOLOGY = hasattr(_cpp.mesh.Topology, "set_index_map")
 
 def mesh_of_cells(
     comm: Any,
-    points: npt.NDArray[np.float64],
+    points: npt.NDArray[np.floating],
     cells: npt.NDArray[np.int32],
     *,
     index_map: tuple[int, npt.NDArray[np.int64], npt.NDArray[np.int32]],
@@ -156,7 +156,7 @@ def mesh_of_cells(
 
 
 def _with_nodes(
-    topology: Any, kind: str, degree: int, index_map: Any, cells: Any, nodes: npt.NDArray[np.float64], inputs: Any
+    topology: Any, kind: str, degree: int, index_map: Any, cells: Any, nodes: npt.NDArray[np.floating], inputs: Any
 ) -> _mesh.Mesh:
     """The mesh of a topology whose cells have these nodes, (n, d), numbered as given."""
     import basix.ufl
@@ -167,7 +167,7 @@ def _with_nodes(
     return _mesh.Mesh(_cpp.mesh.Mesh_float64(topology.comm, topology, geometry), _Domain(element))
 
 
-def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: npt.NDArray[np.float64]) -> _mesh.Mesh:
+def quadratic_mesh(mesh: _mesh.Mesh, dofmap: Any, points: npt.NDArray[np.floating]) -> _mesh.Mesh:
     """A mesh of the same topology whose cells are of second order. Collective.
 
     Args:

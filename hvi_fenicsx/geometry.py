@@ -51,7 +51,7 @@ class CircularArc:
     def nearest(self, x: Array) -> Array:
         """The points of the circle nearest to the points x, both of shape (n, 2), m."""
         away = x - self.centre
-        return np.asarray(self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True))
+        return self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True)
 
     def moved(self, origin: Array, rotation: Array) -> CircularArc:
         """The circle turned about the origin of coordinates, and then moved.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[np.floating]
 """Real numbers."""
 Entities = npt.NDArray[np.int32]
 """Local numbers of cells, facets, vertices or unknowns, as dolfinx keeps them."""

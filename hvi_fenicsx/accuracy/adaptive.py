@@ -207,7 +207,7 @@ def _unresolved(problem: Problem) -> Entities:
     for facets, value in data_errors.everything(problem):
         at = data_errors.facet_modes(problem, space, facets)
         squares, area, values = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas, at.of(value)
-        low, high = -largest(comm, np.max(-values, initial=-np.inf)), largest(comm, np.max(values, initial=-np.inf))
+        low, high = (sign * largest(comm, float(np.max(sign * values, initial=-np.inf))) for sign in (-1.0, 1.0))
         allowed = max(CONTROL.unresolved * (high - low), _ROUNDING * max(abs(low), abs(high))) ** 2
         if total(comm, float(area @ squares)) > allowed * total(comm, float(np.sum(area))):
             found.append(at.facets.cells[squares > allowed])

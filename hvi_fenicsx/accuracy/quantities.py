@@ -151,7 +151,7 @@ class Resultant(Observable):
         """Its components (d,), N/m in 2D, N in 3D."""
         states = [s for s in _states(level) if s.bounds is not None]
         own = sum((s.resultant for s in states), np.zeros(level.solution.scene.dimension))
-        return np.asarray(level.comm.allreduce(own) * level.prepared.problem.scales.force)
+        return level.comm.allreduce(own) * level.prepared.problem.scales.force
 
 
 class LoadFactor(Observable):

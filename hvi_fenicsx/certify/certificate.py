@@ -199,7 +199,7 @@ def measured(
     found = {name: np.zeros(references.count) for name in names}
 
     def enter(name: str, blocks: Entities, values: Array) -> None:
-        found[name] = np.maximum(found[name], references.largest(blocks, values))
+        np.maximum(found[name], references.largest(blocks, values), out=found[name])
 
     for state in states:
         blocks = state.surface.blocks
@@ -252,7 +252,7 @@ def _rounding_of_laws(references: References, u: fem.Function, states: Sequence[
 
 
 def _owned(u: fem.Function, forces: Forces) -> Array:
-    return np.asarray(u.x.array[: forces.load.size])
+    return u.x.array[: forces.load.size]
 
 
 def _force_scales(references: References, u: fem.Function, forces: Forces) -> Array:

@@ -76,12 +76,12 @@ class ContactState:
     @property
     def normal_displacement(self) -> Array:
         """u·n at the nodes, (m,)."""
-        return np.asarray(np.sum(self.values * self.surface.normals, axis=1))
+        return np.sum(self.values * self.surface.normals, axis=1)
 
     @property
     def tangential_displacement(self) -> Array:
         """u·t at the nodes, (m, d-1)."""
-        return np.asarray(np.einsum("mkd,md->mk", self.surface.tangents, self.values))
+        return np.einsum("mkd,md->mk", self.surface.tangents, self.values)
 
     @property
     def contact(self) -> Mask:
@@ -292,7 +292,7 @@ def nearest(law: Superpotential, length: Length | None, slip: Array, traction: A
     """
     ends = law.interval(slip[:, 0] if length is None else length.of(slip), near)
     if length is None:
-        return np.asarray(np.clip(traction[:, 0], *ends)[:, None])
+        return np.clip(traction[:, 0], *ends)[:, None]
     return length.allowed(slip, traction, ends, near)
 
 

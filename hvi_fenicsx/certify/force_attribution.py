@@ -132,7 +132,7 @@ def on_kink(part: ConvexPart, argument: Array, near: float | Array) -> Mask:
         argument: what it acts on, (m,).
         near: distance that counts as being on a kink, one for all or (m,).
     """
-    return np.asarray(np.any(np.abs(argument[:, None] - part.kinks) <= np.reshape(near, (-1, 1)), axis=1))
+    return np.any(np.abs(argument[:, None] - part.kinks) <= np.reshape(near, (-1, 1)), axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -314,7 +314,7 @@ def _admissible(directions: Array, up: Mask, down: Mask) -> Array:
     """Unit directions (q, k) without the components that are not admissible; those left empty are left out."""
     v = np.where(((directions > 0) & ~up) | ((directions < 0) & ~down), 0.0, directions)
     length = np.linalg.norm(v, axis=1)
-    return np.asarray(v[length > 0.0] / length[length > 0.0, None])
+    return v[length > 0.0] / length[length > 0.0, None]
 
 
 def _sphere(k: int) -> Array:

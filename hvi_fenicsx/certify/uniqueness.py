@@ -33,7 +33,7 @@ from ..rigid import Mode
 from ..runtime.mpi import agree, largest, total
 from ..system import existence, rigid_motions
 from ..system.system import System
-from ..typing import Array
+from ..typing import Array, Integers
 from .certificate import Examination
 from .contact_state import LawState
 from .second_order import growth, negative_eigenvalues
@@ -54,7 +54,7 @@ def needed_falls(state: LawState) -> Array | None:
     x = _on_breaks(graph, state.argument, state.near)
     falls: Array = np.zeros(len(x))
     energy, rounding = graph.primitive(x), DEFAULT.near * state.scale
-    for arc in (a for a in map(Arc._make, graph.table.tolist()) if not state.term.radial or a.low >= 0.0):
+    for arc in (a for a in (Arc(*map(float, row)) for row in graph.table) if not state.term.radial or a.low >= 0.0):
         falls = np.maximum(falls, _needed(arc, x, energy, traction, rounding))
     falls[falls <= DEFAULT.near * float(np.max(np.abs(graph.slopes)))] = 0.0
     falls /= state.term.stretch
@@ -236,7 +236,7 @@ def _size(values: Sequence[Array]) -> float:
 
 def _stiffer(system: System, motions: Motions, falls: Sequence[Array]) -> bool:
     """Whether A less C, a little enlarged, is positive but for the motions, which C does not feel. Collective."""
-    pins = np.empty(0, np.int64)
+    pins: Integers = np.empty(0, np.int64)
     if motions:
         made = rigid_motions.create([motion.copy() for _, motion in motions], [mode for mode, _ in motions])
         pins = made.pins.astype(np.int64)
@@ -252,7 +252,7 @@ def _rate(term: LawTerm, slope: Array) -> Array:
     """The tangent of a law with given slopes by displacements wherever it is, (m,); (m, d, d)."""
     factors = np.ones(1) if term.length is None else np.array(term.length.factors)
     full = np.einsum("m,k,mka,mkb->mab", slope, factors**2, term.directions, term.directions)
-    return np.asarray(term.free[:, :, None] * full * term.free[:, None, :])
+    return term.free[:, :, None] * full * term.free[:, None, :]
 
 
 def _left(system: System, motions: Motions, u: fem.Function, examination: Examination) -> str:

@@ -64,7 +64,7 @@ def _sizes(prepared: Preparation) -> dict[str, Any]:
 
     def shown(force: Array) -> list[float]:
         rounding = 1e-12 * np.max(np.abs(force))
-        return (np.where(np.abs(force) > rounding, force, 0.0) * problem.scales.force).tolist()
+        return [float(f) * problem.scales.force if abs(f) > rounding else 0.0 for f in force]
 
     return {
         "body": list(map(float, problem.domain.upper - problem.domain.lower)),

@@ -232,7 +232,7 @@ class Moment(_Total):
             text = "the part has no extent across the moment's axis; take a wider part"
             raise InputError(f"boundary.{part}.moment: {text}")
         x = ufl.SpatialCoordinate(context.test.ufl_function_space().mesh)
-        r = [x[i] - context.number(c) for i, c in enumerate(moments.centroid)]
+        r = [x[i] - context.number(float(c)) for i, c in enumerate(moments.centroid)]
         a = [context.number(c / context.stress) for c in rate]
         if context.dimension == 2:
             return ufl.as_vector([-a[2] * r[1], a[2] * r[0]])

@@ -117,7 +117,8 @@ def shape(index: Index, barycentric: Array, by: int | None = None) -> Array:
     factors = [_factor(order, sum(index)) for order in index]
     if by is not None:
         factors[by] = factors[by].deriv()
-    return np.prod([factor(barycentric[:, i]) for i, factor in enumerate(factors)], axis=0)
+    values: Any = [factor(barycentric[:, i]) for i, factor in enumerate(factors)]
+    return np.prod(values, axis=0)
 
 
 @functools.cache
@@ -155,7 +156,7 @@ def _points(found: Sequence[Index], corners: Array) -> Array:
     """The points of bubbles in a cell, (bubbles, d)."""
     if not found:
         return np.zeros((0, corners.shape[1]))
-    return np.asarray(np.array(found) / sum(found[0]) @ corners)
+    return np.array(found) / sum(found[0]) @ corners
 
 
 def _coefficients(cell: str, degree: int) -> Array:
@@ -165,7 +166,7 @@ def _coefficients(cell: str, degree: int) -> Array:
     legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, 2 * degree, points)
     values = [shape(index, barycentric) for index in of_cell(degree, cell)]
     volume = 1.0 / math.factorial(barycentric.shape[1] - 1)
-    return np.asarray(np.einsum("iq,q,jq->ij", np.array(values), volume * weights, legendre))
+    return np.einsum("iq,q,jq->ij", np.array(values), volume * weights, legendre)
 
 
 def space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
@@ -237,7 +238,7 @@ class BubbleStiffness:
 
     def _owned(self, field: fem.Function) -> Array:
         """The owned values of a field of bubbles, (n, d), in place."""
-        return np.asarray(field.x.array[: self.inverse.size].reshape(self.inverse.shape))
+        return field.x.array[: self.inverse.size].reshape(self.inverse.shape)
 
     def descent(self, r: Array, project: Callable[[Array], None], at: Entities) -> Array:
         """P D⁻¹ P r, D being the diagonal and P taking out what is held; overwritten by the next product.

@@ -94,7 +94,7 @@ class FacetModes:
     @property
     def areas(self) -> Array:
         """What the sample points stand for, over L^(d-1), (f, q)."""
-        return np.asarray(self.facets.areas[:, None] * self.weights)
+        return self.facets.areas[:, None] * self.weights
 
     def interpolated(self, at_nodes: Array, at: Array | None = None) -> Array:
         """Values at the nodes (f, n, ...), interpolated at points, on the curve where a facet is curved, (f, q, ...).
@@ -104,7 +104,7 @@ class FacetModes:
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
         functions = spaces.simplex_functions(self.facets.degree, self.barycentric if at is None else at)
-        return np.asarray(np.einsum("qn,fn...->fq...", functions, at_nodes))
+        return np.einsum("qn,fn...->fq...", functions, at_nodes)
 
     @functools.cached_property
     def points(self) -> Array:
@@ -127,11 +127,11 @@ class FacetModes:
             value: on the boundary.
             at: the points in barycentric coordinates, (q, d); by default the sample points.
         """
-        return np.asarray(self.of(value, at) - self.interpolated(_at(value, self.nodes), at))
+        return self.of(value, at) - self.interpolated(_at(value, self.nodes), at)
 
     def coefficients(self, sampled: Array) -> Array:
         """The coefficients of sampled values (f, q), (f, m)."""
-        return np.asarray((sampled * self.weights) @ self.values.T)
+        return (sampled * self.weights) @ self.values.T
 
     def energies(self, tractions: Array, compliance: Array, lowest: int) -> Array:
         """Energies a(w, w) of the displacements w that tractions cause, (f,).
@@ -142,7 +142,7 @@ class FacetModes:
             lowest: degree from which modes count.
         """
         squares = self.coefficients(tractions) ** 2 / (self.degrees + 0.5)
-        return np.asarray(self.facets.areas * compliance * np.sum(squares[:, self.degrees >= lowest], axis=1))
+        return self.facets.areas * compliance * np.sum(squares[:, self.degrees >= lowest], axis=1)
 
     def energies_of_displacements(self, displacements: Array, compliance: Array) -> Array:
         """Energies a(w, w) of displacements w, (f,).
@@ -152,7 +152,7 @@ class FacetModes:
             compliance: of the facets in the direction of the displacements, (f,).
         """
         squares = self.coefficients(displacements) ** 2 * (self.degrees + 0.5)
-        return np.asarray(self.facets.areas / compliance * np.sum(squares, axis=1))
+        return self.facets.areas / compliance * np.sum(squares, axis=1)
 
 
 def _at(value: SpatialValue | Inequalities, points: Array) -> Array:
@@ -208,11 +208,11 @@ def surface_compliance(stiffness: Array, corners: Array) -> Array:
         across, angles = np.cross(normals, along), np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
         waves = [np.cos(a) * along + np.sin(a) * across for a in angles]
     inverses = np.linalg.inv(np.array([_barnett_lothe(stiffness, wave, normals) for wave in waves]))
-    return np.asarray(np.einsum("wfii->fi", inverses) / len(waves))
+    return np.einsum("wfii->fi", inverses) / len(waves)
 
 
 def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:
@@ -225,7 +225,7 @@ def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:
     q = c * c * ww + c * s * (wn + nw) + s * s * nn
     r = c * c * wn + c * s * (nn - ww) - s * s * nw
     t = c * c * nn - c * s * (wn + nw) + s * s * ww
-    return np.asarray(np.mean(q - r @ np.linalg.solve(t, np.swapaxes(r, -1, -2)), axis=0))
+    return np.mean(q - r @ np.linalg.solve(t, np.swapaxes(r, -1, -2)), axis=0)
 
 
 def redistributed(
@@ -292,7 +292,7 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[Conta
 
     for facets, axis, value in tractions(problem):
         on = modes(facets)
-        stress = np.asarray(on.of(value) / problem.scales.stress)
+        stress = on.of(value) / problem.scales.stress
         np.add.at(found, on.facets.cells, on.energies(stress, on.compliance[:, axis], lowest=on.facets.degree))
     for part in problem.prescribed:
         if varies(part.value):
@@ -303,7 +303,7 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[Conta
         for gap, sign, bound in zip(values, (-1.0, 1.0), (bounds.upper, -bounds.lower), strict=True):
             if gap is not None:
                 on, nodal = modes(bounds.surface.facets), (sign * state.contact_pressure, bound + sign * state.normal)
-                within = np.asarray(-sign * on.beyond_nodes(gap) / problem.scales.displacement)
+                within = -sign * on.beyond_nodes(gap) / problem.scales.displacement
                 np.add.at(found, on.facets.cells, _moved_pressure(problem, bubbles, bounds.surface, on, nodal, within))
     return found
 

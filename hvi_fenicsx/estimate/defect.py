@@ -47,7 +47,7 @@ class BubbleBounds:
 
     def component(self, e: Array) -> Array:
         """The normal component e·n at the points, (k,)."""
-        return np.asarray(np.sum(e[self.blocks] * self.normals, axis=1))
+        return np.sum(e[self.blocks] * self.normals, axis=1)
 
     def updated(self, e: Array, force: Array) -> BubbleBounds:
         """Held where e leaves the bounds or these are one, let go where a force draws away from the bound that holds.
@@ -110,13 +110,13 @@ class _Points:
         places = np.array(of_cell(degree, self._space.mesh.topology.cell_name())) / (2 * degree)
         functions = spaces.simplex_functions(degree, places, spaces.edge_share(space))[self._numbers]
         there = u.x.array.reshape(-1, self._space.dofmap.bs)[space.dofmap.list[self._cells]]
-        return np.asarray(np.einsum("kn,knd->kd", functions, there))
+        return np.einsum("kn,knd->kd", functions, there)
 
     def positions(self, *, needed: bool) -> Array:
         """Where they are, m, (k, 3); zeros where it does not matter: dolfinx finds the points of all bubbles."""
         if not needed:
             return np.zeros((len(self.blocks), 3))
-        return np.asarray(self._space.tabulate_dof_coordinates()[self.blocks])
+        return self._space.tabulate_dof_coordinates()[self.blocks]
 
 
 def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.FunctionSpace) -> BubbleBounds:

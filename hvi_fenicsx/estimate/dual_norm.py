@@ -188,7 +188,7 @@ def law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool)
         for law in state.laws:
             term = law.term
             asked = term.exact if exact else term.law
-            components = np.asarray(law.components / term.stretch[:, None])
+            components = law.components / term.stretch[:, None]
             away = law.given - nearest(asked, term.length, components, law.given, term.reach(NEAR))
             away[law.hidden] = 0.0
             vectors = np.einsum("mk,mkd->md", away * term.weights[:, None], term.directions)

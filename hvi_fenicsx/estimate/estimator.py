@@ -210,7 +210,7 @@ class Coupled:
         self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
         self._shared, self._strongest = 0.0, 0.0
         self._force: Array = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
-        self._answer = self._force
+        self._answer: Array = self._force
 
     @property
     def size(self) -> float:

@@ -144,7 +144,7 @@ class LawTraces:
         k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
         near = np.asarray(CERTIFICATE.near / solved.stretch, dtype=np.float64).ravel()
         traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), near)
-        return np.asarray(solved.multiplier * traction.reshape(slip.shape))
+        return solved.multiplier * traction.reshape(slip.shape)
 
     def _asked(self, state: ContactState, law: LawState, error: ErrorField | None) -> tuple[Superpotential, Array]:
         """The law that an error meets, and the slip that it is asked at, over its stretch, (f, q, k). Collective.

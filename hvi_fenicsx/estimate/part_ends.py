@@ -38,7 +38,7 @@ def _energies(part: _Part, squares: Array) -> Array:
     """
     on, moved = part.on, np.sum(part.on.weights * part.missing, axis=1)
     costs = np.pi**2 / 4.0 * np.abs(moved) * on.facets.areas * np.sum(squares * on.compliance, axis=1)
-    return np.asarray(costs * np.where(moved > 0.0, _of_lacking(on.facets.degree, np.abs(moved)), 1.0))
+    return costs * np.where(moved > 0.0, _of_lacking(on.facets.degree, np.abs(moved)), 1.0)
 
 
 def _of_lacking(degree: int, share: Array) -> Array:
@@ -52,14 +52,14 @@ def _of_lacking(degree: int, share: Array) -> Array:
         work = 4.0 / 3.0 * np.sqrt(share)
     else:
         work = 4.0 / 3.0 * (2.0**1.5 - 1.0) * np.sqrt(share) - 16.0 / 15.0 * (2.0**1.5 - 2.0) * share**1.5
-    return np.asarray(np.maximum(4.0 / np.pi * work - 1.0, 0.0))
+    return np.maximum(4.0 / np.pi * work - 1.0, 0.0)
 
 
 def _mean(on: FacetModes, ends: Array) -> Array:
     """The mean over those corners of each facet at which a part ends, of local blocks (n, d); (f, d)."""
     values = ends[on.facets.corners]
     count = np.any(values, axis=2).sum(axis=1)
-    return np.asarray(values.sum(axis=1) / np.maximum(count, 1)[:, None])
+    return values.sum(axis=1) / np.maximum(count, 1)[:, None]
 
 
 def _yielding(problem: Problem, part: str, states: Sequence[ContactState]) -> tuple[Array, Array]:
@@ -126,7 +126,7 @@ def _means(problem: Problem, facets: Entities, forces: Array, areas: Array, coun
     for vector in (field.x, count):
         vector.scatter_reverse(la.InsertMode.add)
         vector.scatter_forward()
-    return np.asarray(values / np.maximum(count.array, 1.0)[:, None])
+    return values / np.maximum(count.array, 1.0)[:, None]
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class _Part:
     @property
     def missing(self) -> Array:
         """1 at the sample points where the mesh lacks the part, -1 beyond its end, (f, q)."""
-        return np.asarray(self.share - self.meshed)
+        return self.share - self.meshed
 
 
 def _parts(problem: Problem, bubbles: fem.FunctionSpace) -> Iterator[_Part]:
@@ -190,7 +190,7 @@ def squares(
             firm, lost = _held(problem, part, holding[part.name].at(owned), examination)
             np.add.at(cells, part.on.facets.cells, _energies(part, firm))
             tractions += part.missing[:, :, None] * lost[:, None]
-    return np.asarray(cells + _of_loads(problem, inverse, parts, lacking))
+    return cells + _of_loads(problem, inverse, parts, lacking)
 
 
 def _held(problem: Problem, part: _Part, forces: Array, examination: Examination) -> tuple[Array, Array]:

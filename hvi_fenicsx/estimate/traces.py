@@ -63,7 +63,7 @@ class Trace:
         one = at_nodes[np.arange(len(own)), self._points.spread.reference]
         alike = own @ rotations_between(np.broadcast_to(one[:, None], at_nodes.shape), at_nodes)
         back = rotations_between(normals, np.broadcast_to(one[facets, None], normals.shape))
-        return np.asarray(self._on_facets(self._points.functions, alike) @ back)
+        return self._on_facets(self._points.functions, alike) @ back
 
     def interpolated(self, values: Array, by: Basis = "functions", *, along: bool = False) -> Array:
         """Values at the owned nodes (m, k), interpolated at the points, (f, q, k). Collective.
@@ -91,7 +91,7 @@ class Trace:
         """Sums of functions (f, q, n) times values of nodes (facets, n, k, ...)."""
         flat = values.reshape(*values.shape[:2], math.prod(values.shape[2:]))
         found = (self._points.spread.carriers @ flat)[self._points.facets]
-        return np.asarray(functions @ found).reshape(*functions.shape[:2], *values.shape[2:])
+        return (functions @ found).reshape(*functions.shape[:2], *values.shape[2:])
 
     def of_bubbles(self, e: fem.Function) -> Array:
         """The values of bubbles, (f, q, k). Collective."""
@@ -100,7 +100,7 @@ class Trace:
             known = side.values(e)
             for i, values in enumerate(side.shapes):
                 found += side.sign * values[:, :, None] * known[:, i, None]
-        return np.asarray(np.einsum("fqkd,fqd->fqk", self._vectors, found))
+        return np.einsum("fqkd,fqd->fqk", self._vectors, found)
 
     def with_bubbles(self, tau: Array) -> list[LocalForces]:
         """∫ τ·w ds of tractions (f, q, k), against the motion of the first side, tested with bubbles. Collective."""
@@ -158,7 +158,7 @@ def turned(rotations: Array, values: Array) -> Array:
         rotations: R, (f, n, k, k).
         values: the components along each node's own directions, or these directions, (f, n, k, ...).
     """
-    return np.asarray(np.einsum("fnkl,fnk...->fnl...", rotations, values))
+    return np.einsum("fnkl,fnk...->fnl...", rotations, values)
 
 
 def rotations_between(one: Array, other: Array) -> Array:
@@ -170,7 +170,7 @@ def rotations_between(one: Array, other: Array) -> Array:
     """
     both, cosine = one + other, np.sum(one * other, axis=-1)[..., None, None]
     bent = both[..., :, None] * both[..., None, :] / (1.0 + cosine)
-    return np.asarray(np.eye(one.shape[-1]) - bent + 2.0 * other[..., :, None] * one[..., None, :])
+    return np.eye(one.shape[-1]) - bent + 2.0 * other[..., :, None] * one[..., None, :]
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) 
     degree, on = nodes.degree(problem.space), nodes.facet_nodes(problem.space, local)
     table = np.array(_numbers_in_cell(degree, topology.cell_name()), dtype=np.int32)
     found = np.take_along_axis(space.dofmap.list[cells], table[number], axis=1)
-    points = np.asarray(problem.points[on[:, :d]] / problem.scales.length)
+    points = problem.points[on[:, :d]] / problem.scales.length
     return ContactFacets(degree, on, found, facets.areas(points), cells, local)
 
 
@@ -266,7 +266,7 @@ class SideBubbles:
         every = e.x.array.reshape(-1, e.function_space.dofmap.bs)
         known = np.zeros((self.count, every.shape[1]))
         known[self.owned] = every[self.blocks]
-        return np.asarray(self.comm.allreduce(known)[self.numbers])
+        return self.comm.allreduce(known)[self.numbers]
 
     def collected(self, sums: Array) -> LocalForces:
         """Forces (f, k, d) on them as those at owned blocks. Collective."""
@@ -435,7 +435,7 @@ class Spread:
         """Values at the owned nodes (m, ...) by facet and carrier, (facets, k, ...). Collective."""
         every = np.zeros((self.count, *values.shape[1:]))
         every[self.own] = values
-        return np.asarray(self.comm.allreduce(every)[self.at])
+        return self.comm.allreduce(every)[self.at]
 
     def summed(self, values: Array) -> Array:
         """Forces on the functions of facets' nodes (facets, k, ·) as forces on the relative displacements, (m, ·).
@@ -446,7 +446,7 @@ class Spread:
         """
         every = np.zeros((self.count, values.shape[2]))
         np.add.at(every, self.at[self.kept], values[self.kept])
-        return np.asarray(self.comm.allreduce(every)[self.own] * self.shares)
+        return self.comm.allreduce(every)[self.own] * self.shares
 
 
 def _of_carriers(problem: Problem, interface: Interface) -> Spread:
@@ -473,4 +473,4 @@ def _means(kept: Mask) -> Array:
     """Weights (f, n, n) by which nodes that carry something (f, n) stay as they are, others are the mean of these."""
     count = kept.shape[1]
     shares = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
-    return np.asarray(np.where(kept[:, :, None], np.eye(count), shares[:, None, :]))
+    return np.where(kept[:, :, None], np.eye(count), shares[:, None, :])

@@ -324,7 +324,7 @@ class Superpotential(ABC):
             atol: see `interval`.
         """
         lo, hi = self.interval(x, atol)
-        return np.asarray(np.maximum(np.maximum(lo - traction, traction - hi), 0.0))
+        return np.maximum(np.maximum(lo - traction, traction - hi), 0.0)
 
     def piece(self, x: Array) -> Integers:
         """Index (m,) of the law's piece that x lies on, counted from 0 by |x|; this default knows one."""

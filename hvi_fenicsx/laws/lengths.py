@@ -42,7 +42,7 @@ class Length:
 
     def of(self, c: Array) -> Array:
         """δ at vectors c."""
-        return np.asarray(np.linalg.norm(self._felt(c), axis=1))
+        return np.linalg.norm(self._felt(c), axis=1)
 
     def gradient(self, c: Array) -> Array:
         """∇δ at vectors c, (m, k); zero where δ is."""
@@ -63,7 +63,7 @@ class Length:
         across = np.divide(first, size, out=np.array(second, dtype=float), where=size > 0.0)
         weights = np.where(self._counts(c), np.array(self.factors) ** 2, 0.0)
         whole = weights[:, :, None] * np.eye(len(self.factors))
-        return np.asarray(second[:, None, None] * along + across[:, None, None] * (whole - along))
+        return second[:, None, None] * along + across[:, None, None] * (whole - along)
 
     def traction(self, c: Array, forces: Array, near: float | Array) -> Array:
         """The traction of the law, by which ∇δ makes forces per area; at δ = 0 the least that can give them, (m,).
@@ -124,7 +124,7 @@ class Length:
         felt, size = self._felt(c), self.of(c)
         slip = np.linalg.norm(felt[:, 1:], axis=1)
         share = np.divide(slip, size, out=np.full_like(size, np.nan), where=size > near)
-        return np.asarray(share**2)
+        return share**2
 
     def counts_at_zero(self, c: Array, near: float | Array) -> Mask:
         """Which components count to first order at δ = 0, (m, k): not an opening that is negative.
@@ -229,11 +229,11 @@ class BenzeggaghKenane(Mixity):
 
     @override
     def energy(self, share: Array) -> Array:
-        return np.asarray(1.0 + (self.energy_ratio - 1.0) * share**self.exponent)
+        return 1.0 + (self.energy_ratio - 1.0) * share**self.exponent
 
     @override
     def slope(self, share: Array) -> Array:
-        return np.asarray((self.energy_ratio - 1.0) * self.exponent * share ** (self.exponent - 1.0))
+        return (self.energy_ratio - 1.0) * self.exponent * share ** (self.exponent - 1.0)
 
 
 class PowerLaw(Mixity):
@@ -243,16 +243,16 @@ class PowerLaw(Mixity):
 
     @override
     def energy(self, share: Array) -> Array:
-        return np.asarray(self._parts(share) ** (-1.0 / self.exponent))
+        return self._parts(share) ** (-1.0 / self.exponent)
 
     @override
     def slope(self, share: Array) -> Array:
         power = self.exponent - 1.0
         change = (1.0 - share) ** power - (share / self.energy_ratio) ** power / self.energy_ratio
-        return np.asarray(change * self._parts(share) ** (-1.0 / self.exponent - 1.0))
+        return change * self._parts(share) ** (-1.0 / self.exponent - 1.0)
 
     def _parts(self, share: Array) -> Array:
-        return np.asarray((1.0 - share) ** self.exponent + (share / self.energy_ratio) ** self.exponent)
+        return (1.0 - share) ** self.exponent + (share / self.energy_ratio) ** self.exponent
 
 
 def mixities() -> dict[str, type[Mixity]]:

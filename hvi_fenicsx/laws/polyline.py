@@ -93,7 +93,7 @@ class PolylineLaw(Superpotential):
     @override
     @cached_property
     def kinks(self) -> Array:
-        return np.asarray(self.graph.breaks[self.graph.jumps != 0.0])
+        return self.graph.breaks[self.graph.jumps != 0.0]
 
     @property
     @override

@@ -217,7 +217,7 @@ class SmoothedPart(DifferentiablePart):
 
     def correction(self, x: Array) -> Array:
         """What the smoothing adds to the part, from 0 to κ ε for each kink."""
-        return np.asarray(self.epsilon * self._profiles(np.abs(x) if self.even else x)[0].sum(axis=1))
+        return self.epsilon * self._profiles(np.abs(x) if self.even else x)[0].sum(axis=1)
 
     def _profiles(self, x: Array) -> tuple[Array, Array, Array]:
         """D, D', D'' (m, k) of each point and kink, at their distance in units of the kink's width."""
@@ -379,7 +379,7 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
         with np.errstate(over="ignore"):
             exact = np.minimum(0.5 * self.slope * y * y, law.gamma2 * y)
             z = np.abs(self._gap(y)) / self.epsilon_absolute
-        return np.asarray(exact - self.epsilon_absolute * QUADRATIC.profile(z)[0])
+        return exact - self.epsilon_absolute * QUADRATIC.profile(z)[0]
 
     @cached_property
     @override

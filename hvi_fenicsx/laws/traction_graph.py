@@ -237,7 +237,7 @@ class TractionGraph:
         d = x - _taken(self.breaks, anchor)
         start, half = _taken(self._start, piece), 0.5 * _taken(self.slopes, piece)
         with np.errstate(over="ignore"):
-            return np.asarray(_taken(self._energy, anchor) + (start + half * d) * d)
+            return _taken(self._energy, anchor) + (start + half * d) * d
 
     @cached_property
     def table(self) -> Array:

@@ -72,7 +72,7 @@ class VertexLaws:
             traction: along them.
         """
         plain = 0.5 * x * traction if self.memory is not None else self.law.value(self.factors * x)
-        return np.asarray(self.weights * plain)
+        return self.weights * plain
 
     def dissipated(self, x: Array, traction: Array) -> Array:
         """The energy that is lost for good once the vertices have been at x, or where they were before.
@@ -87,7 +87,7 @@ class VertexLaws:
         ends, tractions = been[:, :2], been[:, 2:]
         taken = self.law.value((self.factors[:, None] * ends).ravel()) - self.law.value(np.zeros(1))
         lost = taken.reshape(ends.shape) - 0.5 * ends * tractions
-        return np.asarray(self.weights * (lost[:, 1] if self.law.even else lost.sum(axis=1)))
+        return self.weights * (lost[:, 1] if self.law.even else lost.sum(axis=1))
 
     def remembering(self, x: Array, traction: Array) -> VertexLaws:
         """The laws once the vertices have been at x.

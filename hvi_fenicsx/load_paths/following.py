@@ -151,7 +151,7 @@ class PathRun:
             factor=state.factor,
             event=str(state.event),
             part=None if place is None else place.part,
-            point=None if place is None else np.asarray(place.point[:d]),
+            point=None if place is None else place.point[:d],
             energy=state.energy * scales.energy,
             work=state.work * scales.energy,
             dissipated=state.dissipated * scales.energy,

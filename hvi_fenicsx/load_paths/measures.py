@@ -88,7 +88,7 @@ class Measures:
         """The forces (0) or means (1) of all parts, (parts, d)."""
         constants, rows = self._affine[first]
         found = constants @ np.array([1.0, factor]) + rows @ x
-        return np.asarray(found.reshape(-1, self._scales.dimension))
+        return found.reshape(-1, self._scales.dimension)
 
     def _force(
         self, part: str, held: Integers, touched: Integers, component: int, condensation: Condensation
@@ -200,7 +200,7 @@ class HeldLaw:
         laws = self.laws
         for end in reached if laws.memory is not None else ():
             laws = laws.remembering(*self._at(laws, end))
-        return np.asarray(self.forces * self._at(laws, factor)[1][:, None])
+        return self.forces * self._at(laws, factor)[1][:, None]
 
     def _at(self, laws: VertexLaws, factor: float) -> tuple[Array, Array]:
         """What the laws act on at a factor, and their tractions, at a jump the mean of both limits."""

@@ -223,7 +223,7 @@ def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> tuple[Integers, Entities, 
     for rank in np.unique(others):
         at = others == rank
         ghosts[at] = first[rank] + _numbers_of_owner(parts, int(rank), places[owned:][at])
-    return places, local, (owned, ghosts, others)
+    return places, local, (owned, ghosts, others.astype(np.int32))
 
 
 def _counts(part: Box) -> Integers:
@@ -241,7 +241,7 @@ def _places(part: Box) -> Integers:
 def _owners(parts: Sequence[Box], rank: int) -> Integers:
     """The rank that owns each vertex of a part, x running fastest, (n,): the first of those that have it."""
     places = _places(parts[rank])
-    owner = np.full(len(places), rank, dtype=np.int32)
+    owner = np.full(len(places), rank)
     for other in reversed(range(rank)):
         begin, end = parts[other]
         owner[np.all((places >= begin) & (places <= end), axis=1) & np.all(end > begin)] = other
@@ -273,9 +273,10 @@ class GridTransfer(Transfer):
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
         """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
         cells = np.array(self.coarser_cells)
-        near, far = (_grid_places(p, self.size, n) for p, n in zip(points, (self.cells, cells), strict=True))
+        near, far = _grid_places(points[0], self.size, self.cells), _grid_places(points[1], self.size, cells)
         if np.array_equal(2 * cells, self.cells):  # the mean of the ends of an edge, of whatever direction
-            ends, weights = np.stack([near // 2, (near + 1) // 2], axis=1), np.full((len(near), 2), 0.5)
+            ends = np.stack([near // 2, (near + 1) // 2], axis=1)
+            weights: Array = np.full((len(near), 2), 0.5)
         else:
             ends, weights = _in_simplices(near * cells / np.array(self.cells), cells)
         own = _flat(far[: coarse.dofmap.index_map.size_local], cells)

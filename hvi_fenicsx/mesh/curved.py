@@ -117,7 +117,7 @@ def _jacobians(points: Array) -> Array:
     """The Jacobian determinants of cells (c, n, d) at their nodes, (c, n); positive where they are straight."""
     kind = {6: basix.CellType.triangle, 10: basix.CellType.tetrahedron}[points.shape[1]]
     element = basix.create_element(basix.ElementFamily.P, kind, 2, basix.LagrangeVariant.gll_warped)
-    slopes = element.tabulate(1, element.points)[1:, :, :, 0]
+    slopes = np.asarray(element.tabulate(1, np.asarray(element.points)))[1:, :, :, 0]
     straight = np.linalg.det(points[:, 1 : points.shape[2] + 1] - points[:, :1])
     signed = np.linalg.det(np.einsum("iqn,cnd->cqid", slopes, points))
     return signed * np.sign(straight)[:, None]
@@ -259,6 +259,6 @@ class CurvedFacets:
 
 def _at(element: basix.finite_element.FiniteElement, nodes: Array, place: Array) -> tuple[Array, Array]:
     """Points of facets (p, d) and their derivatives by the reference coordinates (d-1, p, d)."""
-    table = element.tabulate(1, np.ascontiguousarray(place))[:, :, :, 0]
+    table = np.asarray(element.tabulate(1, np.ascontiguousarray(place)))[:, :, :, 0]
     values = np.einsum("ipn,pnd->ipd", table, nodes)
     return values[0], values[1:]

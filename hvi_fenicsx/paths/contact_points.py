@@ -224,7 +224,7 @@ class VectorPoints:
         for criterion, points in self._criteria:
             slopes[points] = criterion.slope(share[points])
         per_length = np.divide(2.0 * slopes, lengths, out=np.zeros_like(slopes), where=lengths > 0.0)
-        return np.asarray(per_length[self.owner] * directions * (self._slips - share[self.owner]))
+        return per_length[self.owner] * directions * (self._slips - share[self.owner])
 
     def _shares(self, directions: Array) -> Array:
         """The share of the slip in the square of each length, (p,)."""

@@ -102,7 +102,7 @@ def _off(bonds: Bonds, laws: VertexLaws, u: Array, force: Array, lower: Array, n
     along = np.sum(force * directions, axis=1)
     across = np.linalg.norm(force - along[:, None] * directions, axis=1)
     moved = np.maximum(np.maximum(least - along, along - most), 0.0) + across
-    return np.asarray(np.where(length <= near, at_rest, moved) + pushed)
+    return np.where(length <= near, at_rest, moved) + pushed
 
 
 def _energies(bonds: Bonds, u: Array) -> Array:

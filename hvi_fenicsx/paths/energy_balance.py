@@ -151,7 +151,7 @@ class EnergyBalance:
     def _tractions(self, values: Values, vertices: Sequence[VertexLaw], at: Integers) -> Array:
         """What each vertex has of the force of all laws at its point, (r,)."""
         forces = self._points.bond_forces(values)
-        found = np.asarray(forces[at] / vertices[0].laws.weights)
+        found = forces[at] / vertices[0].laws.weights
         for row, (law, k) in enumerate(zip(vertices, at, strict=True)):
             several = self._points.laws[k]
             if len(several) > 1:

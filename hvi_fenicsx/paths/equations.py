@@ -120,7 +120,7 @@ class CurveEquations(Branch):
         here, before = self.here, self.here.values
         change = self.points.stiffness @ (values.x - before.x) + (values.force - before.force)
         change -= (y[-1] - here.y[-1]) * self.unit * self._rate
-        return np.asarray(here.left + change / self.points.forces)
+        return here.left + change / self.points.forces
 
     def _at_place(self, y: Array, tangent: Array, values: Values) -> CurvePoint:
         return CurvePoint(y=y, tangent=tangent, values=values, left=self.residual(y, values))
@@ -147,7 +147,7 @@ class CurveEquations(Branch):
         def change(direction: Array) -> Array:
             found = stiffness @ (moved @ direction[:-1])
             found += risen @ direction[:-1] - direction[-1] * self.unit * self._rate
-            return np.asarray(found / points.forces)
+            return found / points.forces
 
         return change
 
@@ -178,7 +178,7 @@ class CurveEquations(Branch):
         rate = float(row @ found)
         if rate == 0.0 or not np.all(np.isfinite(found)):
             raise np.linalg.LinAlgError("the equations have no tangent here")
-        return np.asarray(found * (sign * np.sign(rate) / np.linalg.norm(found)))
+        return found * (sign * np.sign(rate) / np.linalg.norm(found))
 
     def _refined(self, factors: Bordered, values: Values) -> Array | None:
         """The direction in which the equations stay satisfied, by factors of a point nearby; None: they are too far."""
@@ -347,7 +347,7 @@ class Bordered:
     def __init__(self, matrix: Array) -> None:
         self._row = matrix[-1].copy()
         factors, pivots, singular = dgetrf(matrix, overwrite_a=1)
-        self._inverse = CellInverse(lambda right: np.asarray(dgetrs(factors, pivots, right)[0]), DEFAULT.waits)
+        self._inverse = CellInverse(lambda right: dgetrs(factors, pivots, right)[0], DEFAULT.waits)
         if singular or not self._has_tangent():
             raise np.linalg.LinAlgError("the equations have no tangent here")
 

@@ -198,7 +198,7 @@ class Crossing:
     def __init__(self, curve: CurveEquations) -> None:
         self._curve, self._points = curve, curve.points
         self._lag = self._points.order  # the ways, of the order ε, of the points to their ends
-        self._left = self._lag.copy()
+        self._left: Array = self._lag.copy()
         self._cells: Counter[tuple[bytes, frozenset[int]]] = Counter()
         self._turned: set[int] = set()
         self._rests = np.zeros(len(self._lag), dtype=bool)

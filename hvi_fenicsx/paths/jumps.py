@@ -160,7 +160,7 @@ def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:
         alone, group = np.zeros_like(motion), points.unknowns[k]
         alone[group] = motion[group]
         for force in (_evened(points, motion, size), motion, alone):
-            found = np.asarray(force / (np.max(np.abs(force)) or 1.0))
+            found = force / (np.max(np.abs(force)) or 1.0)
             known = any(np.allclose(found, other, rtol=0.0, atol=DEFAULT.slow) for other in seen)
             if np.any(found) and not known:
                 seen.append(found)

@@ -87,7 +87,7 @@ class OverdampedMotion:
     def _left(self) -> Array:
         """What is left of the forces, (n,)."""
         values = self._points.values(self.z)
-        return np.asarray(self._load - self._problem.elastic @ values.x - values.force)
+        return self._load - self._problem.elastic @ values.x - values.force
 
     def _at_rest(self) -> bool:
         """Whether hardly any force is left, and the body would not leave by itself what is left of it."""

@@ -203,8 +203,8 @@ class StraightBranch(StraightEquations):
         steep = np.maximum(np.abs(points.slope) / (self._stiffest or np.inf), 1.0)
         fastest, force = self._by_kind(speed)
         rounding = DEFAULT.reached if self.stands else DEFAULT.standing
-        fastest = np.where(points.moving, fastest, max(force, 0.1 * self._stiffest * fastest))
-        moves = speed * steep > rounding * fastest
+        speeds = np.where(points.moving, fastest, max(force, 0.1 * self._stiffest * fastest))
+        moves = speed * steep > rounding * speeds
         lengths = points.high - points.low
         size = np.where(
             points.moving, *self._by_kind(np.maximum(np.where(lengths < np.inf, lengths, 0.0), np.abs(tau)))

@@ -134,7 +134,7 @@ class ContactPoints(PointStatuses):
         size = 1.0 + np.abs(values.s)
         steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
         steep[np.abs(rates) <= DEFAULT.undecided * fastest] = 1.0
-        return np.asarray(np.maximum(DEFAULT.reached / steep, DEFAULT.digits) * size)
+        return np.maximum(DEFAULT.reached / steep, DEFAULT.digits) * size
 
     def turning_back(self, values: Values, rates: Array) -> Mask:
         """Which bonds with memory go back, (m,); a vector that has not left 0 passes it instead.
@@ -223,7 +223,7 @@ class ContactPoints(PointStatuses):
         """
         if held is None or not len(held):
             return self.stiffness
-        return np.asarray(self.stiffness + held.T @ held * self.stiffest)
+        return self.stiffness + held.T @ held * self.stiffest
 
     def jacobian(self, values: Values, held: Array | None = None) -> Array:
         """The derivative of S x + r by the coordinates, (n, n).
@@ -233,7 +233,7 @@ class ContactPoints(PointStatuses):
             held: motions that springs hold, as orthonormal rows, (d, n); None for none.
         """
         moved = self.moved(values).sparse @ self.held_stiffness(held)
-        return np.asarray(moved.T + self.risen(values).sparse.toarray())  # S and the first blocks are symmetric
+        return moved.T + self.risen(values).sparse.toarray()  # S and the first blocks are symmetric
 
     def along(self, values: Values, motion: Array) -> Array:
         """What a motion is along the displacements of the points, (m,).

@@ -33,7 +33,7 @@ class Unresisted:
     @property
     def balanced(self) -> Array:
         """The part of the load that works on none of the motions, (n,)."""
-        return np.asarray(self.rate - (self.motions @ self.rate) @ self.motions)
+        return self.rate - (self.motions @ self.rate) @ self.motions
 
     @property
     def driven(self) -> Array:
@@ -59,7 +59,7 @@ def without(motions: Array, parts: Array, none: float) -> Array:
     if not len(motions) or not parts.size:
         return motions
     left, values, _ = np.linalg.svd(parts)
-    return np.asarray(left[:, np.count_nonzero(values > none) :].T @ motions)
+    return left[:, np.count_nonzero(values > none) :].T @ motions
 
 
 def are_same(motions: Array, others: Array) -> bool:
@@ -80,4 +80,4 @@ def pins(motions: Array) -> Integers:
     Args:
         motions: orthonormal rows, (d, n).
     """
-    return np.asarray(qr(motions, mode="r", pivoting=True)[1][: len(motions)])
+    return qr(motions, mode="r", pivoting=True)[1][: len(motions)]

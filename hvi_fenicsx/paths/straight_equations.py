@@ -37,7 +37,8 @@ class StraightEquations(Branch):
     def __init__(self, points: ContactPoints, constant: Array, rate: Array, z: Array, factor: float) -> None:
         self.points, self._constant, self.rate = points, constant, rate
         self._stiffness, self.y = points.elastic, np.append(z, factor)
-        self.held, self._pins = np.empty((0, len(z))), np.zeros(len(z))
+        self._pins = np.zeros(len(z))
+        self.held: Array = np.empty((0, len(z)))
         self.column: Array = np.empty(0)
         self.hold()
 
@@ -65,14 +66,14 @@ class StraightEquations(Branch):
     def residual(self) -> Array:
         """What is left of the forces, (n,)."""
         values = self.values
-        return np.asarray(self._stiffness @ values.x + values.force - self._constant - self.factor * self.rate)
+        return self._stiffness @ values.x + values.force - self._constant - self.factor * self.rate
 
     def _column_of(self, i: int) -> Array:
         """How the equations change with a variable, (n,)."""
         if i == FACTOR:
             return -self.rate
         if rise := self.points.rise[i]:
-            return np.asarray(rise * np.eye(1, len(self.z), i)[0])
+            return rise * np.eye(1, len(self.z), i)[0]
         found = self._stiffness.column(i)
         found[i] += self.points.slope[i] + self._pins[i]
         return found
@@ -82,7 +83,7 @@ class StraightEquations(Branch):
         points, z = self.points, y[:-1]
         diagonal = np.where(points.moving, points.slope + self._pins, points.rise)
         found = self._stiffness @ np.where(points.moving, z, 0.0)
-        return np.asarray(found + diagonal * z - y[FACTOR] * self.rate)
+        return found + diagonal * z - y[FACTOR] * self.rate
 
     def factorised(self, driver: int = FACTOR) -> CellInverse:
         """The inverse of the equations, the factor in the place of the variable that drives.

@@ -314,7 +314,7 @@ def _check_agreement(
         shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
         apart = np.abs(these[i] - those[j]) > rounding * size
         differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
-        bad += [_disagreement(context, int(dof), (one, other), pair, scales) for dof, *pair in differing]
+        bad += [_disagreement(context, int(dof), (one, other), (float(a), float(b)), scales) for dof, a, b in differing]
     refuse(context.domain.mesh.comm, bad[:1])
 
 
@@ -328,7 +328,7 @@ def _values(condition: fem.DirichletBC, values: Array) -> tuple[Entities, Array]
 def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
     block, component = divmod(dof, context.dimension)
     at = spot(context.points[block][: context.dimension])
-    one, other = (float(value) * scales.displacement for value in pair)
+    one, other = (value * scales.displacement for value in pair)
     return (
         f"boundary.{parts[0]} and boundary.{parts[1]} meet at {at} and prescribe displacements along "
         f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'

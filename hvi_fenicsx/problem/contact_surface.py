@@ -208,7 +208,7 @@ def _at_shared_vertices(
     normals = {name: surface.normals.copy() for name, surface in surfaces.items()}
     if not normals:
         return normals
-    axes, prescribed = np.eye(next(iter(normals.values())).shape[1]), set(fixed.tolist())
+    axes, prescribed = np.eye(next(iter(normals.values())).shape[1]), set(map(int, fixed))
     bad: list[str] = []
     for block in _candidates(surfaces, fixed // len(axes)):
         places = [(name, int(i)) for name, s in surfaces.items() for i in np.flatnonzero(s.blocks == block)]

@@ -147,7 +147,7 @@ def _tags(mesh: Any, dimension: int, parts: dict[str, Any]) -> tuple[Any, dict[s
     others = agree(mesh.comm, np.unique(within, axis=0))
     atoms, number = np.unique(np.concatenate([within, *others]), axis=0, return_inverse=True)
     values = number.ravel()[: len(entities)].astype(np.int32) + 1
-    ids = {n: tuple((np.flatnonzero(of) + 1).tolist()) for n, of in zip(sorted(parts), atoms.T, strict=True)}
+    ids = {n: tuple(int(i) + 1 for i in np.flatnonzero(of)) for n, of in zip(sorted(parts), atoms.T, strict=True)}
     return dolfinx.mesh.meshtags(mesh, dimension, entities, values), ids
 
 

@@ -292,7 +292,7 @@ class Bulk:
         """
         q = ufl.TestFunction(self._constants)
         pairs = zip(self.dilatations, pressures, strict=True)
-        return sum(nodal(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs)
+        return np.sum([nodal(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs], axis=0)
 
     def dilatation_error(self, u: fem.Function) -> Array:
         """2μ/d ∫ (div u - p/λ)² of every owned cell, p being the averaged volumetric stress, (cells,). Collective.

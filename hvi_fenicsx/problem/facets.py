@@ -180,7 +180,7 @@ class Facets:
     def _frames(self) -> Array:
         """Distances from a facet's first corner times these are its own coordinates, (f, d, d)."""
         sides = self.corners[:, 1:] - self.corners[:, :1]
-        return np.asarray(np.linalg.inv(np.concatenate([sides, self.normals[:, None]], axis=1)))
+        return np.linalg.inv(np.concatenate([sides, self.normals[:, None]], axis=1))
 
     def own_coordinates(self, facets: Integers, points: Array) -> Array:
         """Points in the coordinates of facets, (p, n, d).

@@ -150,7 +150,7 @@ class LawTerm:
             second: the law's second derivative at u, (m,).
         """
         steep = second / self.stretch
-        local = steep[:, None, None]
+        local: Array = steep[:, None, None]
         if self.length is not None:
             local = self.length.hessian(self.slip(u), derivative, steep)
         full = np.einsum("mka,mkl,mlb->mab", self.directions, local, self.directions)

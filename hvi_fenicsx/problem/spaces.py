@@ -190,9 +190,9 @@ def transformed(cell: str, share: float) -> Any:
     corners: Any = basix.geometry(kind)
     d, extra = corners.shape[1], share / (1 - 2 * share)
     ends, inside = corners[np.array(topology[1])], [*map(len, topology[2:]), *[0] * (3 - d)]
-    where = [list(corners[:, None]), [np.vstack([pair.mean(axis=0), pair]) for pair in ends]]
+    where: list[list[Any]] = [list(corners[:, None]), [np.vstack([pair.mean(axis=0), pair]) for pair in ends]]
     weights = np.array([1 + 2 * extra, -extra, -extra]).reshape(1, 1, 3, 1)
-    what = [[np.ones((1, 1, 1, 1))] * len(corners), [weights] * len(ends)]
+    what: list[list[Any]] = [[np.ones((1, 1, 1, 1))] * len(corners), [weights] * len(ends)]
     return basix.ufl.custom_element(
         kind,
         [],

@@ -225,7 +225,7 @@ class DenseStiffness(CondensedStiffness):
         matrix[np.diag_indices(len(matrix))] += np.where(moving, columns.slope, columns.rise)
         if columns.driver is not None:
             matrix[:, columns.driver] = columns.factor
-        found = np.asarray(np.linalg.inv(matrix))
+        found = np.linalg.inv(matrix)
         if not np.all(np.isfinite(found)):
             raise np.linalg.LinAlgError("the tangent is singular")
         return CellInverse(found.__matmul__, math.isqrt(len(found)))

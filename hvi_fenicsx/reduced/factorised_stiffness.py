@@ -40,7 +40,7 @@ class FactorisedStiffness(CondensedStiffness):
         self._system = self._form.system
         self._matrix, self._stiffness = self._form.matrix(), self._system.jacobian.matrix.copy()
         self._diagonal = self._everywhere(self._own[:, interior.here].diagonal())
-        sums = np.asarray(np.abs(self._own).sum(axis=1)).ravel()
+        sums = np.abs(self._own).sum(axis=1).ravel()
         self._size = float(np.max(self._everywhere(sums), initial=0.0))
         self._add(0.0)
 

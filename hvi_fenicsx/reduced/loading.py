@@ -282,8 +282,9 @@ class Carriers:
         Args:
             chosen: their numbers, ascending, (m,).
         """
-        arrays = [each[chosen] for each in (self.lower, self.upper, self.shift, self.points, self.parts)]
-        return Carriers(*arrays, np.searchsorted(chosen, self.carrying))
+        lower, upper, shift = (each[chosen] for each in (self.lower, self.upper, self.shift))
+        carrying = np.searchsorted(chosen, self.carrying)
+        return Carriers(lower, upper, shift, self.points[chosen], self.parts[chosen], carrying)
 
 
 def carriers_of(system: System, interior: Interior, laws: CondensedLaws, moved: Array) -> Carriers:

@@ -88,8 +88,8 @@ class BodyMesh:
         """The normals (k, 3) of facets, as long as their lengths or areas; to the right of an edge in the plane."""
         first, *others = (self.points[corner] for corner in facets.T)
         if len(others) == 1:
-            return np.asarray(np.cross(others[0] - first, [0.0, 0.0, 1.0]))
-        return np.asarray(np.cross(others[0] - first, others[1] - first) / 2)
+            return np.cross(others[0] - first, [0.0, 0.0, 1.0])
+        return np.cross(others[0] - first, others[1] - first) / 2
 
     def sizes(self, facets: Integers) -> Array:
         """The length or the area of facets, m or m², (k,)."""

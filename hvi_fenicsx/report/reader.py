@@ -231,7 +231,7 @@ class PathResult(Finished):
         scaled = {str(name).rpartition(".")[0] for name in self.path["scaled"]}
         parts = list(self.path["peak_forces"])
         known = [part for part in parts if part in scaled] or parts
-        return max(known, key=self._way, default=None)
+        return max(known, key=self._way) if known else None
 
     def _way(self, part: str) -> tuple[float, float]:
         """The way of a part times its force, and the way."""

@@ -58,7 +58,7 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
     """
     problem = solution.problem
     comm, d, owned = problem.domain.mesh.comm, problem.scales.dimension, problem.space.dofmap.index_map.size_local
-    fields = {"points": problem.positions[:owned, :d]}
+    fields: dict[str, Any] = {"points": problem.positions[:owned, :d]}
     fields["cells"] = spaces.global_numbers(problem.space, nodes.linear_cells(problem.space))
     if solution.solve_result is not None:
         u = spaces.values(problem.space, solution.solve_result.u.x.array)

@@ -141,7 +141,7 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
     Raises:
         InputError: it cannot be written, on all ranks alike.
     """
-    points = np.asarray(problem.points / problem.scales.length)
+    points = problem.points / problem.scales.length
     grid = _grid(problem, {"escape_mode": problem.bodies.motion(points, mode)}, {})
     vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", grid)])
 
@@ -204,7 +204,7 @@ def _fields(problem: Problem, state: ContactState) -> dict[str, Array]:
     found |= {name: values for name, values in columns_of(problem, state).items() if name not in ("x", "y", "z")}
     tangents = np.moveaxis(state.surface.tangents, 1, 0)
     found |= {"normal": in_space(state.surface.normals)}
-    found |= {f"t{i + 1}": in_space(tangent) for i, tangent in enumerate(tangents)}
+    found |= {f"t{i + 1}": in_space(tangent) for i, tangent in enumerate([*tangents])}
     if (both := state.of_both_modes) is not None:
         found["mode_mixity"] = both.slip_share
     distances = [law.term.multiplier * law.distance for law in state.laws] or [0.0 * state.pressure]

@@ -262,7 +262,7 @@ class CuttingPlanes:
             return None
         if found.status != 0:
             raise SolverError(f"HiGHS on the rigid motions: {found.message}")
-        return Minimum(found.fun * size, np.asarray(found.x[:k]), found.fun * size)
+        return Minimum(found.fun * size, found.x[:k], found.fun * size)
 
     def _rows(self, f: Functional, region: Polytope, active: list[int]) -> tuple[Array, Array, Array]:
         """Cost and inequality rows of the cut model in (y, one height for each part with factor > 0).

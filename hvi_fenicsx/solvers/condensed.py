@@ -169,13 +169,13 @@ class _Complementarity:
     def force(self, x: Array) -> Array:
         """F, (n,): the residual on Γc of a body that is in equilibrium inside."""
         self._system.equations.residual(self.expand(x), self._residual, self._models)
-        return np.asarray(self._residual.array_r[self.kept])
+        return self._residual.array_r[self.kept]
 
     def tangent(self, x: Array) -> Array:
         """F', (n, n)."""
         jacobian = self._system.jacobian
         jacobian.set_rates(self._system.equations.tangents(self.expand(x), self._models))
-        return np.asarray(self._stiffness + block_diag(*jacobian.rows.tangent)[np.ix_(self._here, self._here)])
+        return self._stiffness + block_diag(*jacobian.rows.tangent)[np.ix_(self._here, self._here)]
 
     def function(self, x: Array) -> Array:
         """Φ, (n,)."""
@@ -184,7 +184,7 @@ class _Complementarity:
     def jacobian(self, x: Array) -> Array:
         """An element of Φ's B-subdifferential, (n, n)."""
         _, by_x, by_force = _mixed(x, self.force(x), *self._bounds)
-        return np.asarray(np.diag(by_x) + by_force[:, None] * self.tangent(x))
+        return np.diag(by_x) + by_force[:, None] * self.tangent(x)
 
     def in_contact(self, x: Array) -> int:
         """The number of dofs whose distance from a bound is smaller than their force."""

@@ -63,7 +63,7 @@ def _stay_on_kinks(context: SolveContext, x: PETSc.Vec) -> SolveResult:
 
 def _drops(context: SolveContext, smoothed: Sequence[Superpotential], x: PETSc.Vec) -> list[Array]:
     """The kink of G on which a vertex is, since its smoothed traction lies between those of both sides, else NaN."""
-    found = []
+    found: list[Array] = []
     for term, smooth in zip(context.system.terms, smoothed, strict=True):
         concave, between = term.law.concave, smooth.concave.left(term.argument(x.array_r))
         on = np.full(len(between), np.nan)

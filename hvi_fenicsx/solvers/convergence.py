@@ -110,7 +110,8 @@ class ConvergenceTest:
         on their bounds.
         """
         system, axes = self._system, self._system.contact_axes
-        at, contact, d = system.jacobian.rows.dofs, system.jacobian.rows.vertices, axes.shape[1]
+        rows, d = system.jacobian.rows, axes.shape[1]
+        at, contact = rows.dofs, rows.vertices.astype(np.int32)
         self._find_motions(x)
         laws, acting = system.equations.at_contact(x) - residual[at], -left.reshape(-1, d)
         laws, acting[contact] = (np.einsum("mij,mi->mj", axes, v.reshape(-1, d)) for v in (laws, acting[contact]))

@@ -146,7 +146,7 @@ def _tractions(part: ContactPart) -> Array:
 
 def _norms(slip: Array, friction: Array, pressure: Array, weights: Array) -> dict[str, float]:
     """L1, L2 and the largest length of vectors (m, d) on Γc."""
-    found = {}
+    found: dict[str, float] = {}
     for name, vectors in (("u_t", slip), ("friction", friction), ("pressure", pressure)):
         lengths = np.linalg.norm(vectors, axis=1)
         found |= {f"{name}_l1": float(weights @ lengths), f"{name}_l2": math.sqrt(float(weights @ lengths**2))}

@@ -127,7 +127,7 @@ class Interior:
             block = slice(start, start + at_once)
             found[:, block] -= self.coupling.T @ self.solve(columns[:, block].toarray())
         self._comm.Allreduce(MPI.IN_PLACE, found)
-        return np.asarray(0.5 * (found + found.T))
+        return 0.5 * (found + found.T)
 
     def is_held(self) -> bool:
         """Whether the kept unknowns hold the body, other than by rounding (inverse iteration). Collective."""

@@ -158,7 +158,7 @@ class Jacobian:
         self.matrix, self._terms = stiffness, tuple(terms)
         surfaces = [*(t.surface for t in terms), *(b.surface for b in bounds)]
         self.rows = ContactRows(stiffness, surfaces)
-        self._rates = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
+        self._rates: list[Array] = [np.zeros((*t.free.shape, t.free.shape[1])) for t in terms]
         self.held: Entities = np.empty(0, np.int32)
         self._comm = stiffness.comm.tompi4py()
 

@@ -274,7 +274,7 @@ class Level:
         given, found = self._traces.createVecLeft(), self.system.load.duplicate()
         given.array[:] = values
         self._traces.multTranspose(given, found)
-        return np.asarray(found.array_r[self.system.jacobian.rows.dofs])
+        return found.array_r[self.system.jacobian.rows.dofs]
 
     def update(self) -> None:
         """Take over the finer level's tangent and held unknowns. Collective.

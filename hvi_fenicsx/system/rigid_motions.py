@@ -66,7 +66,7 @@ def fields(problem: Problem, modes: Sequence[Mode]) -> list[fem.Function]:
         problem: the problem.
         modes: the motions.
     """
-    points = np.asarray(problem.points / problem.scales.length)
+    points = problem.points / problem.scales.length
     found = []
     for mode in modes:
         field = fem.Function(problem.space)
@@ -150,7 +150,7 @@ class Motions:
     @cached_property
     def squares(self) -> Array:
         """The square of the length of each on this rank, (j,)."""
-        return np.asarray(np.einsum("jvd,jvd->j", self.fields, self.fields))
+        return np.einsum("jvd,jvd->j", self.fields, self.fields)
 
 
 def _supported(problem: Problem, body: AnyBody) -> tuple[Array, Array]:

@@ -124,7 +124,7 @@ def _worth_seeing(part: ContactPart) -> ContactPart:
 
 def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     """A curve, with what the laws say of it."""
-    s, values = np.asarray(part["s"] / length.size), np.asarray(field.values / field.unit.size)
+    s, values = (part["s"] / length.size), (field.values / field.unit.size)
     axes.plot(s, values, color=field.colour, marker="o" if len(s) <= MARKED else "", ms=3.6)
     if field.kind == "slip" and part.drops.size:
         look: dict[str, Any] = {"color": INK, "ls": (0, (4, 3)), "lw": 1.4, "zorder": 4}
@@ -135,7 +135,7 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     elif field.kind == "pressure":
         axes.fill_between(s, values, color=field.colour, alpha=0.15, lw=0)
     everywhere = axes.get_xaxis_transform()
-    axes.fill_between(s, 0.0, 1.0, where=part.lifted.tolist(), transform=everywhere, color=ORANGE, alpha=0.16, lw=0)
+    axes.fill_between(s, 0.0, 1.0, where=list(part.lifted), transform=everywhere, color=ORANGE, alpha=0.16, lw=0)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)  # zero is always in sight
     axes.margins(0.015, 0.06)
     few_ticks(axes, "y")
