@@ -299,7 +299,7 @@ def _tangent(left: _Piece, right: _Piece) -> tuple[float, float, float]:
     marks = [a.rate(left.start), a.rate(a.high), first, b.rate(b.high)]
     p, most, rounding = min(marks), max(marks), float(np.finfo(float).eps)
     if _apart_at(most, left, right) >= 0.0:
-        p = most
+        p = np.inf
     elif _apart_at(p, left, right) > 0.0:
         p = brentq(_apart_at, p, most, (left, right), rounding * max(abs(p), abs(most)), 4.0 * rounding, maxiter=1000)
     (x, value), (y, other) = left.support(p), right.support(p)

@@ -135,7 +135,7 @@ class Relaxation:
         slope, drops = problem.arcs.least_slope(low, high), problem.arcs.drops(low, high)
         undecided = np.flatnonzero((high > low) & ((drops > 0.0) | (slope < 0.0)))
         own = np.where(np.isfinite(slope), np.maximum(slope, 0.0), 0.0)
-        own[problem.size :] = 0.0
+        own[problem.size :] = self._own_of_lengths(low, own, drops)
         most = float(seen[undecided].max(initial=0.0))
         strength = np.where(drops > 0.0, drops, -slope * (high - low)) * (
             seen / most + LIMITS.worthwhile if most > 0.0 else 1.0
@@ -146,6 +146,13 @@ class Relaxation:
         added = self._given(matrix, free, undecided, strength[undecided], need)
         radii = self._radii(self._inverse(matrix - np.diag(problem.diagonal(added)), free))
         return Curvature(added=added - own, radii=np.where(self._moved(free), np.inf, radii), range_radii=radii)
+
+    def _own_of_lengths(self, low: Array, own: Array, drops: Array) -> Array:
+        """Slopes that laws of lengths give to S and still do not fall, (m,)."""
+        n = self.problem.size
+        rate = np.maximum(self.problem.arcs.rates(low)[0][n:], 0.0)
+        secant = np.divide(rate, low[n:], out=np.full_like(rate, np.inf), where=low[n:] > 0.0)
+        return np.where(self.problem.lengths.opens | (drops[n:] > 0.0), 0.0, np.minimum(own[n:], secant))
 
     def _given(self, matrix: Array, free: Array, undecided: Integers, weights: Array, need: Array) -> Array:
         """D, (n + m,): in proportion to the weights, but no more than is needed."""
