@@ -196,7 +196,6 @@ class LowestSearch:
             found = self._relaxation.solve(box)
             weights = 0.5 * (box.weights + found.spread) if box.weights.any() else found.spread
             box = replace(box, x=found.x, bound=max(before, found.bound), weights=weights)
-            self._try(found.x)
             if box.bound >= self.upper - self._allowed or np.any((box := self._smaller(box, found)).low > box.high):
                 return
             if not found.gap or box.bound - before < LIMITS.worthwhile * (self.upper - box.bound):
@@ -204,6 +203,7 @@ class LowestSearch:
             if self.cut():
                 break
         assert found is not None
+        self._try(found.x)
         if not found.gap:  # the minimum is the energy of a point, but for what the programme is off
             i = int(np.argmax(box.high - box.low))
             found = replace(found, argument=i, place=0.5 * float(box.low[i] + box.high[i]))
@@ -221,7 +221,8 @@ class LowestSearch:
     def _try(self, x: Array) -> None:
         """Descend from a point."""
         low, high = self.region
-        found, energy = descend(self.problem, low, high, clipped(x, low, high), self.upper, self.cut)
+        goal = self.upper - self._allowed
+        found, energy = descend(self.problem, low, high, clipped(x, low, high), goal, self.cut)
         if energy < self.upper:
             self.x, self.upper = found, energy
 
