@@ -327,9 +327,10 @@ class _SnesRun:
         the residual does not.
         """
         small, stood, left = self._thresholds.coarse_tolerance, self._stood, self._last
-        self._useless = 0 if left < 0.5 * self._least else self._useless + 1
+        self._useless += 1
+        if left < 0.5 * self._least:
+            self._least, self._useless = left, 0
         self._stood = abs(left - before) < small * before
-        self._least = min(self._least, left)
         counts = self._attempt.line_search == FULL_STEPS or left < small
         return (stood and self._stood) or (counts and self._useless >= self._thresholds.few_steps)
 

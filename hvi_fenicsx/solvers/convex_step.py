@@ -27,6 +27,7 @@ from . import kink_bounds
 from .active_set import ENERGY, EXACT, Attempt
 from .convergence import Counts, Outcome
 from .method import SolveContext
+from .resting_start import at_rest
 
 UNBOUNDED = "the body slides away on what is left of its bonds"
 
@@ -228,10 +229,18 @@ class ConvexStep:
             self._check_bounded = True
             if is_unbounded(self._system, self._laws, [m.xi for m in models if m.xi is not None]):
                 yield UNBOUNDED
+        if is_quadratic(self._system) and (rested := at_rest(self._solver, self._laws)) is not None:
+            self._counts.linear += rested[1]
+            yield Attempt(models=models, start=rested[0])
         yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.foundation)
         secants = [replace(m, secant_from=m.law.length_scale) for m in models]
         yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
         yield Attempt(models=models)
+
+
+def is_quadratic(system: System) -> bool:
+    """Whether the energy is quadratic: laws that are linear springs at most. The same on all ranks."""
+    return all(term.is_linear for term in system.terms)
 
 
 def no_step() -> Outcome:

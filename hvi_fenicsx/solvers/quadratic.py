@@ -15,18 +15,13 @@ from ..system.equations import VertexModel
 from ..system.system import System
 from .branch import BranchIteration
 from .convergence import Counts, Outcome
+from .convex_step import is_quadratic
 from .method import Method, SolveResult, SolverTable, find
-from .resting_start import at_rest
 
 
 def is_equation(system: System) -> bool:
     """Whether nothing nonsmooth acts: no bounds, and laws that are linear springs at most. The same on all ranks."""
     return not system.bounds and is_quadratic(system)
-
-
-def is_quadratic(system: System) -> bool:
-    """Whether the energy is quadratic: laws that are linear springs at most. The same on all ranks."""
-    return all(term.is_linear for term in system.terms)
 
 
 class LinearSolve(Method):
@@ -70,14 +65,12 @@ class ConvexProgramme(BranchIteration):
         """The minimiser, or what was reached. Collective.
 
         Args:
-            start: where to begin; by default with contact closed, then with bodies at rest on their supports.
+            start: where to begin; by default with contact closed.
             branches: as of :meth:`.BranchIteration.solve`.
         """
         found = super().solve(start)
-        if found.converged or found.interrupted:
-            return found
-        rested = at_rest(self.solver, self._laws)
-        return found if rested is None else super().solve(rested[0])
+        self.counts.branch = 0  # it is not iterated
+        return found
 
     def _tolerances(self) -> list[float]:
         return [self.options.tolerance]
