@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import dolfinx
 import numpy as np
 from dolfinx import mesh as dmesh
 
@@ -36,7 +35,7 @@ def in_copies(facets: Entities, mesh: dmesh.Mesh, cells: Entities, other: dmesh.
     return np.unique(cell_facets(other)[copies][on[of_cells[cells]]]).astype(np.int32)
 
 
-def owned(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Entities:
+def owned(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     """Those of some local facets that this rank owns.
 
     Args:
@@ -46,7 +45,7 @@ def owned(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Entities:
     return facets[facets < mesh.topology.index_map(mesh.topology.dim - 1).size_local]
 
 
-def corners(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
+def corners(mesh: dmesh.Mesh, facets: Entities) -> Array:
     """The vertices of facets, m, (f, d, d): by facet, vertex and coordinate.
 
     Args:
@@ -56,7 +55,7 @@ def corners(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
     d = mesh.topology.dim
     if not len(facets):  # dolfinx divides by their number
         return np.empty((0, d, d))
-    found = dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets)
+    found = dmesh.entities_to_geometry(mesh, d - 1, facets)
     return mesh.geometry.x[found][:, :, :d]
 
 
@@ -71,7 +70,7 @@ def areas(points: Array) -> Array:
     return np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / math.factorial(edges.shape[1])
 
 
-def turns(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
+def turns(mesh: dmesh.Mesh, facets: Entities) -> Array:
     """The largest angle (rad, up to a right one) between a vertex's first facet and its others, by vertex.
 
     Args:
@@ -85,7 +84,7 @@ def turns(mesh: dolfinx.mesh.Mesh, facets: Entities) -> Array:
     edges = points[:, 1:] - points[:, :1]
     normals = edges[:, 0, ::-1] * [1.0, -1.0] if d == 2 else np.cross(edges[:, 0], edges[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    nodes = dolfinx.mesh.entities_to_geometry(mesh, d - 1, facets).ravel() if len(facets) else np.empty(0, np.int32)
+    nodes = dmesh.entities_to_geometry(mesh, d - 1, facets).ravel() if len(facets) else np.empty(0, np.int32)
     _, first, vertex, count = np.unique(nodes, return_index=True, return_inverse=True, return_counts=True)
     own = np.repeat(normals, d, axis=0)
     along = np.abs(np.sum(own * own[first][vertex], axis=1))

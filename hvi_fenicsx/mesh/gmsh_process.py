@@ -66,7 +66,9 @@ def _wanted(file: str, *words: str) -> dict[str, Any]:
 
 
 def _read(gmsh: Any, path: Path, is_script: bool, dimension: int, memory: float) -> dict[str, Any]:
-    opened = path if is_script else _linked(path)
+    opened = path if is_script else Path(_LINKED)
+    if not is_script:  # gmsh chooses by names what it does, and would read options beside the file
+        os.symlink(path, opened)
     if not processes.confine(memory) and is_script:
         raise InputError(
             f"mesh file {path}: is a script, which may run programs, and this system cannot forbid it (Linux can from "
@@ -83,12 +85,6 @@ def _read(gmsh: Any, path: Path, is_script: bool, dimension: int, memory: float)
     found = gmsh_arrays.check(gmsh, path, dimension)
     names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}
     return {**vars(found), "names": np.array(json.dumps(names))}
-
-
-def _linked(path: Path) -> Path:
-    """The mesh by another name: gmsh chooses by names what it does, and would read options beside the file."""
-    os.symlink(path, _LINKED)
-    return Path(_LINKED)
 
 
 def _open(gmsh: Any, path: Path, dimension: int) -> None:

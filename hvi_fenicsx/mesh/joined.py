@@ -311,7 +311,7 @@ def check_places(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> None:
     Raises:
         InputError: on all ranks alike, with a place.
     """
-    own = [_corners(body) for body in bodies]
+    own = [body.points[body.cells] for body in bodies]
     boxes = [_box(comm, corners) for corners in own]
     for i, j in permutations(range(len(bodies)), 2):
         low, high = np.maximum(boxes[i][0], boxes[j][0]), np.minimum(boxes[i][1], boxes[j][1])
@@ -324,11 +324,6 @@ def check_places(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> None:
                     f'domain.{bodies[i].name}: at {spot(at[0])} it overlaps the body "{bodies[j].name}"; '
                     "move one of them by its origin, or make them one body"
                 )
-
-
-def _corners(body: PlacedBody) -> Array:
-    """The corners of the cells that this rank owns, in their place, (c, d+1, d)."""
-    return body.points[body.cells]
 
 
 def _box(comm: MPI.Comm, corners: Array) -> tuple[Array, Array]:

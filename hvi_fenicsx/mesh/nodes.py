@@ -57,9 +57,7 @@ def points(space: fem.FunctionSpace) -> Array:
 
     ``tabulate_dof_coordinates`` maps each from each of its cells, four times as slowly.
     """
-    count = space.mesh.topology.index_map(space.mesh.topology.dim)
-    corners = compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
-    corners = corners[:, : space.dofmap.list.shape[1]]  # of curved cells the nodes of degree 2 are the geometry's
+    corners = _cells(space)[:, : space.dofmap.list.shape[1]]  # curved cells have nodes of degree 2
     dofs, vertices = space.dofmap.list[: len(corners)], corners.shape[1]
     index_map = space.dofmap.index_map
     size = index_map.size_local + index_map.num_ghosts
@@ -72,6 +70,12 @@ def points(space: fem.FunctionSpace) -> Array:
     return found
 
 
+def _cells(space: fem.FunctionSpace) -> Entities:
+    """The local cells by the nodes of their geometry."""
+    count = space.mesh.topology.index_map(space.mesh.topology.dim)
+    return compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
+
+
 def reference_points(space: fem.FunctionSpace) -> Array:
     """The nodes of a cell by their barycentric coordinates, in the order of its dofs, (nodes, d+1)."""
     corners = np.eye(space.mesh.topology.dim + 1)
@@ -81,8 +85,7 @@ def reference_points(space: fem.FunctionSpace) -> Array:
 
 def dof_of_node(space: fem.FunctionSpace) -> Entities:
     """The (block) dof at each geometry node of the mesh, whose nodes are its vertices, (nodes,)."""
-    count = space.mesh.topology.index_map(space.mesh.topology.dim)
-    corners = compat.geometry_dofmap(space.mesh)[: count.size_local + count.num_ghosts]
+    corners = _cells(space)
     result = np.zeros(space.mesh.geometry.x.shape[0], dtype=np.int32)
     result[corners] = space.dofmap.list[: len(corners), : corners.shape[1]]
     return result
@@ -153,8 +156,7 @@ def hats(degree: int, barycentric: Array) -> Array:
     if degree == 1:
         return barycentric
     corners = np.maximum(2 * barycentric - 1, 0.0)
-    pairs = basix.topology(basix.CellType[{2: "interval", 3: "triangle"}[barycentric.shape[1]]])[1]
-    ends = [2 * barycentric[:, pair] for pair in pairs]
+    ends = [2 * barycentric[:, pair] for pair in basix.topology(basix.CellType[_BY_CORNERS[barycentric.shape[1]]])[1]]
     edges = [np.minimum(both.min(axis=1), both.sum(axis=1) - 1) for both in ends]
     return np.column_stack([corners, *(np.maximum(edge, 0.0) for edge in edges)])
 

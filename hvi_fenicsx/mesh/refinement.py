@@ -19,7 +19,7 @@ from ..typing import Array, Entities
 from . import curved
 from .domain import DEFAULT, Domain, check_affordable
 from .facets import cell_facets
-from .transfer import Halves, ParentCellTransfer, Transfer
+from .transfer import Halves, ParentCellTransfer
 
 _SKEWED = np.eye(3) + ROUNDING * np.sqrt([[2, 3, 5], [3, 7, 11], [5, 11, 13]])
 """Edges are measured after this linear map: there edges of equal length differ by direction, on all ranks alike."""
@@ -58,17 +58,9 @@ def repeated(domain: Domain, times: int) -> Domain:
         unknowns = d * vertices * 2 ** (d * times)
         check_affordable(domain.mesh.comm, unknowns, d, "domain.refinements", "use fewer refinements")
     for _ in range(times):
-        domain = _with_coarser(domain, uniform(domain))
+        step = uniform(domain)
+        domain = replace(step.domain, coarsening=lambda found=(domain, step.transfer): found)
     return domain
-
-
-def _with_coarser(coarse: Domain, step: Refinement) -> Domain:
-    """The refined domain, with the one that it came from as its coarser level."""
-
-    def coarsening() -> tuple[Domain, Transfer]:
-        return coarse, step.transfer
-
-    return replace(step.domain, coarsening=coarsening)
 
 
 def marked(domain: Domain, cells: Entities) -> Refinement:

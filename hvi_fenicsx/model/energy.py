@@ -33,10 +33,10 @@ class Energy(Effect):
     strains only. Where other materials are elsewhere, it must itself integrate over its region.
     """
 
-    key: ClassVar[str] = "energy"
-    place: ClassVar[Place] = Place.MATERIAL
+    key = "energy"
+    place = Place.MATERIAL
     in_files: ClassVar[bool] = False
-    term: ClassVar[str] = "a(u, v), a form of the user's own"
+    term = "a(u, v), a form of the user's own"
 
     form: Callable[..., Any] = Field(exclude=True)
     """makes the form of trial and test function, SI"""

@@ -111,8 +111,8 @@ class BoundaryTable(_EffectTable):
     """A part of the boundary and the effects that act on it. NAME is the name of the part in the results."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
-    place: ClassVar[Place] = Place.BOUNDARY
-    where_key: ClassVar[str] = "on"
+    place = Place.BOUNDARY
+    where_key = "on"
 
     on: Names
     """a side of the shape, a physical group of the mesh file, or a list of them"""
@@ -127,8 +127,8 @@ class InterfaceTable(_EffectTable):
     NAME is the name of the part in the results.
     """
 
-    place: ClassVar[Place] = Place.BOUNDARY
-    where_key: ClassVar[str] = ""
+    place = Place.BOUNDARY
+    where_key = ""
 
     between: Annotated[tuple[str, str], vector(2)]
     """the two sides, like ["lower.top", "upper.bottom"]; the vertices of the first carry contact and laws, and its
@@ -145,8 +145,8 @@ class InterfaceTable(_EffectTable):
 class BodyTable(_EffectTable):
     """The effects that act in the body, or in one region of it."""
 
-    place: ClassVar[Place] = Place.BODY
-    where_key: ClassVar[str] = "region"
+    place = Place.BODY
+    where_key = "region"
 
     region: Names | None = None
     """a physical group of cells, or a list of them; without it the whole body"""

@@ -115,11 +115,7 @@ class Box(Block):
     """A box from the origin to `size`, in tetrahedra; sides left, right (x), front, back (y), bottom, top (z)."""
 
     dimension = 3
-    normals: ClassVar = {
-        **{"left": 0, "right": 0},
-        **{"front": 1, "back": 1},
-        **{"bottom": 2, "top": 2},
-    }
+    normals: ClassVar = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
 
     shape: Literal["box"] = "box"
     """one corner is the origin"""
@@ -265,10 +261,7 @@ def _check_smaller(name: str, part: tuple[float, float], size: tuple[float, floa
 class LShape(PlaneShape):
     """An L: a rectangle without a smaller rectangle at its upper right corner."""
 
-    normals: ClassVar = {
-        **{"left": 0, "right": 0, "bottom": 1, "top": 1},
-        **{"inner_right": 0, "inner_top": 1},
-    }
+    normals: ClassVar = {"left": 0, "right": 0, "bottom": 1, "top": 1, "inner_right": 0, "inner_top": 1}
 
     shape: Literal["l_shape"] = "l_shape"
     """sides left, right, bottom, top, and inner_right, inner_top, which meet at the re-entrant corner"""
