@@ -169,7 +169,7 @@ def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
     _check_axes(scene, axes)
     scene = scene.with_solver(degree=scene.solver.degree or 1)
     left_out = list[str]()
-    products: list[Values] = [axes] if axes else [*_default(scene)]
+    products: list[Values] = [dict(axes)] if axes else [*_default(scene)]
     wanted = [point for product in products for point in _combinations(scene, product, left_out)]
     if not wanted:
         raise InputError("--axis: no combination of these is a scene:\n" + "\n".join(left_out))
