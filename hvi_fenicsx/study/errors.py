@@ -9,7 +9,7 @@ node outside of all cells takes its nearest cell's field, continued.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import basix
@@ -43,8 +43,6 @@ NORMS: Mapping[str, tuple[str, str]] = {
 """The quantities whose errors are measured, in the order of the tables: what they are, and their names in sentences."""
 Errors = Mapping[str, float | None]
 """Relative errors by the keys of :data:`NORMS`; None where there is nothing to measure."""
-Transfer = Callable[[Array], Array]
-"""Vectors at other points from those at the nodes of a mesh."""
 _KINDS = {1: "interval", 2: "triangle", 3: "tetrahedron"}
 
 
@@ -81,7 +79,7 @@ class ReferenceSolution:
 
     def __init__(self, arrays: SolutionArrays, stiffness: sparse.csr_array, joints: Collection[str] = ()) -> None:
         self._arrays, self._stiffness, self._joints = arrays, stiffness, joints
-        self._ends, self._transfers = edge_ends(arrays), dict[bytes, tuple[Transfer, dict[str, sparse.csr_array]]]()
+        self._ends = edge_ends(arrays)
         self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[arrays.points.shape[1]]
         parts, d = arrays.parts.values(), arrays.points.shape[1]
         self._weights = np.concatenate([np.empty(0), *(part.weight for part in parts)])
@@ -90,22 +88,16 @@ class ReferenceSolution:
         self.own = self.transfer(arrays)
 
     def transfer(self, found: SolutionArrays) -> Fields:
-        """A solution, which must have a displacement, on the reference's nodes; the way from a mesh is found once."""
-        key = found.points.tobytes() + found.cells.tobytes()
-        if key not in self._transfers:
-            points = {name: self._arrays.points[part.vertices] for name, part in self._arrays.parts.items()}
-            along = {name: surface(found, found.parts[name], x) for name, x in points.items()}
-            self._transfers = {key: (between_bodies(found, self._arrays), along)}
-        in_bodies, on_parts = self._transfers[key]
-        assert found.displacement is not None
-        u = in_bodies(found.displacement)
+        """A solution, which must have a displacement, on the reference's nodes."""
+        u = in_bodies(found, self._arrays)
         rows = [np.empty((0, 2 * u.shape[1] + 2))]
-        for name, way in on_parts.items():
-            part, own = found.parts[name], self._arrays.parts[name]
-            here = u[own.vertices]
-            slip = here - np.sum(here * own.normal, axis=1)[:, None] * own.normal
-            slip = way @ part.vectors("slip") if name in self._joints else slip
-            rows.append(np.hstack([slip, way @ _tractions(part)]))
+        for name, own in self._arrays.parts.items():
+            part, here = found.parts[name], u[own.vertices]
+            values = np.hstack([part.vectors("slip"), _tractions(part)])
+            told = on_part(found, part, values, self._arrays.points[own.vertices])
+            if name not in self._joints:
+                told[:, : u.shape[1]] = here - np.sum(here * own.normal, axis=1)[:, None] * own.normal
+            rows.append(told)
         slip, friction, others = np.split(np.vstack(rows), [u.shape[1], 2 * u.shape[1]], axis=1)
         return Fields(u, slip, friction, others[:, 0], others[:, 1] > 0.5)
 
@@ -196,27 +188,20 @@ def mesh_width(arrays: SolutionArrays) -> float:
     return float((largest * (2.0 / np.sqrt(3.0) if d == 2 else np.sqrt(2.0))) ** (1.0 / d))
 
 
-def between_bodies(source: SolutionArrays, target: SolutionArrays) -> Transfer:
-    """What takes vectors at the nodes of a mesh to those of another one of the same bodies. On this process alone.
+def in_bodies(source: SolutionArrays, target: SolutionArrays) -> Array:
+    """The displacement of a solution, which must have one, at the nodes of another one. On this process alone.
 
     Args:
-        source: a solution on the mesh.
-        target: one on the other mesh.
+        source: the solution.
+        target: one of the same bodies.
     """
     cells, bodies, wanted = cells_of(source), _bodies(source), _bodies(target)
-    boxes, pieces = _boxes(source, bodies), list[tuple[Integers, Transfer]]()
+    boxes, found = _boxes(source, bodies), np.empty(target.points.shape)
     for body, box in enumerate(_boxes(target, wanted)):
         same = np.argmin(np.linalg.norm(boxes - box, axis=1))
-        rows = np.flatnonzero(wanted == body)
-        pieces.append((rows, _in_body(source.points, cells[bodies[cells[:, 0]] == same], target.points[rows])))
-
-    def taken(values: Array) -> Array:
-        found = np.empty(target.points.shape)
-        for rows, piece in pieces:
-            found[rows] = piece(values)
-        return found
-
-    return taken
+        rows = wanted == body
+        found[rows] = _in_body(source, cells[bodies[cells[:, 0]] == same], target.points[rows])
+    return found
 
 
 def _bodies(arrays: SolutionArrays) -> Integers:
@@ -233,30 +218,27 @@ def _boxes(arrays: SolutionArrays, bodies: Integers) -> Array:
     return np.array([np.concatenate([own.min(axis=0), own.max(axis=0)]) for own in points])
 
 
-def _in_body(vertices: Array, cells: Integers, points: Array) -> Transfer:
-    """What takes vectors (n, d) at all nodes to points of a body by its cells, whose degree its functions have."""
+def _in_body(source: SolutionArrays, cells: Integers, points: Array) -> Array:
+    """The displacement of a solution at points of a body by its cells, continued where they are outside."""
     kept, local = np.unique(cells, return_inverse=True)
-    d, degree = vertices.shape[1], 1 if cells.shape[1] == vertices.shape[1] + 1 else 2
+    d = points.shape[1]
     local = local.reshape(cells.shape)
-    mesh = compat.simplex_mesh(MPI.COMM_SELF, local, vertices[kept], _KINDS[d], degree=degree)
+    mesh = compat.simplex_mesh(MPI.COMM_SELF, local, source.points[kept], _KINDS[d], degree=source.degree)
     at = in_space(points)
-    containing = transfer.containing_cells(mesh, at).astype(np.int32)
-    field = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, (d,))))
+    field = fem.Function(fem.functionspace(mesh, ("Lagrange", source.degree, (d,))))
     own = kept[mesh.geometry.input_global_indices[compat.geometry_dofmap(mesh)]]
-
-    def taken(values: Array) -> Array:
-        field.x.array.reshape(-1, d)[field.function_space.dofmap.list] = values[own]
-        return np.asarray(field.eval(at, containing)).reshape(-1, d)
-
-    return taken
+    assert source.displacement is not None
+    field.x.array.reshape(-1, d)[field.function_space.dofmap.list] = source.displacement[own]
+    return np.asarray(field.eval(at, transfer.containing_cells(mesh, at).astype(np.int32))).reshape(-1, d)
 
 
-def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.csr_array:
-    """The matrix from a part's rows (n) to points on it (m) of what is linear between neighbouring nodes, as tractions.
+def on_part(source: SolutionArrays, part: ContactPart, values: Array, points: Array) -> Array:
+    """Values at the vertices of a part, at points on it: linear between neighbouring nodes, as tractions, (m, k).
 
     Args:
         source: the solution.
         part: of it.
+        values: (n, k).
         points: m, (m, d).
     """
     kept, local = np.unique(part.facets, return_inverse=True)
@@ -267,6 +249,6 @@ def surface(source: SolutionArrays, part: ContactPart, points: Array) -> sparse.
     nearest = geometry.compute_closest_entity(tree, middles, line, in_space(points))
     corners = part.facets[line.topology.original_cell_index[nearest]]
     weights = transfer.clipped(transfer.barycentric_weights(source.points[corners], points))
-    starts, rows = np.arange(0, corners.size + 1, d), np.empty(len(source.points), dtype=np.int64)
-    rows[part.vertices] = np.arange(len(part.vertices))
-    return sparse.csr_array((weights.ravel(), rows[corners].ravel(), starts), (len(points), len(part.vertices)))
+    everywhere = np.zeros((len(source.points), values.shape[1]))
+    everywhere[part.vertices] = values
+    return np.einsum("mc,mck->mk", weights, everywhere[corners])

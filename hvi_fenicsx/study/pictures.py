@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator
 
 from ..report.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, VERMILION, figure, save, titled
 from .errors import NORMS
-from .table import Row, Study, duration
+from .table import Row, Study
 
 _COLOURS = {None: GREEN, "quadratic": BLUE, "chks": PURPLE, "log_exp": ORANGE, "paper": VERMILION}
 _PICTURES: Mapping[str, tuple[str, str]] = {
-    "work_precision": ("seconds", "time to solution, without compilation and output"),
+    "work_precision": ("seconds", "time to solution in s, without compilation and output"),
     "error_h": ("h", "mesh width h in m"),
     "error_epsilon": ("epsilon", "ε, relative to the law's energy at its kink, on the scene's own mesh"),
 }
@@ -49,9 +48,9 @@ def _page(study: Study, along: str, label: str, lines: Mapping[str, list[Row]]) 
             _line(axes, rows, along, quantity, name)
         _beside(axes, study, along, quantity)
         _dress(axes, study, quantity)
-    _label(panels[-1].xaxis, duration if along == "seconds" else _decimal)
     handles = {text: line for axes in panels for line, text in zip(*axes.get_legend_handles_labels(), strict=True)}
     fig.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize=10)
+    _label(panels[-1].xaxis)
     panels[-1].set_xlabel(label)
     return fig
 
@@ -95,20 +94,15 @@ def _dress(axes: Axes, study: Study, quantity: str) -> None:
     """The title and the grid; the reference's own error is a grey band from below."""
     axes.grid(which="major", color="#e6e6e6", lw=0.8)
     axes.set_title(f"error in {NORMS[quantity][1]}".replace("_t", "ₜ").replace("_n", "ₙ").replace("-", "−"), loc="left")
-    _label(axes.yaxis, lambda y: f"{_decimal(100 * y)} %")
+    _label(axes.yaxis)
     low, own = axes.get_ylim()[0], study.certain[quantity].error
     if own is not None and own > low:
         axes.axhspan(low, own, color=GREY, alpha=0.16, lw=0, zorder=0, label="the reference's own error")
 
 
-def _label(axis: Axis, text: Callable[[float], str]) -> None:
+def _label(axis: Axis) -> None:
     """Label a logarithmic axis at the powers of ten, between few of them at 2 and 5 too."""
     low, high = axis.get_view_interval()
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 1e3 * low else (1.0,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: text(value)))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def _decimal(value: float) -> str:
-    """A number without a power of ten, however small, since those of one axis should look alike."""
-    return np.format_float_positional(value, precision=3, fractional=False, trim="-")
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")

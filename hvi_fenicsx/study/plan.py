@@ -30,20 +30,6 @@ Values = Mapping[str, Sequence[Any]]
 """The values by axis; of the mesh also domain shapes."""
 
 
-def law_text(smoothing: str | None, epsilon: float | None, epsilon_absolute: float | None) -> str:
-    """The law in words: exact, or how it is smoothed.
-
-    Args:
-        smoothing: its kind; None for the exact law.
-        epsilon: its relative width.
-        epsilon_absolute: its width in N/m, where the scene says it so.
-    """
-    if smoothing is None:
-        return "exact law"
-    width = f"{epsilon_absolute:g} N/m" if epsilon_absolute is not None else f"{epsilon:.3g}"
-    return f"{'' if smoothing == 'quadratic' else f'{smoothing}, '}ε = {width}"
-
-
 @dataclass(frozen=True)
 class Point:
     """What one point of a study solves.
@@ -80,8 +66,7 @@ class Point:
 
     def __str__(self) -> str:
         solver = self.scene.solver
-        law = law_text(solver.smoothing, solver.epsilon, solver.epsilon_absolute)
-        return f"{self.mesh}, degree {self.degree}, {law}, {solver.method}"
+        return f"{self.mesh}, degree {self.degree}, {solver.smoothing or 'exact law'}, {solver.method}"
 
 
 @dataclass(frozen=True)
@@ -166,7 +151,12 @@ def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
     Raises:
         InputError: an axis that the scene has not, or named twice; or none of the combinations is a scene.
     """
-    _check_axes(scene, axes)
+    names = [name for name, _ in axes]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"--axis {name}: is given twice; put its values into one list")
+        if name in _UNSMOOTHED and not scene.laws():
+            raise InputError(f"--axis {name}: the scene has no law that could be smoothed; leave the axis out")
     scene = scene.with_solver(degree=scene.solver.degree or 1)
     left_out = list[str]()
     products: list[Values] = [dict(axes)] if axes else [*_default(scene)]
@@ -181,15 +171,6 @@ def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
     degree = max(point.degree for point in everything)
     points = tuple(sorted(distinct, key=lambda p: (p.unknowns, p.scene.solver.smoothing is not None)))
     return replace(plan, points=points, reference=_reference(finest, degree))
-
-
-def _check_axes(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> None:
-    names = [name for name, _ in axes]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"--axis {name}: is given twice; put its values into one list")
-        if name in _UNSMOOTHED and not scene.laws():
-            raise InputError(f"--axis {name}: the scene has no law that could be smoothed; leave the axis out")
 
 
 def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:

@@ -16,7 +16,7 @@ from ..runtime.log import percent
 from ..runtime.manifest import __version__, versions
 from ..schema import unknown
 from .errors import NORMS, Errors
-from .plan import Plan, Point, law_text
+from .plan import Plan, Point
 
 PHASES = ("mesh", "assembly", "setup", "solve", "certificate")
 """What a point costs: compilation is paid once for all, and a study writes no results."""
@@ -120,7 +120,10 @@ class Row:
     @property
     def law(self) -> str:
         """The law in words: exact, or how it is smoothed."""
-        return law_text(self.smoothing, self.epsilon, self.epsilon_absolute)
+        if self.smoothing is None:
+            return "exact law"
+        width = f"{self.epsilon:.3g}" if self.epsilon_absolute is None else f"{self.epsilon_absolute:g} N/m"
+        return f"{'' if self.smoothing == 'quadratic' else f'{self.smoothing}, '}ε = {width}"
 
     @property
     def way(self) -> tuple[str, str, float]:
@@ -193,10 +196,11 @@ class Study:
 
     def front(self, quantity: str) -> list[Row]:
         """The points that nothing cheaper is as accurate as, cheapest first; errors count with two digits."""
-        known = [(r.seconds, float(f"{e:.1e}"), r) for r in self.rows if (e := self.claimed(r, quantity)) is not None]
-        found: list[Row] = []
-        best = math.inf
-        for _, error, row in sorted(((s, e, r) for s, e, r in known if s is not None), key=lambda t: t[:2]):
+        known = [
+            (r.seconds or 0.0, float(f"{e:.1e}"), r) for r in self.rows if (e := self.claimed(r, quantity)) is not None
+        ]
+        found, best = list[Row](), math.inf
+        for _, error, row in sorted(known, key=lambda t: t[:2]):
             if error < best:
                 best = error
                 found.append(row)
@@ -344,14 +348,15 @@ def _targets(study: Study, quantity: str) -> str:
     """What each accuracy costs, up to the first that is not reached."""
     best, parts = study.front(quantity), dict[str, list[str]]()
     for target in _TARGETS:
-        row = next((r for r in best if (study.claimed(r, quantity) or 0.0) <= target), None)
-        cost = "is not reached here" if row is None else f"for {duration(row.seconds)} ({row.text})"
-        parts.setdefault(cost, []).append(_of_error(target))
-        if row is None:
-            at, least = best[-1], _of_error(study.claimed(best[-1], quantity) or 0.0)
-            parts[f"the best that can be claimed is {least} for {duration(at.seconds)} ({at.text})"] = []
+        row = next((r for r in best if (study.claimed(r, quantity) or 0.0) <= target), best[-1])
+        claimed, cost = study.claimed(row, quantity) or 0.0, f"for {duration(row.seconds)} ({row.text})"
+        if claimed > target:
+            parts[f"is not reached here; the best that can be claimed is {_of_error(claimed)} {cost}"] = [
+                _of_error(target)
+            ]
             break
-    said = (f"{', '.join(targets)} {cost}".strip() for cost, targets in parts.items())
+        parts.setdefault(cost, []).append(_of_error(target))
+    said = (f"{', '.join(targets)} {cost}" for cost, targets in parts.items())
     return f"In {NORMS[quantity][1]}: {'; '.join(said)}."
 
 
