@@ -145,11 +145,8 @@ class Bulk:
     @functools.cached_property
     def _internal(self) -> tuple[fem.Form, fem.Function]:
         """The compiled form a(u, ·), and its u: much quicker than to derive the form for each u."""
-        return self._once("elastic force", self._action)
-
-    def _action(self) -> tuple[fem.Form, fem.Function]:
         displacement = fem.Function(self.space)
-        return forms.compiled(ufl.action(self.form, displacement)), displacement
+        return self._once("elastic force", lambda: (forms.compiled(ufl.action(self.form, displacement)), displacement))
 
     @functools.cached_property
     def dilatations(self) -> list[Dilatation]:

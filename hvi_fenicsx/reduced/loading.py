@@ -306,7 +306,12 @@ def carriers_of(system: System, interior: Interior, laws: CondensedLaws, moved: 
     named = np.full(system.load.local_size, "", dtype=object)
     for bounds in system.bounds:
         named[bounds.component()[0]] = bounds.surface.part
-    _refuse_laws(laws, shift)
+    for bonds in laws.bonds:
+        if np.any(shift[bonds.unknowns] != 0.0):  # laws act on the body's own displacement
+            raise InputError(
+                f"boundary.{bonds.part}: the path moves an obstacle along the displacement that this "
+                "law acts on; leave the vertices that both parts share out of one of them (where)"
+            )
     return Carriers(
         lower=lower - shift,
         upper=upper - shift,
@@ -315,13 +320,3 @@ def carriers_of(system: System, interior: Interior, laws: CondensedLaws, moved: 
         parts=np.where(bounded, interior.gathered(named), ""),
         carrying=np.unique(np.concatenate([np.flatnonzero(bounded), *with_law])),
     )
-
-
-def _refuse_laws(laws: CondensedLaws, shift: Array) -> None:
-    """Laws act on the body's own displacement, which is not that relative to an obstacle."""
-    for bonds in laws.bonds:
-        if np.any(shift[bonds.unknowns] != 0.0):
-            raise InputError(
-                f"boundary.{bonds.part}: the path moves an obstacle along the displacement that this "
-                "law acts on; leave the vertices that both parts share out of one of them (where)"
-            )

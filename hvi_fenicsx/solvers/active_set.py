@@ -115,24 +115,6 @@ class ActiveSetSolver:
         self.held.destroy()
         self._residual.destroy()
 
-    def in_contact(self, x: PETSc.Vec) -> int:
-        """Vertices on a bound of the problem. Collective."""
-        return self.convergence.in_contact(x)
-
-    def measure(self, x: PETSc.Vec, residual: PETSc.Vec, lower: PETSc.Vec, upper: PETSc.Vec) -> float:
-        """The residual of the inequality over its scale: at most ``tolerance`` when solved. Collective.
-
-        It is the largest of its norm relative to the forces of the body, of the largest nodal traction error on Γc
-        relative to what is allowed there, and of the net forces along rigid motions; of all bodies the largest.
-
-        Args:
-            x: the displacement.
-            residual: of the equations at x.
-            lower: lower bounds.
-            upper: upper bounds.
-        """
-        return self.convergence.sizes(x, residual, lower, upper).worst
-
     def newton_step(self, x: PETSc.Vec, held: Entities, models: Sequence[VertexModel], rtol: float) -> Outcome:
         """One Newton step that leaves some unknowns as they are. Collective.
 
@@ -169,7 +151,7 @@ class ActiveSetSolver:
         Args:
             x: start and result.
             attempts: the next is asked for only after the last has failed; a text is the reason to end.
-            tolerance: of :meth:`measure`.
+            tolerance: of the residual's largest size.
             bounds: lower and upper bounds.
             counts: gets the iterations of all.
             most: Newton steps of each at most.
@@ -201,7 +183,7 @@ class ActiveSetSolver:
         Args:
             x: start and result.
             attempt: how.
-            tolerance: of :meth:`measure`.
+            tolerance: of the residual's largest size.
             bounds: lower and upper bounds.
             most: Newton steps at most.
         """
@@ -213,7 +195,7 @@ class ActiveSetSolver:
                 if found.converged or found.measure > 0.5 * left:
                     return self.convergence.accept_rounding(found, sizes, x, tolerance)
                 left, again = found.measure, _SnesRun(self, attempt, tolerance, bounds).into(x, most)
-                found = found.followed_by(again)
+                found = replace(again, newton=found.newton + again.newton, linear=found.linear + again.linear)
             return found
 
     def judged(
@@ -225,7 +207,7 @@ class ActiveSetSolver:
             found: of the solve.
             x: its result.
             models: what takes the place of the laws, by term.
-            tolerance: of :meth:`measure`.
+            tolerance: of the residual's largest size.
             bounds: lower and upper bounds.
         """
         found, sizes = self._measured(found, x, models, tolerance, bounds)
@@ -304,9 +286,9 @@ class _SnesRun:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         """PETSc's convergence test: the residual of the inequality, and whether to give up."""
         x, owner, reasons = snes.getSolution(), self._owner, PETSc.SNES.ConvergedReason
-        before, self._last = self._last, owner.measure(x, snes.getFunction()[0], *self._bounds)
+        before, self._last = self._last, owner.convergence.sizes(x, snes.getFunction()[0], *self._bounds).worst
         if owner.progress:
-            owner.progress(iteration, self._last, owner.in_contact(x))
+            owner.progress(iteration, self._last, owner.convergence.in_contact(x))
         moved = self._system.equations.from_base(x).norm(PETSc.NormType.INFINITY)
         if moved > self._thresholds.runaway:
             self._reason = f"a displacement of more than {self._thresholds.runaway:.0e} times p0 L / E0"

@@ -121,8 +121,11 @@ class Auto(BranchIteration):
         return None
 
     def _most_without_path(self) -> int | None:
+        """Newton steps of a start before the path is followed, which takes longer where it is a curve; None: any."""
         laws = [term.exact for term in self.system.terms]
-        return first_steps(laws, self.thresholds.few_steps, self.options.max_iterations)
+        if not any(softens(law) for law in laws):
+            return None
+        return self.thresholds.few_steps if _are_straight(laws) else self.options.max_iterations
 
     def _asks_for_path(self) -> bool:
         """Whether loading decides which equilibrium is meant, or if there is one."""
@@ -238,19 +241,6 @@ def softens(law: Superpotential) -> bool:
     """
     graph, unsmoothed = law.graph, law.law if isinstance(law, SmoothedLaw) else law
     return 0.0 < unsmoothed.steepest_fall < np.inf if graph is None else bool(np.any(graph.slopes < 0.0))
-
-
-def first_steps(laws: Sequence[Superpotential], few: int, many: int) -> int | None:
-    """Newton steps of a start without the path, before the path is followed; None: any number.
-
-    Args:
-        laws: the laws.
-        few: of such steps, where the path is straight between events.
-        many: of them, where it is a curve, which takes longer.
-    """
-    if not any(softens(law) for law in laws):
-        return None
-    return few if _are_straight(laws) else many
 
 
 def _are_straight(laws: Sequence[Superpotential]) -> bool:

@@ -136,7 +136,7 @@ class Condensation(Method):
         self.system.equations.residual(x, residual, self.models)
         found = onto_bounds(self.system, x, residual)
         self.system.equations.residual(found, residual, self.models)
-        return found, self.solver.measure(found, residual, self.system.lower, self.system.upper)
+        return found, self.solver.convergence.sizes(found, residual, self.system.lower, self.system.upper).worst
 
 
 class _Stop(Exception):

@@ -59,10 +59,6 @@ class Outcome:
     interrupted: bool = False
     rounding: float = 0.0
 
-    def followed_by(self, other: Outcome) -> Outcome:
-        """The outcome of another solve from there, with the iterations of both."""
-        return replace(other, newton=self.newton + other.newton, linear=self.linear + other.linear)
-
 
 class ConvergenceTest:
     """The convergence test of one system.

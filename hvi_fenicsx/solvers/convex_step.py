@@ -137,7 +137,7 @@ class ConvexStep:
         if self.anywhere(self._overloaded(x, self.majorants(cells, self._nearest(x, xi)))):
             return math.inf
         lower, upper = kink_bounds.slip_bounds(self._system, cells)
-        return self._solver.measure(x, self._residual, lower, upper)
+        return self._solver.convergence.sizes(x, self._residual, lower, upper).worst
 
     def measure_step(self, x: PETSc.Vec, cells: Sequence[Cells], xi: Sequence[Array], outcome: Outcome) -> float:
         """As :meth:`measure`, after a step with these ξ: where all are still in ∂G, its own residual. Collective.

@@ -15,15 +15,6 @@ from ..system.system import System
 from ..typing import Array, Integers, Mask
 
 
-def exist(cells: Sequence[Cells]) -> bool:
-    """Whether any law has a convex kink.
-
-    Args:
-        cells: by term.
-    """
-    return any(len(c.kinks) for c in cells)
-
-
 def slip_bounds(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETSc.Vec]:
     """The system's bounds, with those that keep each vertex in its cell. Collective.
 
@@ -34,7 +25,7 @@ def slip_bounds(system: System, cells: Sequence[Cells]) -> tuple[PETSc.Vec, PETS
     Returns:
         Lower and upper bounds; the system's own vectors where no law has a convex kink.
     """
-    if not exist(cells):
+    if not any(len(c.kinks) for c in cells):
         return system.lower, system.upper
     lower, upper = system.lower.copy(), system.upper.copy()
     for term, c in zip(system.terms, cells, strict=True):

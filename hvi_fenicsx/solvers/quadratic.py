@@ -19,11 +19,6 @@ from .convex_step import is_quadratic
 from .method import Method, SolveResult, SolverTable, find
 
 
-def is_equation(system: System) -> bool:
-    """Whether nothing nonsmooth acts: no bounds, and laws that are linear springs at most. The same on all ranks."""
-    return not system.bounds and is_quadratic(system)
-
-
 class LinearSolve(Method):
     """The equation on one system; call :meth:`solve` once."""
 
@@ -87,5 +82,5 @@ def choose(options: SolverTable, system: System) -> type[Method]:
         InputError: there is no such method.
     """
     if options.method == "auto" and is_quadratic(system):
-        return LinearSolve if is_equation(system) else ConvexProgramme
+        return ConvexProgramme if system.bounds else LinearSolve
     return find(options.method)

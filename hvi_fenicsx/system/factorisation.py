@@ -229,8 +229,9 @@ class Factorisation:
 
     @property
     def negative(self) -> int:
-        """The number of negative eigenvalues of the system's matrix. Collective."""
-        return negative_pivots(self.pc) - int(self._form.system.comm.allreduce(self._form.pressures))
+        """The number of negative eigenvalues of the system's matrix, by those of pivots (Sylvester). Collective."""
+        pivots = int(self.pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
+        return pivots - int(self._form.system.comm.allreduce(self._form.pressures))
 
     @property
     def is_singular(self) -> bool:
@@ -262,15 +263,6 @@ def entries(pc: PETSc.PC) -> float:
         return np.inf
     count = pc.getFactorMatrix().getMumpsInfog(_FACTOR_ENTRIES)
     return float(count if count >= 0 else -1e6 * count)
-
-
-def negative_pivots(pc: PETSc.PC) -> int:
-    """The number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia).
-
-    Args:
-        pc: a symmetric matrix, factorised by MUMPS.
-    """
-    return int(pc.getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS))
 
 
 def without_dilatation(system: System) -> System:

@@ -76,7 +76,10 @@ class HeldPreconditioner:
             return
         self._held = None  # what fails to be made fits nothing
         with self._timer("setup"):
-            self._build(held)
+            if self.settings.kind != self._kind or self._preconditioner is None:
+                self.destroy()
+                self._preconditioner, self._kind = self._new(), self.settings.kind
+            self._preconditioner.prepare(held)
         self._held, self._rates = held.copy(), self.system.jacobian.rates
         self._first_iterations, self._outdated = 0, False
 
@@ -104,12 +107,6 @@ class HeldPreconditioner:
         self._outdated = failed or iterations > 2 * self._first_iterations
         if (failed or iterations > thresholds.slow) and self.settings.replaceable:
             self.settings, self._outdated = LinearSettings("lu"), True
-
-    def _build(self, held: Entities) -> None:
-        if self.settings.kind != self._kind or self._preconditioner is None:
-            self.destroy()
-            self._preconditioner, self._kind = self._new(), self.settings.kind
-        self._preconditioner.prepare(held)
 
     @property
     def pc(self) -> PETSc.PC:

@@ -45,12 +45,9 @@ class ContactRows:
         self.bulk = matrix.createSubMatrix(rows, None)
         self._product = self.bulk.createVecLeft()
         self._blocks = (self.vertices + start // d).astype(PETSc.IntType)[:, None]
-        self._elastic = self._diagonal_blocks(matrix, d)
+        each = self._blocks * d + np.arange(d, dtype=PETSc.IntType)
+        self._elastic = np.array([matrix.getValues(i, i) for i in each], dtype=np.float64).reshape(-1, d, d)
         self.tangent = np.zeros_like(self._elastic)
-
-    def _diagonal_blocks(self, matrix: PETSc.Mat, d: int) -> Array:
-        dofs = self._blocks * d + np.arange(d, dtype=PETSc.IntType)
-        return np.array([matrix.getValues(i, i) for i in dofs], dtype=np.float64).reshape(-1, d, d)
 
     def set_tangent(self, terms: Sequence[LawTerm], rates: Sequence[Array]) -> None:
         """Compute W K.
