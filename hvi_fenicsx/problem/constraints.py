@@ -10,7 +10,7 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..effects import Condition, Effect, NormalBounds, ObstacleMotion, Towards, load_name
+from ..effects import Condition, Effect, NormalBounds, Towards, load_name
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..geometry import spot
@@ -156,37 +156,19 @@ def _bounds(
         move = BoundsMove(name=load_name(where.part, effect), by=by, straight=bounds.move.straight)
     force = None
     if bounds.force is not None:
-        ahead = -value(bounds.force.lower) if bounds.force.straight else upper
-        force = _pressed(load_name(where.part, effect), bounds.force, ahead - upper, scales)
-        if not any(agree(context.domain.mesh.comm, bool(np.any(force.rate < 0.0)))):
-            raise InputError(f"boundary.{force.name}: the force moves the obstacle away from the body; turn it round")
+        stated, name = bounds.force, load_name(where.part, effect)
+        if not stated.straight:
+            raise InputError(
+                f"boundary.{name}: this obstacle's gaps do not change in proportion to the way that a force moves it; "
+                "give it a direction along the force"
+            )
+        rate = (-value(stated.lower) - upper) * scales.displacement
+        if not any(agree(context.domain.mesh.comm, bool(np.any(rate < 0.0)))):
+            raise InputError(f"boundary.{name}: the force moves the obstacle away from the body; turn it round")
+        size = float(np.linalg.norm(stated.vector))
+        direction = np.array(stated.vector) / size
+        force = BoundsForce(name=name, rate=rate, force=size / scales.force, direction=direction)
     return Bounds(where, -value(bounds.upper), upper, move, force)
-
-
-def _pressed(name: str, stated: ObstacleMotion, moved: Array, scales: Scales) -> BoundsForce:
-    """The force on an obstacle, nondimensional.
-
-    Args:
-        name: of part and effect.
-        stated: SI.
-        moved: by what a metre of its way moves the bounds, (m,).
-        scales: what one unit is in SI.
-
-    Raises:
-        InputError: on all ranks alike: the gaps do not change in proportion to the way.
-    """
-    if not stated.straight:
-        raise InputError(
-            f"boundary.{name}: this obstacle's gaps do not change in proportion to the way that a force moves it; give "
-            "it a direction along the force"
-        )
-    size = float(np.linalg.norm(stated.vector))
-    return BoundsForce(
-        name=name,
-        rate=moved * scales.displacement,
-        force=size / scales.force,
-        direction=np.asarray(stated.vector) / size,
-    )
 
 
 def _coefficients(context: DomainForms, where: Surface, formula: SpatialValue) -> Array:

@@ -183,16 +183,13 @@ def largest_turn(comm: MPI.Comm, surface: Surface) -> float:
 def _own(surface: Surface, stated: Array | None, length: float, rounding: float) -> Surface:
     """The surface with its normals as if it were alone, without rounding."""
     if stated is None:
-        normals = _without_rounding(surface.normals, rounding * _relative_refinement(surface, length))
+        # size of the coordinates over that of the facets: so much larger is rounding of normals
+        facet = length * surface.weights ** (1 / (surface.normals.shape[1] - 1))
+        refinement = (length + np.linalg.norm(surface.points, axis=1)) / facet
+        normals = _without_rounding(surface.normals, rounding * refinement[:, None])
     else:
         normals = _without_rounding(stated, rounding)
     return replace(surface, normals=normals, measured=normals)
-
-
-def _relative_refinement(surface: Surface, length: float) -> Array:
-    """Size of the coordinates over that of the facets at each vertex, (m, 1): so much larger is rounding of normals."""
-    facet = length * surface.weights ** (1 / (surface.normals.shape[1] - 1))
-    return ((length + np.linalg.norm(surface.points, axis=1)) / facet)[:, None]
 
 
 def _without_rounding(normals: Array, rounding: Array | float) -> Array:

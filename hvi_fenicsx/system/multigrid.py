@@ -21,7 +21,6 @@ from petsc4py import PETSc
 
 from ..mesh import nodes
 from ..mesh.transfer import Transfer
-from ..problem.problem import Problem
 from ..problem.spaces import Dilatation
 from ..typing import Array, Entities
 from .factorisation import nested, without_dilatation
@@ -313,20 +312,16 @@ def prolongation(fine: System, coarse: System, transfer: Transfer) -> PETSc.Mat:
         coarse: the system on the next coarser mesh.
         transfer: the transfer from the coarser mesh to the finer one.
     """
-    step = _of_displacements(fine.problem, coarse.problem, transfer)
-    if coarse.problem.coupling is not None:
-        step = step.matMult(coarse.problem.coupling.matrix)
-    if fine.problem.coupling is not None:
-        step = fine.problem.coupling.inverse.matMult(step)
+    to, origin = fine.problem, coarse.problem
+    name, points = f"prolongation from degree {nodes.degree(origin.space)}", (to.points, origin.points)
+    step = to.once(name, None, lambda: transfer.prolongation(to.space, origin.space, points))
+    if origin.coupling is not None:
+        step = step.matMult(origin.coupling.matrix)
+    if to.coupling is not None:
+        step = to.coupling.inverse.matMult(step)
     if coarse.rotation is not None:
         step = step.matMult(coarse.rotation)
     return step if fine.rotation is None else fine.rotation.transposeMatMult(step)
-
-
-def _of_displacements(fine: Problem, coarse: Problem, transfer: Transfer) -> PETSc.Mat:
-    """The prolongation between displacements in Cartesian components. Collective."""
-    name, points = f"prolongation from degree {nodes.degree(coarse.space)}", (fine.points, coarse.points)
-    return fine.once(name, None, lambda: transfer.prolongation(fine.space, coarse.space, points))
 
 
 def with_coarser_system(finer: System, coarser: System, levels: Levels, step: PETSc.Mat) -> Levels:

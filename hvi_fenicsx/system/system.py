@@ -319,14 +319,9 @@ def assemble(domain: Domain, model: Formulation, timer: Timer, thresholds: Thres
         problem = compose(domain, model)
         problem.compile()
     system = System(problem, timer, thresholds)
-    _require_finite(system)
-    return system
-
-
-def _require_finite(system: System) -> None:
-    """Refuse loads that are not finite where they are integrated, between the vertices. Collective."""
-    stated = [(where, effect) for where, effect, _ in system.problem.contributions]
+    stated = [(where, effect) for where, effect, _ in problem.contributions]
     for name, force in system.forces.items():
         if not np.isfinite(force.norm()):
             place = next(scaling.place(p) for p in stated if load_name(*p) == name)
             raise InputError(f"{place}: the formula is not finite everywhere there, between the vertices of the mesh")
+    return system
