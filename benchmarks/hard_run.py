@@ -104,7 +104,7 @@ def _judged(
         assert solution.examination is not None
         return solution.solve_result, solution.examination
     found = _solved(case, data, prepared, late)
-    return found, examine(prepared, found.u)
+    return found, examine(prepared, prepared.problem, found.u)
 
 
 def _unsolved(state: str, found: SolveResult) -> str:

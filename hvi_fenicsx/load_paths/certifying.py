@@ -136,15 +136,40 @@ class Certifier:
         """What Newton steps along the graphs, with what bonds remember, leave of rounding; None: it does not help."""
         if found is not None and not found.certificate.is_near:
             return None
-        problem, factor = self._factored.at(state.factor), state.factor
+        problem = self._factored.at(state.factor)
         try:
             graphs = StateOnGraphs(self._condensation.problem, self._remember, state)
-            other = refined(self._system, self._condensation, problem, graphs, factor)
+            other = self._stepped(problem, graphs, state.factor)
         except np.linalg.LinAlgError:
             return None
         change, size = (float(np.max(np.abs(x), initial=0.0)) for x in (other.x - state.x, state.x))
         near = change <= THRESHOLDS.largest_rounding * size  # the steps took out no more than rounding
         return other.u if near and self._is_certified(state, other) else None
+
+    def _stepped(self, problem: Problem, graphs: StateOnGraphs, factor: float) -> Refined:
+        """A state after the steps. Collective."""
+        system, condensation = self._system, self._condensation
+        unknowns = condensation.expand(graphs.x, factor)
+        for _ in range(_STEPS):
+            forces = contact_state.forces(problem, system.displacement(unknowns))
+            left, carried = self._reaction(forces), condensation.spread(-graphs.force)
+            left.axpy(-1.0, carried)
+            missing = condensation.forces(-left.array_r)
+            before = graphs.x
+            graphs.take(missing.condensed)
+            unknowns.array[:] += condensation.change(graphs.x - before, missing)
+            for vector in (left, carried):
+                vector.destroy()
+        u = system.displacement(unknowns)
+        unknowns.destroy()
+        return Refined(u=u, x=graphs.x, force=graphs.force, forces=contact_state.forces(problem, u))
+
+    def _reaction(self, forces: Forces) -> PETSc.Vec:
+        """Internal forces minus loads in the components of the unknowns."""
+        found = self._system.load.duplicate()
+        found.array[:] = forces.reaction.ravel()
+        turn(found, self._system.rotation)
+        return found
 
     def _is_certified(self, state: PathState, found: Refined) -> bool:
         """Whether forces by cell balance, and those on Γc are on the graphs. Collective."""
@@ -175,7 +200,7 @@ class Certifier:
         What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
         there, what rounding makes of the stresses is excused, and no net force.
         """
-        acting, spread = reaction(self._system, forces), self._condensation.spread(carried)
+        acting, spread = self._reaction(forces), self._condensation.spread(carried)
         left, given = self._condensation.unbalanced(acting, spread), product(spread, self._system.rotation)
         for vector in (acting, spread):
             vector.destroy()
@@ -233,47 +258,3 @@ class Refined:
     x: Array
     force: Array
     forces: Forces
-
-
-def reaction(system: System, forces: Forces) -> PETSc.Vec:
-    """Internal forces minus loads in the components of the unknowns.
-
-    Args:
-        system: whose unknowns they are.
-        forces: by cell.
-    """
-    found = system.load.duplicate()
-    found.array[:] = forces.reaction.ravel()
-    turn(found, system.rotation)
-    return found
-
-
-def refined(
-    system: System, condensation: Condensation, problem: Problem, graphs: StateOnGraphs, factor: float
-) -> Refined:
-    """A state after the steps. Collective.
-
-    Args:
-        system: the system.
-        condensation: its condensation.
-        problem: at the state's factor.
-        graphs: the state.
-        factor: λ.
-
-    Raises:
-        numpy.linalg.LinAlgError: the equations of the state are singular.
-    """
-    unknowns = condensation.expand(graphs.x, factor)
-    for _ in range(_STEPS):
-        forces = contact_state.forces(problem, system.displacement(unknowns))
-        left, carried = reaction(system, forces), condensation.spread(-graphs.force)
-        left.axpy(-1.0, carried)
-        missing = condensation.forces(-left.array_r)
-        before = graphs.x
-        graphs.take(missing.condensed)
-        unknowns.array[:] += condensation.change(graphs.x - before, missing)
-        for vector in (left, carried):
-            vector.destroy()
-    u = system.displacement(unknowns)
-    unknowns.destroy()
-    return Refined(u=u, x=graphs.x, force=graphs.force, forces=contact_state.forces(problem, u))

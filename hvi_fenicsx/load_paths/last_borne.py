@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..certify import certificate, plausibility
+from ..certify import plausibility
 from ..errors import InputError, SolverError
 from ..model import PathTable
 from ..paths.state import End
@@ -19,8 +19,9 @@ from ..problem.problem import FactoredProblem, Problem
 from ..reduced import loading
 from ..runtime.log import logger
 from ..solvers import frozen_mixity, obstacle_force
-from ..solvers.method import Borne, decides_stability, never
+from ..solvers.method import Borne, never
 from ..workflow import LastBorne, Preparation, Solution
+from ..workflow.solving import examine
 
 _LOG = logger("path")
 
@@ -89,10 +90,9 @@ def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
 def _shown(prepared: Preparation, problem: Problem, borne: Borne, failed: Solution) -> Solution:
     """The last state that is borne, certified under its load. Collective."""
     assert failed.solve_result is not None
-    options, u = prepared.options, borne.u
+    u = borne.u
     frozen_mixity.freeze(problem, u)
-    inertia = decides_stability(options, prepared.system)
-    found = certificate.examine(problem, u, options.tolerance, inertia=inertia)
+    found = examine(prepared, problem, u)
     return replace(
         failed,
         problem=problem,

@@ -274,7 +274,7 @@ def certified(prepared: Preparation, found: SolveResult) -> Solution:
         found: the displacement.
     """
     with prepared.timer("certificate"):
-        examination = examine(prepared, found.u)
+        examination = examine(prepared, prepared.problem, found.u)
         warnings = plausibility.of_solution(prepared.problem, examination, found.u)
     warn(_LOG, warnings)
     proof = examination.certificate
@@ -284,16 +284,17 @@ def certified(prepared: Preparation, found: SolveResult) -> Solution:
     return replace(solution, solve_result=found, examination=examination, warnings=solution.warnings + tuple(warnings))
 
 
-def examine(prepared: Preparation, u: fem.Function) -> Examination:
+def examine(prepared: Preparation, problem: Problem, u: fem.Function) -> Examination:
     """What the certificate says of a displacement. Collective.
 
     Args:
         prepared: the scene.
+        problem: that of the scene, or at another factor.
         u: nondimensional, ghosts updated.
     """
     options = prepared.options
     inertia = decides_stability(options, prepared.system)
-    return certificate.examine(prepared.problem, u, options.tolerance, inertia=inertia)
+    return certificate.examine(problem, u, options.tolerance, inertia=inertia)
 
 
 def unsolved(prepared: Preparation) -> Solution:
