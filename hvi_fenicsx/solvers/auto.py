@@ -94,8 +94,12 @@ class Auto(BranchIteration):
         return replace(found, interrupted=False, reason=reason)
 
     def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> SolveResult:
-        follows = start is None and branches is None and self._asks_for_path()
-        self._limit.next_start(self._most_without_path() if follows else None)
+        most, follows = self._most_without_path(), False
+        if start is None and branches is None and self.system.terms and self.options.start == "unbroken":
+            follows = (
+                not self._held or most is not None
+            )  # loading decides which equilibrium is meant, or if there is one
+        self._limit.next_start(most if follows else None)
         first = super().solve(start, branches)
         cut = self._limit.cut
         self._limit.next_start()
@@ -126,11 +130,6 @@ class Auto(BranchIteration):
         if not any(softens(law) for law in laws):
             return None
         return self.thresholds.few_steps if _are_straight(laws) else self.options.max_iterations
-
-    def _asks_for_path(self) -> bool:
-        """Whether loading decides which equilibrium is meant, or if there is one."""
-        undecided = not self._held or self._most_without_path() is not None
-        return bool(self.system.terms) and self.options.start == "unbroken" and undecided
 
     def _along_path(self, first: SolveResult) -> SolveResult | None:
         """The equilibrium on the load path, or that there is none on it; None where this is not known. Collective.

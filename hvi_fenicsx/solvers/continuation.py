@@ -29,7 +29,11 @@ def solve(context: SolveContext) -> SolveResult:
     Args:
         context: the system and how to solve it.
     """
-    still = _stay_on_kinks(context, context.system.undisplaced())
+    x, drops = context.system.undisplaced(), list[Array]()
+    for term in context.system.terms:  # no smoothing leads to where a kink has a traction of one sign only
+        at = term.argument(x.array_r)
+        drops.append(np.where(np.isin(at, term.law.concave.kinks), at, np.nan))
+    still = BranchIteration(context).newton(x, drops)
     if still.converged:
         return still
     found = held = BranchIteration(context, [LinearSpring(stiffness=1.0)] * len(context.system.terms)).solve()
@@ -50,15 +54,6 @@ def solve(context: SolveContext) -> SolveResult:
         if exact.converged:
             return replace(exact, counts=counts)
     return replace(held, converged=False, counts=counts)
-
-
-def _stay_on_kinks(context: SolveContext, x: PETSc.Vec) -> SolveResult:
-    """A stationary point near x at which the vertices that x has on kinks of G stay there. Collective.
-
-    No smoothing leads to it where a kink has a traction of one sign only, as a literal law has at zero.
-    """
-    arguments = [(term.law.concave.kinks, term.argument(x.array_r)) for term in context.system.terms]
-    return BranchIteration(context).newton(x, [np.where(np.isin(a, kinks), a, np.nan) for kinks, a in arguments])
 
 
 def _drops(context: SolveContext, smoothed: Sequence[Superpotential], x: PETSc.Vec) -> list[Array]:
