@@ -66,26 +66,25 @@ def solve_to_goal(
     )
 
 
+@dataclass
 class _Run:
     """One run to an accuracy, which balances three parts of the error; what it decides is the same on all ranks.
 
     The mesh has the largest part; smoothing and solver get what is small beside it.
     """
 
-    def __init__(
-        self, comm: MPI.Comm, accuracy: float, quantity: Quantity, solver: AdaptiveSolver, report: Callable[[str], None]
-    ) -> None:
+    _comm: MPI.Comm
+    _accuracy: float
+    _quantity: Quantity
+    _solver: AdaptiveSolver
+    _report: Callable[[str], None]
+    _failures: int = 0
+    _estimated: AdaptiveLevel | None = None
+
+    def __post_init__(self) -> None:
         self.steps: list[AdaptiveStep] = []
-        self._comm, self._accuracy, self._quantity, self._solver, self._report = (
-            comm,
-            accuracy,
-            quantity,
-            solver,
-            report,
-        )
-        self._room = cost.memory_room(comm) - cost.peak_memory(comm)
-        self._failures, self._start = 0, time.perf_counter()
-        self._estimated: AdaptiveLevel | None = None
+        self._room = cost.memory_room(self._comm) - cost.peak_memory(self._comm)
+        self._start = time.perf_counter()
 
     def levels(self, scene: Model) -> tuple[AdaptiveLevel, str | None]:
         """The last mesh, and why it does not reach the goal; from the coarsest one that sees the data. Collective."""

@@ -35,7 +35,7 @@ from ..system.system import System
 from ..typing import Array
 
 ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
-"""The events whose states are examined with the whole body."""
+"""The events whose states are examined with the whole body, and that a film shows first."""
 FIRST = 100
 """So many states are examined in any case; of twice as many each second one, and so on."""
 
@@ -91,7 +91,8 @@ class Certifier:
             number: of its row.
         """
         on_graphs = self._distance(state) <= self._tolerance
-        if not (state.event in ALWAYS or is_examined(number)):
+        # fewer and fewer rows the longer the path is
+        if state.event not in ALWAYS and number % (1 << (number // FIRST).bit_length()):
             return StateVerdict(certified=on_graphs, whole=False)
         if not on_graphs:
             return StateVerdict(certified=False, whole=True)
@@ -228,15 +229,6 @@ class Certifier:
 
     def _expanded(self, state: PathState) -> fem.Function:
         return self._condensation.displacement(state.x, state.factor)
-
-
-def is_examined(number: int) -> bool:
-    """Whether a row is among those whose whole body is examined: fewer and fewer of them the longer a path is.
-
-    Args:
-        number: of the row, from 0.
-    """
-    return number % (1 << (number // FIRST).bit_length()) == 0
 
 
 _STEPS = 3

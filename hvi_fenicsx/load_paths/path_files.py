@@ -11,7 +11,7 @@ import numpy as np
 from ..certify import certificate
 from ..model import dump_scene
 from ..paths.load_path import LoadPath
-from ..paths.state import End, Event
+from ..paths.state import End
 from ..report import page
 from ..report.page import draw as draw_pictures
 from ..results import vtk_fields, whole
@@ -22,12 +22,11 @@ from ..results.whole import made, write_record
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..workflow import unsolved
+from .certifying import ALWAYS
 from .following import PathRun
 
 JOURNAL = "path.journal"
 """The file in which the states of a path are kept while it is followed."""
-_SHOWN = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
-"""The events whose states a film shows first; limit points come after them."""
 
 
 def shown_rows(path: LoadPath, most: int) -> list[int]:
@@ -40,7 +39,7 @@ def shown_rows(path: LoadPath, most: int) -> list[int]:
     if not path.rows:
         return []
     last, chosen = len(path.rows) - 1, list[int]()
-    marked = [n for n, row in enumerate(path.rows) if row.event in _SHOWN]
+    marked = [n for n, row in enumerate(path.rows) if row.event in ALWAYS]
     for rows in ([0, last, path.peak, *marked], path.folds, range(last + 1)):
         rest, room = np.array(sorted({*rows} - {*chosen}), dtype=np.int64), most - len(chosen)
         places = np.linspace(0, len(rest) - 1, min(len(rest), room)).round().astype(int)
