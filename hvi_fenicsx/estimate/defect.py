@@ -50,14 +50,14 @@ class BubbleBounds:
         return np.sum(e[self.blocks] * self.normals, axis=1)
 
     def updated(self, e: Array, force: Array) -> BubbleBounds:
-        """Held where e leaves the bounds or these are one, let go where a force draws away from the bound that holds.
+        """Held where e leaves the bounds or both are one array (prescribed), let go where a force draws away from one.
 
         Args:
             e: the bubbles at the points, (k, d).
             force: the force on them, (k, d).
         """
         along, push = np.sum(e * self.normals, axis=1), np.sum(force * self.normals, axis=1)
-        upper = np.where(self.side == 1, push >= 0, along > self.upper) | (self.lower == self.upper)
+        upper = np.where(self.side == 1, push >= 0, along > self.upper) | (self.lower is self.upper)
         lower = np.where(self.side == -1, push <= 0, along < self.lower)
         return replace(self, side=np.where(upper, 1, np.where(lower, -1, 0)).astype(np.int8))
 
