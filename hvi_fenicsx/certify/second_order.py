@@ -18,7 +18,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from ..laws import Length, Superpotential
+from ..laws import Length
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
@@ -189,7 +189,7 @@ class _Collector:
         """
         (dofs, sign), w = next(force_attribution.components(term)), term.weights
         near = term.reach(self.near[term.surface.blocks])
-        x = _on_kink(term.law, term.argument(self.u), near)
+        x = on_places(term.argument(self.u), term.law.kinks, near)
         left, right = w * term.law.left(x), w * term.law.right(x)
         before, after = (w / term.stretch * term.law.derivatives(x + step)[1] for step in (-2 * near, 2 * near))
         ahead = sign > 0
@@ -209,7 +209,7 @@ class _Collector:
         """
         w, slip, distance = term.weights, term.slip(self.u), self.near[term.surface.blocks]
         near = term.reach(distance)
-        x = _on_kink(term.law, term.argument(self.u), near)
+        x = on_places(term.argument(self.u), term.law.kinks, near)
         moving = x > near
         size = np.where(moving, x, 1.0)
         unit = np.where(moving[:, None], term.gradient(slip), 0.0)
@@ -277,11 +277,17 @@ class _Collector:
         return Growth(least, opposite, self.slack, rounding, np.minimum(up, down), self.bent)
 
 
-def _on_kink(law: Superpotential, x: Array, near: Array) -> Array:
-    """Arguments, those near a kink put on it."""
-    if not len(law.kinks):
+def on_places(x: Array, places: Array, near: Array) -> Array:
+    """Arguments of a law, those that are at one of some places but for rounding put on it.
+
+    Args:
+        x: the arguments, (m,).
+        places: such as the law's kinks, (k,).
+        near: what is rounding, (m,).
+    """
+    if not len(places):
         return x
-    nearest = law.kinks[np.argmin(np.abs(x[:, None] - law.kinks), axis=1)]
+    nearest = places[np.argmin(np.abs(x[:, None] - places), axis=1)]
     return np.where(np.abs(x - nearest) <= near, nearest, x)
 
 

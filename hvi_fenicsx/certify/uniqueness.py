@@ -25,7 +25,6 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..laws import TractionGraph
 from ..laws.traction_graph import Arc
 from ..problem import references
 from ..problem.law_term import LawTerm
@@ -36,7 +35,7 @@ from ..system.system import System
 from ..typing import Array, Integers
 from .certificate import Examination
 from .contact_state import LawState
-from .second_order import growth, negative_eigenvalues
+from .second_order import growth, negative_eigenvalues, on_places
 from .thresholds import DEFAULT, UNIQUENESS
 
 
@@ -51,7 +50,7 @@ def needed_falls(state: LawState) -> Array | None:
         return None
     low, high = state.term.law.interval(state.argument, state.near)
     traction = np.clip(state.traction, low, high)
-    x = _on_breaks(graph, state.argument, state.near)
+    x = on_places(state.argument, graph.breaks, state.near)
     falls: Array = np.zeros(len(x))
     energy, rounding = graph.primitive(x), DEFAULT.near * state.scale
     for arc in (a for a in (Arc(*map(float, row)) for row in graph.table) if not state.term.radial or a.low >= 0.0):
@@ -61,12 +60,6 @@ def needed_falls(state: LawState) -> Array | None:
     if state.term.radial:
         return np.where(state.hidden | (traction < 0.0), np.inf, falls)
     return np.where(state.hidden, 0.0, falls)
-
-
-def _on_breaks(graph: TractionGraph, x: Array, near: Array) -> Array:
-    """Displacements; those that are on a break but for rounding, exactly there."""
-    distances = np.abs(x[:, None] - graph.breaks)
-    return np.where(distances.min(axis=1) <= near, graph.breaks[np.argmin(distances, axis=1)], x)
 
 
 def _needed(arc: Arc, x: Array, energy: Array, traction: Array, rounding: Array) -> Array:

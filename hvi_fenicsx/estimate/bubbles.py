@@ -331,7 +331,7 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
     """
     d, v, integrals = problem.scales.dimension, ufl.TestFunction(bubbles), []
     for form, heights, shares in _energies(problem):
-        each = [_over_cells(_energy(problem, form, heights, axis)) for axis in range(d)]
+        each = [_energy(problem, form, heights, axis) for axis in range(d)]
         for along in zip(*each, strict=True):
             density = ufl.dot(ufl.as_vector([integral.integrand() for integral in along]), v)
             for share in sorted(set(shares.values()) - {0.0}):
@@ -360,16 +360,12 @@ def _energies(problem: Problem) -> Iterator[tuple[Any, tuple[Any, Any], dict[Ind
         yield problem.bulk.foundation, (1.0, 1.0), squares
 
 
-def _energy(problem: Problem, form: Any, heights: tuple[Any, Any], axis: int) -> Any:
-    """A bilinear form of two functions along an axis, in UFL."""
+def _energy(problem: Problem, form: Any, heights: tuple[Any, Any], axis: int) -> list[Any]:
+    """The integrals over cells of a bilinear form of two functions along an axis, in UFL."""
     d, arguments = problem.scales.dimension, problem.bulk.form.arguments()
     moved = (ufl.as_vector([height if i == axis else 0.0 for i in range(d)]) for height in heights)
-    return ufl.replace(form, dict(zip(arguments, moved, strict=True)))
-
-
-def _over_cells(form: Any) -> list[Any]:
-    """The integrals of a form over cells."""
-    return [integral for integral in form.integrals() if integral.integral_type() == "cell"]
+    found = ufl.replace(form, dict(zip(arguments, moved, strict=True)))
+    return [integral for integral in found.integrals() if integral.integral_type() == "cell"]
 
 
 def _rule(places: list[Index]) -> dict[str, Any]:

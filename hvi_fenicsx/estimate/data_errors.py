@@ -340,9 +340,9 @@ def _moved_pressure(
     if comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) <= CERTIFICATE.near:
         return np.zeros(len(within))
     spread = part_points(problem, bubbles, surface, 1).spread
-    normals = spread.of_carriers(surface.normals).mean(axis=1)
+    normals = spread.by_facet(surface.normals).mean(axis=1)
     compliance = np.sum(normals**2 * on.compliance, axis=1) / np.sum(normals**2, axis=1)
-    pushes, gaps = (on.interpolated(spread.of_carriers(np.maximum(values, 0.0))) for values in nodal)
+    pushes, gaps = (on.interpolated(spread.by_facet(np.maximum(values, 0.0))) for values in nodal)
     free = not _is_supported(problem, surface.normals)
     moved, before = (
         redistributed(comm, on, pushes, gaps + more, compliance, free=free) for more in (within, np.zeros_like(within))

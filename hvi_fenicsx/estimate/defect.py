@@ -81,7 +81,7 @@ def _prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> 
         wanted = part.value.at(points.positions(needed=not part.value.is_number)) / problem.scales.displacement
         values, count = wanted - points.values(u)[:, part.component], len(points.blocks)
         axes = np.tile(np.eye(d)[part.component], (count, 1))
-        yield BubbleBounds(points.blocks, axes, values, values, np.zeros(count, np.int8))
+        yield BubbleBounds(points.blocks, axes, values, values, np.ones(count, np.int8))
 
 
 class _Points:
@@ -154,7 +154,7 @@ def _on(space: fem.FunctionSpace, facets: Entities) -> Entities:
 
 
 def constraints(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> tuple[BubbleBounds, ...]:
-    """What the bubbles must meet beside a solution: what is prescribed, and bounds of parts with contact. Collective.
+    """What the bubbles must meet beside a solution: bounds of parts with contact, and what is prescribed. Collective.
 
     Args:
         problem: what was solved.
@@ -169,28 +169,32 @@ class LeastEnergy:
     """The admissible bubbles of least energy, an active set method, a few rounds. Creation is collective.
 
     Args:
+        traces: the laws between the nodes.
         bubbles: take the result.
         stiffness: a(e, e).
-        under: what they must meet.
-        load: ρ, (n, d); it becomes the residual.
 
     Attributes:
+        laws: their force on the bubbles, a part of ρ, (n, d).
+        unmet: the force on the nodes that the laws are taken for, (n, d).
         residual: ρ - a(e, ·), what is held included, (n, d); a change of the load is to be added to it.
         energy: a(e, e).
     """
 
-    def __init__(
-        self, bubbles: fem.Function, stiffness: BubbleStiffness, under: tuple[BubbleBounds, ...], load: Array
-    ) -> None:
-        self._bubbles, self._stiffness = bubbles, stiffness
-        self.residual, self.energy, self._parts, self._begun = load, 0.0, under, False
-        self._e = bubbles.x.array[: load.size].reshape(load.shape)
-        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *(part.blocks for part in under)]))
+    def __init__(self, traces: LawTraces, bubbles: fem.Function, stiffness: BubbleStiffness) -> None:
+        problem, u = traces.problem, traces.u
+        self._bubbles, self._stiffness, self.energy, self._begun = bubbles, stiffness, 0.0, False
+        self.residual = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
+        self.laws, self.unmet = traces.tested()
+        self.residual -= self.laws
+        self._parts = constraints(problem, u, traces.bubbles)
+        self._e = bubbles.x.array[: self.residual.size].reshape(self.residual.shape)
+        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *(part.blocks for part in self._parts)]))
 
     def find(self) -> None:
         """Find them; from the second time on from those that were found before. Collective."""
         stiffness, e = self._stiffness, self._e
-        self._parts = tuple(p.updated(self._guess(p), self.residual[p.blocks]) for p in self._parts)
+        guess = e if self._begun else self._guess()
+        self._parts = tuple(p.updated(guess[p.blocks], self.residual[p.blocks]) for p in self._parts)
         rough = DEFAULT.rough_tolerance[nodes.degree(stiffness.problem.space) - 1]
         tolerance = rough if self._begun else DEFAULT.tolerance
         square = stiffness.dot(self.residual, self._descent(self.residual))
@@ -222,11 +226,12 @@ class LeastEnergy:
         self.residual += force - before if self._begun else force
         self.energy += work - self._stiffness.dot(self._e, force)
 
-    def _guess(self, part: BubbleBounds) -> Array:
-        """The bubbles of a part as they are, at first what the diagonal alone makes of the load, (k, d)."""
-        if self._begun:
-            return np.asarray(self._e[part.blocks])
-        return np.asarray(self.residual[part.blocks] * self._stiffness.inverse[part.blocks])
+    def _guess(self) -> Array:
+        """What the diagonal alone makes of the load, and what is prescribed, (n, d)."""
+        found = np.asarray(self.residual * self._stiffness.inverse)
+        for part in self._parts:
+            part.put_on_bounds(found)
+        return found
 
     def _put_on_bounds(self) -> None:
         """Put the bubbles on the bounds that hold them; the residual follows."""
@@ -328,15 +333,13 @@ def squares(traces: LawTraces, inverse: DualNorm) -> Array:
     """
     problem, u = traces.problem, traces.u
     stiffness = VertexStiffness(problem, traces.bubbles, inverse)
-    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
-    between, unmet = traces.tested()
-    load -= between
+    bubbles = fem.Function(traces.bubbles)
+    least = LeastEnergy(traces, bubbles, stiffness)
     if problem.terms:
-        load -= stiffness.on_bubbles(unmet)
-    bubbles, under = fem.Function(traces.bubbles), constraints(problem, u, traces.bubbles)
+        least.residual -= stiffness.on_bubbles(least.unmet)
     springs = LawSprings(traces, ErrorField(fem.Function(problem.space), bubbles))
     stiffness.hold(springs.diagonal(), springs.times)
-    LeastEnergy(bubbles, stiffness, under, load).find()
-    stiffness.follow(bubbles.x.array.reshape(-1, unmet.shape[1])[: len(load)], unmet)
+    least.find()
+    stiffness.follow(bubbles.x.array[: least.residual.size].reshape(least.residual.shape), least.unmet)
     shear = problem.bulk.energy_by_cell(bubbles + stiffness.at_nodes)
     return shear + problem.bulk.pressure_energy(stiffness.pressures) + problem.bulk.dilatation_error(u)

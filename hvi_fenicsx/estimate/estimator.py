@@ -123,15 +123,12 @@ def _discretisation(traces: LawTraces, inverse: DualNorm, energy: float) -> tupl
 
 def _between_nodes(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness) -> Array:
     """η_K² of the owned cells: of the bubbles, and of the nodal forces that the laws are taken for. Collective."""
-    problem, u = traces.problem, traces.u
-    load = problem.bulk.residual_in(traces.bubbles, u, problem.linear.values())
-    between, unmet = traces.tested()
-    load -= between
-    bubbles, under = fem.Function(traces.bubbles), defect.constraints(problem, u, traces.bubbles)
-    defect.LeastEnergy(bubbles, stiffness, under, load).find()
+    problem, bubbles = traces.problem, fem.Function(traces.bubbles)
+    least = defect.LeastEnergy(traces, bubbles, stiffness)
+    least.find()
     cells = problem.bulk.energy_by_cell(bubbles)
     if problem.terms:
-        cells += problem.bulk.energy_by_cell(inverse.solve(unmet)[0])
+        cells += problem.bulk.energy_by_cell(inverse.solve(least.unmet)[0])
     return cells
 
 
@@ -200,16 +197,12 @@ class Coupled:
         self._traces, self._inverse = traces, inverse
         self._longest = 0.0
         self.error = ErrorField(fem.Function(problem.space), fem.Function(space))
-        load = problem.bulk.residual_in(space, traces.u, problem.linear.values())
-        self._laws, _ = traces.tested()
-        load -= self._laws
-        under = defect.constraints(problem, traces.u, space)
-        self._least = defect.LeastEnergy(self.error.bubbles, stiffness, under, load)
+        self._least = defect.LeastEnergy(traces, self.error.bubbles, stiffness)
         self._moved = fem.Function(problem.space)
         self._of_moved = problem.bulk.force_in(space, self._moved)
         self._of_bubbles = problem.bulk.force_in(problem.space, self.error.bubbles)
         self._shared, self._strongest = 0.0, 0.0
-        self._force: Array = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
+        self._force: Array = np.zeros_like(self._least.unmet)
         self._answer: Array = self._force
 
     @property
@@ -255,9 +248,9 @@ class Coupled:
 
     def tell_bubbles(self) -> None:
         """Let the bubbles feel that nodes and laws have moved. Collective."""
-        before = self._laws
-        self._laws, _ = self._traces.tested(self.error)
-        self._least.residual += before - self._laws
+        before = self._least.laws
+        self._least.laws, _ = self._traces.tested(self.error)
+        self._least.residual += before - self._least.laws
         self._least.residual -= self._of_moved.values()
 
 

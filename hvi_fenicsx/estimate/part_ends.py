@@ -57,7 +57,7 @@ def _of_lacking(degree: int, share: Array) -> Array:
 
 def _mean(on: FacetModes, ends: Array) -> Array:
     """The mean over those corners of each facet at which a part ends, of local blocks (n, d); (f, d)."""
-    values = ends[on.facets.corners]
+    values = ends[on.facets.nodes[:, : on.barycentric.shape[1]]]
     count = np.any(values, axis=2).sum(axis=1)
     return values.sum(axis=1) / np.maximum(count, 1)[:, None]
 

@@ -46,7 +46,7 @@ class Trace:
     def __init__(self, problem: Problem, points: FacetPoints, surface: Surface, directions: Array) -> None:
         self._problem, self._points = problem, points
         self._surface, self._directions, self.weights = surface, directions, points.weights
-        own = points.spread.of_carriers(directions)
+        own = points.spread.by_facet(directions)
         self._rotations = rotations(own, points.spread.reference)
         self._vectors = self._turned(turned(self._rotations, own))
 
@@ -59,7 +59,7 @@ class Trace:
         facets, normals = self._points.facets, self._points.normals
         if normals is None:
             return self._on_facets(self._points.functions, own)
-        at_nodes = self._points.spread.of_carriers(self._surface.normals)
+        at_nodes = self._points.spread.by_facet(self._surface.normals)
         one = at_nodes[np.arange(len(own)), self._points.spread.reference]
         alike = own @ rotations_between(np.broadcast_to(one[:, None], at_nodes.shape), at_nodes)
         back = rotations_between(normals, np.broadcast_to(one[facets, None], normals.shape))
@@ -74,7 +74,7 @@ class Trace:
                 the ends of facets in the place of the points ("at_ends").
             along: whether they are components along the directions.
         """
-        there = self._points.spread.of_carriers(values)
+        there = self._points.spread.by_facet(values)
         return self._on_facets(getattr(self._points, by), turned(self._rotations, there) if along else there)
 
     def of_field(self, u: fem.Function, by: Basis = "functions") -> Array:
@@ -97,7 +97,7 @@ class Trace:
         """The values of bubbles, (f, q, k). Collective."""
         found = np.zeros((*self.weights.shape, self._problem.scales.dimension))
         for side in self._points.sides:
-            known = side.values(e)
+            known = side.by_facet(e.x.array.reshape(-1, found.shape[2])[side.blocks])
             for i, values in enumerate(side.shapes):
                 found += side.sign * values[:, :, None] * known[:, i, None]
         return np.einsum("fqkd,fqd->fqk", self._vectors, found)
@@ -111,7 +111,7 @@ class Trace:
         on_facets = np.zeros(self._rotations.shape[:3])
         forces = np.einsum("fqk,fqn->fnk", self.weights[:, :, None] * tau, self._points.functions)
         np.add.at(on_facets, self._points.facets, forces)
-        carried = self._points.spread.summed(np.einsum("fnkl,fnl->fnk", self._rotations, on_facets))
+        carried = self._points.spread.forces(np.einsum("fnkl,fnl->fnk", self._rotations, on_facets))
         return self._surface.blocks, np.einsum("mk,mkd->md", carried, self._directions)
 
     def squared(self, rates: Array) -> list[LocalForces]:
@@ -127,7 +127,7 @@ class Trace:
         found = []
         for side in self._points.sides:
             each = [np.einsum("fq,fqd->fd", (side.sign * values) ** power, vectors) for values in side.shapes]
-            found.append(side.collected(np.stack(each, axis=1)))
+            found.append((side.blocks, side.summed(np.stack(each, axis=1))))
         return found
 
 
@@ -193,16 +193,6 @@ class ContactFacets:
     cells: Entities
     local: Entities
 
-    @property
-    def dimension(self) -> int:
-        """The dimension of space, which is the number of a facet's corners."""
-        return self.nodes.shape[1] if self.degree == 1 else {3: 2, 6: 3}[self.nodes.shape[1]]
-
-    @property
-    def corners(self) -> Entities:
-        """The blocks of the corners, (f, d)."""
-        return self.nodes[:, : self.dimension]
-
 
 def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) -> ContactFacets:
     """The nodes and bubbles of boundary facets whose cell this rank owns.
@@ -236,43 +226,47 @@ def _numbers_in_cell(degree: int, cell: str) -> list[list[int]]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SideBubbles:
-    """The bubbles (n) of one side, the same numbers on all ranks, at points of facets or intersections (f).
+class Shared:
+    """Nodes or bubbles (n), with the same numbers on all ranks, of facets or intersections (f).
 
     Attributes:
         comm: the ranks.
-        sign: of the side's displacement in the relative one.
-        shapes: the values of each bubble of a facet at the points, (f, q) each.
-        numbers: the bubbles of each facet (:func:`.bubbles.of_facet`), (f, k).
         count: n.
-        owned: those that this rank owns, (m,).
-        blocks: their local blocks, (m,).
+        own: those that this rank owns, (m,).
+        at: those of each facet, (f, k).
     """
 
     comm: MPI.Comm
+    count: int
+    own: Integers
+    at: Integers
+
+    def by_facet(self, values: Array) -> Array:
+        """Values at the owned ones (m, ...) by facet, (f, k, ...). Collective."""
+        every = np.zeros((self.count, *values.shape[1:]))
+        every[self.own] = values
+        return np.asarray(self.comm.allreduce(every)[self.at])
+
+    def summed(self, values: Array) -> Array:
+        """Sums of values (f, k, ·) of facets at the owned ones, (m, ·). Collective."""
+        every = np.zeros((self.count, values.shape[2]))
+        np.add.at(every, self.at, values)
+        return np.asarray(self.comm.allreduce(every)[self.own])
+
+
+@dataclass(frozen=True, kw_only=True)
+class SideBubbles(Shared):
+    """The bubbles of one side (:func:`.bubbles.of_facet`) at points of facets or intersections.
+
+    Attributes:
+        sign: of the side's displacement in the relative one.
+        shapes: the values of each bubble of a facet at the points, (f, q) each.
+        blocks: the local blocks of those that this rank owns, (m,).
+    """
+
     sign: float
     shapes: list[Array]
-    numbers: Integers
-    count: int
-    owned: Integers
     blocks: Integers
-
-    def values(self, e: fem.Function) -> Array:
-        """The bubbles of each facet, (f, k, d). Collective.
-
-        Args:
-            e: all bubbles.
-        """
-        every = e.x.array.reshape(-1, e.function_space.dofmap.bs)
-        known = np.zeros((self.count, every.shape[1]))
-        known[self.owned] = every[self.blocks]
-        return self.comm.allreduce(known)[self.numbers]
-
-    def collected(self, sums: Array) -> LocalForces:
-        """Forces (f, k, d) on them as those at owned blocks. Collective."""
-        found = np.zeros((self.count, sums.shape[2]))
-        np.add.at(found, self.numbers, sums)
-        return self.blocks, self.comm.allreduce(found)[self.owned]
 
 
 def _side(space: fem.FunctionSpace, degree: int, sign: float, at: Array, bubbles: Integers) -> SideBubbles:
@@ -284,9 +278,9 @@ def _side(space: fem.FunctionSpace, degree: int, sign: float, at: Array, bubbles
         comm=comm,
         sign=sign,
         shapes=[shape(index, at.reshape(-1, d)).reshape(at.shape[:2]) for index in of_facet(degree, d)],
-        numbers=np.searchsorted(known, bubbles),
+        at=np.searchsorted(known, bubbles),
         count=len(known),
-        owned=owned,
+        own=owned,
         blocks=known[owned] - start,
     )
 
@@ -342,7 +336,7 @@ def part_points(problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, 
         degree: of the quadrature.
     """
     comm, on = problem.domain.mesh.comm, contact_facets(problem, bubbles, surface.facets)
-    at, weights = quadrature("interval" if on.dimension == 2 else "triangle", degree)
+    at, weights = quadrature("interval" if problem.scales.dimension == 2 else "triangle", degree)
     functions = spaces.simplex_functions(on.degree, at, spaces.edge_share(problem.space))
     count, own = len(on.nodes), _numbers(problem.space, surface.blocks)
     known, kept = np.unique(np.concatenate(agree(comm, own))), np.ones(on.nodes.shape, dtype=np.bool_)
@@ -405,23 +399,15 @@ def interface_points(problem: Problem, bubbles: fem.FunctionSpace, interface: In
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spread:
-    """Values at the nodes (n) that carry something as values at the nodes of facets.
+class Spread(Shared):
+    """Values at the nodes that carry something as values at the nodes of facets.
 
     Attributes:
-        comm: the ranks.
-        count: n.
-        own: those that this rank owns, (m,).
-        at: the carriers of each facet, (facets, k).
         kept: which of the facet's nodes are their own carriers, (facets, k).
         shares: by how much a relative displacement of 1 at owned nodes moves the first side there, (m, 1).
         carriers: what the value at each node is the mean of, rows of weights, (facets, k, k).
     """
 
-    comm: MPI.Comm
-    count: int
-    own: Integers
-    at: Integers
     kept: Mask
     shares: Array
     carriers: Array
@@ -431,22 +417,14 @@ class Spread:
         """A node of each facet's carriers, (facets,)."""
         return np.argmax(self.carriers.any(axis=1), axis=1)
 
-    def of_carriers(self, values: Array) -> Array:
-        """Values at the owned nodes (m, ...) by facet and carrier, (facets, k, ...). Collective."""
-        every = np.zeros((self.count, *values.shape[1:]))
-        every[self.own] = values
-        return self.comm.allreduce(every)[self.at]
-
-    def summed(self, values: Array) -> Array:
+    def forces(self, values: Array) -> Array:
         """Forces on the functions of facets' nodes (facets, k, ·) as forces on the relative displacements, (m, ·).
 
         Beside a node that carries nothing a relative displacement of 1 moves the first side by another amount than 1:
         the rows of the problem (:mod:`.dual_basis`) say by how much. So a uniform traction has the problem's own
         nodal forces. Collective.
         """
-        every = np.zeros((self.count, values.shape[2]))
-        np.add.at(every, self.at[self.kept], values[self.kept])
-        return self.comm.allreduce(every)[self.own] * self.shares
+        return np.asarray(self.summed(np.where(self.kept[:, :, None], values, 0.0)) * self.shares)
 
 
 def _of_carriers(problem: Problem, interface: Interface) -> Spread:

@@ -374,17 +374,51 @@ def registered() -> dict[str, type[Superpotential]]:
 
 
 @dataclass(frozen=True)
-class ScaledLaw(Superpotential, register=False):
+class DerivedLaw(Superpotential, register=False):
+    """A law made of another one, whose scales it has, in units of its own if a subclass has such.
+
+    Attributes:
+        law: the other one.
+    """
+
+    law: Superpotential
+    length = traction = 1.0
+
+    @override
+    @property
+    def growth(self) -> Directional:
+        return self.law.growth.times(1.0 / self.traction)
+
+    @override
+    @property
+    def energy_scale(self) -> float:
+        return self.law.energy_scale / (self.length * self.traction)
+
+    @override
+    @property
+    def length_scale(self) -> float:
+        return self.law.length_scale / self.length
+
+    @override
+    @property
+    def even(self) -> bool:
+        return self.law.even
+
+    @override
+    def piece(self, x: Array) -> Integers:
+        return self.law.piece(x * self.length)
+
+
+@dataclass(frozen=True)
+class ScaledLaw(DerivedLaw, register=False):
     """A law in other units: the default of `Superpotential.scaled`.
 
     Attributes:
-        law: the law.
         length: the unit of displacements.
         traction: the unit of tractions.
     """
 
     name = "scaled"
-    law: Superpotential
     length: float
     traction: float
 
@@ -403,29 +437,9 @@ class ScaledLaw(Superpotential, register=False):
         return ScaledPart(self.law.concave, self.length, self.traction)
 
     @override
-    @property
-    def growth(self) -> Directional:
-        return self.law.growth.times(1.0 / self.traction)
-
-    @override
     @cached_property
     def _extremes(self) -> tuple[Directional, float]:
         return self.law.peak.times(1.0 / self.traction), self.law.c4 / self.traction
-
-    @override
-    @property
-    def energy_scale(self) -> float:
-        return self.law.energy_scale / (self.length * self.traction)
-
-    @override
-    @property
-    def length_scale(self) -> float:
-        return self.law.length_scale / self.length
-
-    @override
-    @property
-    def even(self) -> bool:
-        return self.law.even
 
     @override
     @property
@@ -436,10 +450,6 @@ class ScaledLaw(Superpotential, register=False):
     @property
     def steepest_fall(self) -> float:
         return self.law.steepest_fall * (self.length / self.traction)
-
-    @override
-    def piece(self, x: Array) -> Integers:
-        return self.law.piece(x * self.length)
 
 
 def extremes(law: Superpotential) -> tuple[Directional, float]:

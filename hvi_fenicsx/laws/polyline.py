@@ -64,19 +64,15 @@ class PolylineLaw(Superpotential):
         """The table of the law; read `build` once."""
         return self.build()
 
-    @cached_property
-    def _split(self) -> tuple[TractionGraph, TractionGraph]:
-        return self.graph.split()
-
     @override
     @cached_property
     def convex(self) -> ConvexPart:
-        return PolylinePart(self._split[0])
+        return PolylinePart(self.graph.split()[0])
 
     @override
     @cached_property
     def concave(self) -> ConvexPart:
-        return PolylinePart(self._split[1])
+        return PolylinePart(self.graph.split()[1])
 
     @override
     def value(self, x: Array) -> Array:

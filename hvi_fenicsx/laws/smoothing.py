@@ -29,8 +29,8 @@ from typing_extensions import override
 
 from ..class_registry import enter, hint
 from ..errors import InputError
-from ..typing import Array, Integers
-from .base import ConvexPart, DifferentiablePart, Directional, Superpotential, quotient
+from ..typing import Array
+from .base import ConvexPart, DerivedLaw, DifferentiablePart, Superpotential, quotient
 from .catalogue import QuadraticLinear
 from .polyline import PolylinePart
 from .registry import require_positive
@@ -118,38 +118,13 @@ def create(
 
 
 @dataclass(frozen=True)
-class SmoothedLaw(Superpotential, register=False):
+class SmoothedLaw(DerivedLaw, register=False):
     """A law smoothed with a width ε (N/m): what all smoothings leave as the law has it."""
 
-    law: Superpotential
     epsilon_absolute: float
 
     def __post_init__(self) -> None:
         require_positive("smoothing", epsilon_absolute=self.epsilon_absolute)
-
-    @property
-    @override
-    def growth(self) -> Directional:
-        return self.law.growth
-
-    @property
-    @override
-    def energy_scale(self) -> float:
-        return self.law.energy_scale
-
-    @property
-    @override
-    def length_scale(self) -> float:
-        return self.law.length_scale
-
-    @property
-    @override
-    def even(self) -> bool:
-        return self.law.even
-
-    @override
-    def piece(self, x: Array) -> Integers:
-        return self.law.piece(x)
 
 
 @dataclass(frozen=True)

@@ -47,19 +47,13 @@ def at_full_load(
         states = list(follower.states())
         if follower.end is End.REACHED and states:
             return FullLoad(x=states[-1].x, reason="the whole load is reached")
+        # Where no load is borne on it, or some beyond the whole, the whole one may be borne all the same, off the path.
+        begins = 0.0 < max((state.factor for state in states), default=0.0) <= 1.0
         off = follower.end is End.ESCAPES or (follower.is_closed and follow is Follow.EXACT)
-        if follower.end is End.INTERRUPTED or (ended is None and not (off and _begins(states))):
+        if follower.end is End.INTERRUPTED or (ended is None and not (off and begins)):
             return None
         ended = ended or _off(follower, states, follow)
     return ended
-
-
-def _begins(states: Sequence[PathState]) -> bool:
-    """Whether some load is borne on a path, and none beyond the whole, at which a sound path ends.
-
-    Where no load is borne on it, the whole one may be all the same, off the path.
-    """
-    return 0.0 < max((state.factor for state in states), default=0.0) <= 1.0
 
 
 def _off(follower: Follower, states: Sequence[PathState], follow: Follow) -> FullLoad:
