@@ -231,7 +231,7 @@ def _turns(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(80))
 def test_an_envelope_is_the_hull_of_samples_and_never_above_the_law(seed: int) -> None:
     random = np.random.default_rng(seed)
     graph, weight, sign = random_graph(random), random.uniform(0.3, 2.0), random.choice([-1.0, 1.0])
