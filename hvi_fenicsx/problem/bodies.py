@@ -16,7 +16,7 @@ from mpi4py import MPI
 from ..geometry import spot
 from ..mesh import hierarchy
 from ..mesh.domain import Domain
-from ..rigid import AnyBody, JoinedBodies, Mode, RigidBody, rigid_fields
+from ..rigid import JoinedBodies, Mode, RigidBody, rigid_fields
 from ..runtime.mpi import agree, refuse
 from ..typing import Array, Entities, Integers
 
@@ -31,11 +31,11 @@ class MeshBodies:
         members: which body among those that meet, (n,); 0 of a body that is alone.
     """
 
-    bodies: tuple[AnyBody, ...]
+    bodies: tuple[JoinedBodies, ...]
     labels: Integers
     members: Integers
 
-    def __iter__(self) -> Iterator[AnyBody]:
+    def __iter__(self) -> Iterator[JoinedBodies]:
         return iter(self.bodies)
 
     def single(self) -> tuple[RigidBody, ...]:
@@ -51,7 +51,7 @@ class MeshBodies:
         counts = [len(body.bodies) for body in self.bodies]
         return np.cumsum([0, *counts])[self.labels[blocks]] + self.members[blocks]
 
-    def fields(self, points: Array, blocks: npt.NDArray[np.integer], body: AnyBody) -> Array:
+    def fields(self, points: Array, blocks: npt.NDArray[np.integer], body: JoinedBodies) -> Array:
         """The basis motions of a body at some of its vertices, (m, motions, d).
 
         Args:
@@ -59,8 +59,6 @@ class MeshBodies:
             blocks: their local numbers, (m,).
             body: one of these.
         """
-        if isinstance(body, RigidBody):
-            return rigid_fields(points, body)
         found = np.zeros((len(points), body.motions, body.dimension))
         for number, one in enumerate(body.bodies):
             here = np.flatnonzero(self.members[blocks] == number)
@@ -99,7 +97,7 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array, meetings: Sequ
     one = whole(domain)
     cells, count = hierarchy.labels(domain)
     if count == 1:
-        return MeshBodies((one,), *np.zeros((2, len(points)), np.int64))
+        return MeshBodies((JoinedBodies((one,)),), *np.zeros((2, len(points)), np.int64))
     labels = _vertices(domain, space, cells, points)
     lower, upper = _boxes(domain, points[:, : domain.dimension], labels, count)
     centres = (lower + upper) / 2
@@ -107,7 +105,7 @@ def find(domain: Domain, space: fem.FunctionSpace, points: Array, meetings: Sequ
     place = np.argsort(order)
     found = [replace(one, centre=np.pad(centres[i] / domain.length, (0, 3 - domain.dimension))) for i in order]
     names = _names(domain, place[cells], found)
-    bodies = [replace(body, name=name, index=i) for i, (body, name) in enumerate(zip(found, names, strict=True))]
+    bodies = [replace(body, name=name) for body, name in zip(found, names, strict=True)]
     return _together(bodies, place[labels], _meeting(domain.mesh.comm, place[labels], meetings))
 
 
@@ -128,11 +126,10 @@ def _together(bodies: Sequence[RigidBody], labels: Integers, pairs: Sequence[tup
         group = [low if g == high else g for g in group]
     members: list[list[int]] = [[i for i, g in enumerate(group) if g == first] for first in sorted(set(group))]
     label, member = np.zeros((2, len(bodies)), np.int64)
-    found: list[AnyBody] = []
+    found: list[JoinedBodies] = []
     for index, those in enumerate(members):
         label[those], member[those] = index, np.arange(len(those))
-        own = tuple(replace(bodies[i], index=k) for k, i in enumerate(those))
-        found.append(replace(own[0], index=index) if len(own) == 1 else JoinedBodies(own, index))
+        found.append(JoinedBodies(tuple(bodies[i] for i in those), index))
     return MeshBodies(tuple(found), label[labels], member[labels])
 
 

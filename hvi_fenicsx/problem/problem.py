@@ -21,7 +21,7 @@ from ..formula import SpatialValue
 from ..mesh import nodes
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
-from ..rigid import AnyBody
+from ..rigid import JoinedBodies
 from ..runtime import forms
 from ..typing import Array, Entities, Integers
 from . import bodies, contact_surface, spaces
@@ -239,7 +239,7 @@ class Problem:
             found.append(np.stack(columns, axis=1))
         return tuple(found)
 
-    def motions_at(self, blocks: npt.NDArray[np.integer], body: AnyBody) -> Array:
+    def motions_at(self, blocks: npt.NDArray[np.integer], body: JoinedBodies) -> Array:
         """The basis motions at vertices of a body as bounds and laws see them, (m, motions, d). Collective at first.
 
         Args:

@@ -4,7 +4,6 @@ from ..laws.base import Directional
 from .least_energy import OneSidedSupports, RestingPosition, least_energy
 from .limit_analysis import analyse, gives_way, load_factors
 from .motions import (
-    AnyBody,
     JoinedBodies,
     Mode,
     RigidBody,

@@ -52,47 +52,25 @@ class RigidBody:
         centre: (3,).
         length: metres per unit of length, for the names of motions.
         name: where there are several bodies, what it is called.
-        index: where there are several bodies, its number among them.
     """
 
     dimension: int
     centre: Array
     length: float = 1.0
     name: str = ""
-    index: int = 0
 
     @property
     def motions(self) -> int:
         """Number of rigid motions: 3 in 2D, 6 in 3D."""
         return 3 if self.dimension == 2 else 6
 
-    @property
-    def shifts(self) -> int:
-        """Number of translations among them; they come first."""
-        return self.dimension
-
-    @property
-    def bodies(self) -> tuple[RigidBody, ...]:
-        """This one alone."""
-        return (self,)
-
-    def describe(self, coefficients: Array, *, signed: bool) -> str:
-        """A motion in words, and whose it is.
-
-        Args:
-            coefficients: (3|6,), on the basis of this module.
-            signed: whether the name has the sense too.
-        """
-        whose = f" of {self.name}" if self.name else ""
-        return describe(coefficients, self.centre, self.length, signed=signed) + whose
-
 
 @dataclass(frozen=True)
 class JoinedBodies:
-    """Bodies that meet in interfaces, and obstacles that slide along given directions; nondimensional.
+    """One body, or bodies that meet in interfaces, and obstacles that slide along given directions; nondimensional.
 
     Attributes:
-        bodies: the index of each is its number here.
+        bodies: one, or all that meet.
         index: the number of the whole among all that do not meet.
         obstacles: their names; the way of each is a translation, after those of the bodies.
     """
@@ -114,7 +92,7 @@ class JoinedBodies:
     @property
     def shifts(self) -> int:
         """Number of translations among them; they come first."""
-        return sum(body.shifts for body in self.bodies) + len(self.obstacles)
+        return len(self.bodies) * self.dimension + len(self.obstacles)
 
     def own(self, number: int) -> Integers:
         """Which of the motions are those of one body, (3|6,).
@@ -122,7 +100,7 @@ class JoinedBodies:
         Args:
             number: of the body.
         """
-        shifts, spins = self.bodies[number].shifts, self.bodies[number].motions - self.bodies[number].shifts
+        shifts, spins = self.dimension, self.bodies[number].motions - self.dimension
         first = self.shifts + number * spins
         return np.r_[number * shifts : (number + 1) * shifts, first : first + spins]
 
@@ -150,10 +128,6 @@ class JoinedBodies:
         return f"{moved}, together with the obstacle of {who}" if moved else f"the obstacle of {who} alone"
 
 
-AnyBody = RigidBody | JoinedBodies
-"""What moves."""
-
-
 @dataclass(frozen=True)
 class Mode:
     """A rigid motion of one body, or of bodies that meet.
@@ -169,7 +143,7 @@ class Mode:
     body: int = 0
 
 
-def mode_of(coefficients: Array, body: AnyBody, *, signed: bool) -> Mode:
+def mode_of(coefficients: Array, body: JoinedBodies, *, signed: bool) -> Mode:
     """The motion with the given coefficients, with its name.
 
     Args:
@@ -209,7 +183,7 @@ def works(directions: Array, fields: Array) -> Array:
     return np.einsum("md,mnd->mn", directions, fields)
 
 
-def kernel(comm: MPI.Comm, body: AnyBody, fixed: Sequence[Array]) -> Array:
+def kernel(comm: MPI.Comm, body: JoinedBodies, fixed: Sequence[Array]) -> Array:
     """A basis of Y as columns of rigid coefficients, (3|6, k). Collective; the same on all ranks.
 
     First the translations, orthonormal; then rotations about orthonormal axes, one radian each, whose
@@ -227,7 +201,7 @@ def kernel(comm: MPI.Comm, body: AnyBody, fixed: Sequence[Array]) -> Array:
     return np.asarray(comm.bcast(basis, root=0))
 
 
-def modes(basis: Array, body: AnyBody) -> tuple[Mode, ...]:
+def modes(basis: Array, body: JoinedBodies) -> tuple[Mode, ...]:
     """The motions of a kernel's basis. Local.
 
     Args:

@@ -17,7 +17,7 @@ from ..laws import Length
 from ..laws.base import Directional
 from ..typing import Array
 from .cutting_planes import Functional, SlipIntegral, merged
-from .motions import DEFAULT, AnyBody, JoinedBodies, Mode, kernel
+from .motions import DEFAULT, JoinedBodies, Mode, kernel
 
 
 def _linear_part(law: Directional) -> float:
@@ -86,7 +86,7 @@ class RigidProblem:
         force: sum of the absolute nodal forces: beside it a work is rounding or not, however well loads balance.
     """
 
-    body: AnyBody
+    body: JoinedBodies
     loads: Mapping[str, Array]
     fixed: tuple[Array, ...] = ()
     contact: tuple[Array, ...] = ()
@@ -258,7 +258,7 @@ def without_obstacles(problem: RigidProblem, mode: Mode | None) -> Mode | None:
         mode: one of its motions.
     """
     body = problem.body
-    if mode is None or not isinstance(body, JoinedBodies):
+    if mode is None:
         return mode
     own = np.delete(mode.coefficients, range(body.shifts - len(body.obstacles), body.shifts))
     return replace(mode, coefficients=tuple(map(float, own))) if own.any() else None

@@ -16,7 +16,7 @@ from ..problem.interfaces import Interface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..rigid import (
-    AnyBody,
+    JoinedBodies,
     LoadFactors,
     Mode,
     Resistance,
@@ -114,7 +114,7 @@ def _with_obstacles(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> tuple[
     return tuple(replace(one, loads={n: np.zeros(one.body.motions) for n in names} | dict(one.loads)) for one in found)
 
 
-def _ways(problem: Problem, body: AnyBody, names: Sequence[str]) -> list[Array]:
+def _ways(problem: Problem, body: JoinedBodies, names: Sequence[str]) -> list[Array]:
     """What a unit of each obstacle's way adds to the rows of each contact of a body, (m, obstacles)."""
     found: list[Array] = []
     for bounds in (b for b in problem.bounds if not _bilateral(b)):
@@ -167,7 +167,7 @@ def loads_of_rigid_motions(problem: Problem, forces: Mapping[str, PETSc.Vec]) ->
     return {name: force for name, force in forces.items() if name not in problem.bulk.strains}
 
 
-def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBody) -> RigidProblem:
+def rigid_problem(problem: Problem, forces: Mapping[str, PETSc.Vec], body: JoinedBodies) -> RigidProblem:
     """The data of the existence question of one body. Collective.
 
     Args:
@@ -193,7 +193,7 @@ def _bilateral(bounds: Bounds) -> bool:
     return bool(np.all(np.isfinite(bounds.lower) & np.isfinite(bounds.upper)))
 
 
-def inside(problem: Problem, body: AnyBody, blocks: Entities) -> Mask:
+def inside(problem: Problem, body: JoinedBodies, blocks: Entities) -> Mask:
     """Which vertices belong to a body, (n,).
 
     Args:
@@ -204,7 +204,7 @@ def inside(problem: Problem, body: AnyBody, blocks: Entities) -> Mask:
     return np.asarray(problem.bodies.labels[blocks] == body.index)
 
 
-def normals(problem: Problem, body: AnyBody, surface: Surface, closed: Mask | None = None) -> Array:
+def normals(problem: Problem, body: JoinedBodies, surface: Surface, closed: Mask | None = None) -> Array:
     """The work of a surface's normals at the body's vertices in its rigid motions, (m, motions).
 
     Args:
@@ -217,7 +217,7 @@ def normals(problem: Problem, body: AnyBody, surface: Surface, closed: Mask | No
     return works(surface.normals[mine], problem.motions_at(surface.blocks[mine], body))
 
 
-def prescribed(problem: Problem, body: AnyBody) -> Array:
+def prescribed(problem: Problem, body: JoinedBodies) -> Array:
     """The prescribed components of the body's rigid motions, (m, motions).
 
     Args:
@@ -229,7 +229,7 @@ def prescribed(problem: Problem, body: AnyBody) -> Array:
     return works(np.eye(d)[dofs % d], problem.motions_at(dofs // d, body))
 
 
-def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBody) -> tuple[dict[str, Array], float]:
+def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: JoinedBodies) -> tuple[dict[str, Array], float]:
     """<g, y> of each load on the rigid basis, and the sum of the absolute nodal forces. Collective."""
     comm, d = problem.domain.mesh.comm, problem.scales.dimension
     points = problem.points
@@ -243,7 +243,7 @@ def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: AnyBody) -> 
     return found, size
 
 
-def acts_on(problem: Problem, body: AnyBody, surface: Surface) -> bool:
+def acts_on(problem: Problem, body: JoinedBodies, surface: Surface) -> bool:
     """Whether a part of Γc has vertices of a body. Collective.
 
     Args:
@@ -255,7 +255,7 @@ def acts_on(problem: Problem, body: AnyBody, surface: Surface) -> bool:
     return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
 
 
-def _resistance(problem: Problem, body: AnyBody, term: LawTerm) -> Resistance:
+def _resistance(problem: Problem, body: JoinedBodies, term: LawTerm) -> Resistance:
     surface, law, mixity = term.surface, term.exact, term.mixity
     least, greatest = (1.0, 1.0) if mixity is None else sorted((1.0, mixity.energy_ratio))
     mine = inside(problem, body, surface.blocks)

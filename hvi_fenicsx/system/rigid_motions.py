@@ -26,7 +26,7 @@ from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
 from ..problem.references import References
 from ..problem.vectors import NodalForces, null_space
-from ..rigid import AnyBody, Mode, kernel
+from ..rigid import JoinedBodies, Mode, kernel
 from ..runtime import forms
 from ..runtime.mpi import total
 from ..typing import Array, Entities, Mask
@@ -128,7 +128,7 @@ class Motions:
     fields: Array
 
     @classmethod
-    def of(cls, problem: Problem, body: AnyBody, closed: Sequence[tuple[Surface, Mask]] = ()) -> Self:
+    def of(cls, problem: Problem, body: JoinedBodies, closed: Sequence[tuple[Surface, Mask]] = ()) -> Self:
         """All that supports leave, then those that closed contact does not see. Collective.
 
         Args:
@@ -153,7 +153,7 @@ class Motions:
         return np.einsum("jvd,jvd->j", self.fields, self.fields)
 
 
-def _supported(problem: Problem, body: AnyBody) -> tuple[Array, Array]:
+def _supported(problem: Problem, body: JoinedBodies) -> tuple[Array, Array]:
     """The motions that the supports of a body leave, as coefficients, and at this rank's vertices. Collective."""
     free = kernel(problem.domain.mesh.comm, body, [existence.prescribed(problem, body)])
     here = problem.space.dofmap.index_map.size_local

@@ -15,6 +15,7 @@ from hvi_fenicsx import prepare, read_tables
 from hvi_fenicsx.console import existence
 from hvi_fenicsx.rigid import (
     Directional,
+    JoinedBodies,
     Resistance,
     RigidBody,
     RigidProblem,
@@ -80,7 +81,7 @@ def random_problem(seed: int, d: int) -> RigidProblem:
     points = np.hstack([rng.uniform(-1, 1, size=(4, d)), np.zeros((4, 3 - d))])
     contact = works(-np.abs(rng.normal(size=(4, d))), rigid_fields(points, body))
     load = rng.normal(size=body.motions) * rng.choice([0.02, 0.2, 1.0])
-    return RigidProblem(body=body, loads={"g": load}, contact=(contact,), resistances=tuple(parts))
+    return RigidProblem(body=JoinedBodies((body,)), loads={"g": load}, contact=(contact,), resistances=tuple(parts))
 
 
 def agree(problem: RigidProblem, verdict: Solvability, rel: float = 1e-5) -> None:
@@ -125,7 +126,7 @@ def literal(seed: int) -> RigidProblem:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     cone = works(normals, rigid_fields(at, body))
     load = rng.uniform(0.3, 3.0, 5) @ cone
-    return RigidProblem(body=body, loads={"g": load}, contact=(cone,), resistances=(part,))
+    return RigidProblem(body=JoinedBodies((body,)), loads={"g": load}, contact=(cone,), resistances=(part,))
 
 
 def loaded(problem: RigidProblem, factor: float) -> RigidProblem:

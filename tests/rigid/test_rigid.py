@@ -17,6 +17,7 @@ from scipy.optimize import linprog
 
 from hvi_fenicsx.rigid import (
     Directional,
+    JoinedBodies,
     Resistance,
     RigidBody,
     RigidProblem,
@@ -39,6 +40,11 @@ SQUARE = RigidBody(2, np.array([0.5, 0.5, 0.0]))
 
 def even(strength: float) -> Directional:
     return Directional(strength, strength)
+
+
+def only(body: RigidBody) -> JoinedBodies:
+    """A body that meets no other."""
+    return JoinedBodies((body,))
 
 
 def force(body: RigidBody, point: tuple[float, ...], vector: tuple[float, ...]) -> Array:
@@ -100,7 +106,7 @@ def block(
         "push": force(body, (0.0, height, 0.0), (push, 0.0)),
         "weight": force(body, (0.5, 0.5, 0.0), (0.0, -weight)),
     }
-    return RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,))
+    return RigidProblem(body=only(body), loads=loads, contact=(contact,), resistances=(friction,))
 
 
 def slab(
@@ -113,7 +119,7 @@ def slab(
         "push": force(body, (1.0, 0.5, 0.0), (*push, 0.0)) + torque * np.eye(6)[5],
         "weight": force(body, (1.0, 0.5, 0.5), (0.0, 0.0, -weight)),
     }
-    return RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,))
+    return RigidProblem(body=only(body), loads=loads, contact=(contact,), resistances=(friction,))
 
 
 def wall(q: float, resistances: tuple[Resistance, ...] = (), lift: float = 0.0) -> RigidProblem:
@@ -127,7 +133,7 @@ def wall(q: float, resistances: tuple[Resistance, ...] = (), lift: float = 0.0) 
         "lift": force(body, (0.5, 1.0, 0.0), (0.0, lift)),
     }
     return RigidProblem(
-        body=body,
+        body=only(body),
         loads=loads,
         fixed=(works(np.tile([1.0, 0.0], (5, 1)), rigid_fields(side, body)),),
         contact=(contact,),
@@ -228,7 +234,7 @@ def test_a_plate_on_a_slanted_floor_slides_when_its_weight_along_the_slope_excee
     body = RigidBody(2, np.array([*middle, 0.0]))
     contact, friction = floor_2d(body, 12, even(0.25), even(0.4), 3.0, angle)
     loads = {"weight": force(body, (*middle, 0.0), (0.0, -2.0))}
-    verdict = analyse(ALONE, RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,)))
+    verdict = analyse(ALONE, RigidProblem(body=only(body), loads=loads, contact=(contact,), resistances=(friction,)))
     slope = 2.0 * abs(np.sin(angle))
     assert verdict.lambda_held == pytest.approx(0.75 / slope, abs=1e-9)
     assert verdict.lambda_peak == pytest.approx(1.2 / slope, abs=1e-9)
@@ -245,7 +251,7 @@ def test_a_one_sided_law_holds_one_way_only() -> None:
             "push": force(body, (0.5, 0.0, 0.0), (push, 0.0)),
             "weight": force(body, (0.5, 0.5, 0.0), (0.0, -1.0)),
         }
-        problem = RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(friction,))
+        problem = RigidProblem(body=only(body), loads=loads, contact=(contact,), resistances=(friction,))
         verdict = analyse(ALONE, problem)
         assert verdict.lambda_held == pytest.approx(held, abs=1e-9)
         assert verdict.state == state
@@ -260,7 +266,7 @@ def test_springs_take_motions_out_of_the_kernel_and_one_sided_springs_out_of_the
         "push": force(body, (0.5, 0.0, 0.0), (7.0, 0.0)),
         "weight": force(body, (0.5, 0.5, 0.0), (0.0, -1.0)),
     }
-    verdict = analyse(ALONE, RigidProblem(body=body, loads=loads, contact=(contact,), resistances=(spring,)))
+    verdict = analyse(ALONE, RigidProblem(body=only(body), loads=loads, contact=(contact,), resistances=(spring,)))
     assert words(verdict) == ["translation along y", "rotation about (0.5, 0)"]
     assert verdict.state == "held"
     points, weights = edge((0.0, 0.0), (1.0, 0.0), 6)
@@ -271,7 +277,7 @@ def test_springs_take_motions_out_of_the_kernel_and_one_sided_springs_out_of_the
         growth=Directional(0.0, np.inf),
         peak=Directional(0.0, np.inf),
     )
-    on_support = RigidProblem(body=body, loads=loads, resistances=(spring, support))
+    on_support = RigidProblem(body=only(body), loads=loads, resistances=(spring, support))
     assert analyse(ALONE, on_support).margin == pytest.approx(verdict.margin, abs=1e-10)
 
 
@@ -287,7 +293,7 @@ def test_a_body_in_a_tight_corner_has_motions_but_none_that_is_admitted() -> Non
         ([0.0, -1.0, 0.0], [0.0, -1.0]),
     ]
     contact = works(np.array([n for _, n in sides]), rigid_fields(np.array([p for p, _ in sides]), body))
-    verdict = analyse(ALONE, RigidProblem(body=body, loads={"g": np.array([1.0, 2.0, 3.0])}, contact=(contact,)))
+    verdict = analyse(ALONE, RigidProblem(body=only(body), loads={"g": np.array([1.0, 2.0, 3.0])}, contact=(contact,)))
     assert (verdict.state, verdict.margin, verdict.lambda_held) == ("held", None, np.inf)
     assert len(verdict.kernel) == 3
 
@@ -298,7 +304,7 @@ def test_balanced_and_unheld_motions_are_free_and_the_state_is_borderline() -> N
     assert [mode.name for mode in verdict.free] == ["translation along x"]
     assert verdict.direction is not None
     assert verdict.direction.name in ("translation along +x", "translation along -x")
-    floating = analyse(ALONE, RigidProblem(body=RigidBody(2, np.zeros(3)), loads={"balanced": np.zeros(3)}))
+    floating = analyse(ALONE, RigidProblem(body=only(RigidBody(2, np.zeros(3))), loads={"balanced": np.zeros(3)}))
     assert floating.state == "borderline"
     assert len(floating.free) == 3
     in_space = analyse(ALONE, slab((0.0, 0.0), growth=0.0))
@@ -337,10 +343,12 @@ def test_a_torque_about_the_vertical_meets_growth_times_distance() -> None:
 def test_an_eccentric_push_in_space_agrees_with_a_fine_search() -> None:
     """Sliding and turning together, the limit surface of planar friction, has no closed form: search."""
     problem = slab((0.0, 0.0))
-    body, part = problem.body, problem.resistances[0]
+    body, part = problem.body.bodies[0], problem.resistances[0]
     loads = {**problem.loads, "push": force(body, (1.7, 0.5, 0.0), (0.2, 0.7, 0.0))}
     factor = load_factors(
-        ALONE, RigidProblem(body=body, loads=loads, contact=problem.contact, resistances=(part,)), "push"
+        ALONE,
+        RigidProblem(body=only(body), loads=loads, contact=problem.contact, resistances=(part,)),
+        "push",
     )
 
     def ratio(t: Array) -> float:
@@ -376,7 +384,7 @@ def test_random_plane_problems_agree_with_one_large_linear_programme(seed: int) 
         for s, law in zip((slice(15), slice(15, 30)), laws, strict=True)
     )
     g = rng.normal(size=3)
-    found = load_factors(ALONE, RigidProblem(body=body, loads={"g": g}, contact=(contact,), resistances=parts))
+    found = load_factors(ALONE, RigidProblem(body=only(body), loads={"g": g}, contact=(contact,), resistances=parts))
     rows = np.vstack([p.slips[:, 0] for p in parts])
     weights = np.concatenate([p.weights for p in parts])
     plus, minus = np.repeat([law.plus for law in laws], 15), np.repeat([law.minus for law in laws], 15)
@@ -414,7 +422,7 @@ def test_no_sampled_motion_is_worse_than_the_margin(seed: int) -> None:
     )
     g = rng.normal(size=body.motions) * rng.choice([0.1, 0.5, 2.0])
     cone = works(normals, fields[:6])
-    verdict = analyse(ALONE, RigidProblem(body=body, loads={"g": g}, contact=(cone,), resistances=(part,)))
+    verdict = analyse(ALONE, RigidProblem(body=only(body), loads={"g": g}, contact=(cone,), resistances=(part,)))
     trials = rng.normal(size=(4000, body.motions))
     trials = trials[(trials @ cone.T <= 0.0).all(axis=1)]
     trials /= np.abs(trials).max(axis=1, keepdims=True)
@@ -445,8 +453,8 @@ def test_kernels_in_the_plane_are_told_in_words(
 ) -> None:
     body = SQUARE
     fields, ways = rigid_fields(np.array(points, float), body), np.array(directions, float)
-    basis = kernel(ALONE, body, [works(ways, fields)])
-    found = [mode.name for mode in modes(basis, body)]
+    basis = kernel(ALONE, only(body), [works(ways, fields)])
+    found = [mode.name for mode in modes(basis, only(body))]
     work = [np.einsum("n,mnd->md", column, fields) for column in basis.T]
     assert all(np.abs((field * ways).sum(axis=1)).max() < 1e-12 for field in work)
     assert found == expected
@@ -478,7 +486,7 @@ def test_kernels_in_space_are_told_in_words(axes: list[int], expected: list[str]
     body = RigidBody(3, np.array([0.5, 0.5, 0.5]))
     fields = floor_3d(body, 3, 0.0, 0.0)[1].fields
     fixed = [fields[:, :, axis] for axis in axes]
-    found = [mode.name for mode in modes(kernel(ALONE, body, fixed), body)]
+    found = [mode.name for mode in modes(kernel(ALONE, only(body), fixed), only(body))]
     assert found == expected
 
 
