@@ -124,7 +124,7 @@ class Trace:
 
     def _with_bubbles(self, vectors: Array, power: int) -> list[LocalForces]:
         """Sums of vectors (f, q, d) times powers of all bubbles, local blocks. Collective."""
-        found = []
+        found: list[LocalForces] = []
         for side in self._points.sides:
             each = [np.einsum("fq,fqd->fd", (side.sign * values) ** power, vectors) for values in side.shapes]
             found.append((side.blocks, side.summed(np.stack(each, axis=1))))

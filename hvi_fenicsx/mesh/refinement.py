@@ -59,7 +59,8 @@ def repeated(domain: Domain, times: int) -> Domain:
         check_affordable(domain.mesh.comm, unknowns, d, "domain.refinements", "use fewer refinements")
     for _ in range(times):
         step = uniform(domain)
-        domain = replace(step.domain, coarsening=lambda found=(domain, step.transfer): found)
+        found = domain, step.transfer
+        domain = replace(step.domain, coarsening=lambda found=found: found)  # type: ignore[misc]
     return domain
 
 

@@ -90,7 +90,7 @@ class ReferenceSolution:
     def transfer(self, found: SolutionArrays) -> Fields:
         """A solution, which must have a displacement, on the reference's nodes."""
         u = in_bodies(found, self._arrays)
-        rows = [np.empty((0, 2 * u.shape[1] + 2))]
+        rows: list[Array] = [np.empty((0, 2 * u.shape[1] + 2))]
         for name, own in self._arrays.parts.items():
             part, here = found.parts[name], u[own.vertices]
             values = np.hstack([part.vectors("slip"), _tractions(part)])
