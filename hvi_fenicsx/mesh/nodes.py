@@ -93,11 +93,22 @@ def dof_of_node(space: fem.FunctionSpace) -> Entities:
 
 def edge_ends(space: fem.FunctionSpace) -> Entities:
     """The vertices whose middle each local node is, by their numbers, (n, 2): a vertex is named twice."""
-    index_map, cells = space.dofmap.index_map, space.dofmap.list
-    found = np.repeat(np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)[:, None], 2, axis=1)
-    corners = space.mesh.topology.dim + 1
-    for number, ends in enumerate(edges(space) if cells.shape[1] > corners else ()):
-        found[cells[:, corners + number]] = cells[:, list(ends)]
+    index_map = space.dofmap.index_map
+    return ends_of(space.dofmap.list, index_map.size_local + index_map.num_ghosts, space.mesh.topology.dim)
+
+
+def ends_of(cells: npt.NDArray[Any], count: int, dimension: int) -> Entities:
+    """The vertices whose middle each node of a mesh is, (count, 2): a vertex is named twice.
+
+    Args:
+        cells: by their nodes, corners first, (c, nodes).
+        count: of nodes.
+        dimension: of the cells.
+    """
+    found = np.repeat(np.arange(count, dtype=np.int32)[:, None], 2, axis=1)
+    edges = basix.topology(basix.CellType[_BY_CORNERS[dimension + 1]])[1]
+    for node, ends in zip(cells.T[dimension + 1 :], edges, strict=False):
+        found[node] = cells[:, list(ends)]
     return found
 
 

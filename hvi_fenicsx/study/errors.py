@@ -12,7 +12,6 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-import basix
 import numpy as np
 from dolfinx import fem, geometry
 from mpi4py import MPI
@@ -79,7 +78,7 @@ class ReferenceSolution:
 
     def __init__(self, arrays: SolutionArrays, stiffness: sparse.csr_array, joints: Collection[str] = ()) -> None:
         self._arrays, self._stiffness, self._joints = arrays, stiffness, joints
-        self._ends = edge_ends(arrays)
+        self._ends = nodes.ends_of(cells_of(arrays), len(arrays.points), arrays.points.shape[1])
         self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[arrays.points.shape[1]]
         parts, d = arrays.parts.values(), arrays.points.shape[1]
         self._weights = np.concatenate([np.empty(0), *(part.weight for part in parts)])
@@ -103,8 +102,7 @@ class ReferenceSolution:
 
     def energy(self, u: Array) -> float:
         """√a(u, u) of a displacement (n, d), up to a factor; the stiffness is that of coefficients in its basis."""
-        share = np.where(self._ends[:, :1] == self._ends[:, 1:], 0.0, self._share)
-        flat = ((u - share * u[self._ends].sum(axis=1)) / (1 - 2 * share)).ravel()
+        flat = (u - self._share * u[self._ends].sum(axis=1)).ravel() / (1 - 2 * self._share)
         return math.sqrt(max(0.0, float(flat @ (self._stiffness @ flat))))
 
     def errors(self, found: Fields, other: Fields | None = None) -> Errors:
@@ -168,16 +166,6 @@ def stiffness(solution: Solution) -> sparse.csr_array | None:
 def cells_of(arrays: SolutionArrays) -> Integers:
     """The cells of a solution by their nodes, corners first, (c, nodes)."""
     return arrays.cells if arrays.degree == 1 else nodes.joined(arrays.cells)
-
-
-def edge_ends(arrays: SolutionArrays) -> Integers:
-    """The vertices whose middle each node is, (n, 2); a vertex is named twice."""
-    cells, d = cells_of(arrays), arrays.points.shape[1]
-    found = np.repeat(np.arange(len(arrays.points))[:, None], 2, axis=1)
-    edges = basix.topology(basix.CellType[_KINDS[d]])[1]
-    for node, ends in zip(cells.T[d + 1 :], edges, strict=False):
-        found[node] = cells[:, list(ends)]
-    return found
 
 
 def mesh_width(arrays: SolutionArrays) -> float:
