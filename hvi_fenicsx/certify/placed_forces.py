@@ -79,12 +79,12 @@ def reactions(
         np.subtract.at(left, state.surface.blocks, own)
         for name, acting in _on_bodies(problem, state.surface, own):
             _add(found, name, acting)
-    for part, dofs in problem.held:
-        own_dofs = dofs[dofs < left.size]
+    for one in problem.prescribed:
+        own_dofs = one.dofs[one.dofs < left.size]
         support = np.zeros_like(left)
         support.ravel()[own_dofs] = left.ravel()[own_dofs]
         left.ravel()[own_dofs] = 0.0
-        _add(found, part, NodalForces.of(support))
+        _add(found, one.part, NodalForces.of(support))
     return found
 
 

@@ -159,9 +159,9 @@ def _attributed(problem: Problem, parts: tuple[str, ...]) -> tuple[dict[str, Int
     here = problem.space.dofmap.index_map.size_local * problem.scales.dimension
     held: dict[str, list[int]] = {part: [] for part in parts}
     touched: dict[str, list[int]] = {part: [] for part in parts}
-    for part, dofs in problem.held:
-        new = [int(dof) for dof in dofs if dof < here and int(dof) not in taken]
-        held.setdefault(part, []).extend(new)
+    for one in problem.prescribed:
+        new = [int(dof) for dof in one.dofs if dof < here and int(dof) not in taken]
+        held.setdefault(one.part, []).extend(new)
         taken.update(new)
     for surface in problem.surfaces:
         new = [int(dof) for dof in surface.dofs.ravel() if int(dof) not in taken]

@@ -12,7 +12,6 @@ from typing import Any
 
 import dolfinx
 import numpy as np
-from dolfinx import fem
 
 from ..effects import Drive, Evaluate, Place, load_name
 from ..errors import InputError
@@ -25,7 +24,7 @@ from . import constraints, domain_forms, elastic_operator, interfaces, law_term,
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .law_term import Modification, unchanged
-from .problem import PrescribedComponent, Problem
+from .problem import Problem
 from .scaling import Placed, PlacedContribution, Scales
 from .spaces import coefficients_of
 
@@ -110,8 +109,9 @@ def _problem(
     implausible: tuple[str, ...],
 ) -> Problem:
     """All contributions together. Collective."""
-    conditions, held, fixed = _conditions(context, scales, contributions)
-    prescribed = constraints.values(context, conditions)
+    components = constraints.prescribed_components(context, scales, contributions)
+    prescribed = constraints.values(context, components)
+    fixed = np.concatenate([np.empty(0, np.int32), *(one.dofs for one in components)])
     surfaces, found = _surfaces(context, contributions, fixed, model)
     fixed = np.unique(np.concatenate([fixed, *(one.tied for one in found)])).astype(np.int32)
     gaps = {one.name: one.gap for one in found}
@@ -131,19 +131,13 @@ def _problem(
             context.space, scales, contributions, strains, context.domain.shared, model.volumetric_ratio
         ),
         linear={**linear, **strains},
-        conditions=conditions,
         fixed=fixed,
-        prescribed=tuple(
-            PrescribedComponent(c.component, context.part_facets[str(where)], c.value)
-            for where, _, contribution in contributions
-            for c in contribution.conditions
-        ),
+        prescribed=components,
         bounds=bounds,
         terms=terms,
         surfaces=tuple(surfaces.values()),
         implausible=implausible,
         contributions=tuple(contributions),
-        held=held,
         part_facets=context.part_facets,
         pieces=model.parts,
         interfaces=found,
@@ -158,17 +152,6 @@ def _surfaces(
     occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
     found = interfaces.find(context, model.interfaces, occupied)
     return surfaces | {one.name: one.surface for one in found}, found
-
-
-def _conditions(
-    context: DomainForms, scales: Scales, contributions: Sequence[PlacedContribution]
-) -> tuple[tuple[fem.DirichletBC, ...], tuple[tuple[str, Entities], ...], Entities]:
-    """Dirichlet conditions, the dofs of each with its part, and all these dofs. Collective."""
-    wanted = [(str(where), c) for where, _, contribution in contributions for c in contribution.conditions]
-    conditions = constraints.make_conditions(context, scales, wanted)
-    held = tuple((where, bc.dof_indices()[0]) for (where, _), bc in zip(wanted, conditions, strict=True))
-    fixed = np.unique(np.concatenate([np.empty(0, np.int32), *(dofs for _, dofs in held)])).astype(np.int32)
-    return conditions, held, fixed
 
 
 def _by_name(contributions: Sequence[PlacedContribution], kind: str) -> dict[str, Any]:

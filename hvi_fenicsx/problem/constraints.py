@@ -20,7 +20,7 @@ from ..typing import Array, Entities
 from . import contact_surface
 from .contact_surface import Surface
 from .domain_forms import DomainForms
-from .problem import Bounds, BoundsForce, BoundsMove
+from .problem import Bounds, BoundsForce, BoundsMove, PrescribedComponent
 from .scaling import DEFAULT, PlacedContribution, Scales
 from .spaces import contact_rule, edge_share
 
@@ -240,40 +240,50 @@ def _contradiction(one: Bounds, other: Bounds, unit: float) -> list[str]:
     ]
 
 
-def make_conditions(
-    context: DomainForms, scales: Scales, wanted: Sequence[tuple[str, Condition]]
-) -> tuple[fem.DirichletBC, ...]:
-    """The conditions, nondimensional. Collective.
+def prescribed_components(
+    context: DomainForms, scales: Scales, contributions: Sequence[PlacedContribution]
+) -> tuple[PrescribedComponent, ...]:
+    """The prescribed components, with their conditions. Collective.
 
     Args:
         context: spaces, parts and vertices.
         scales: what one unit is in SI.
-        wanted: the conditions in SI, each with the part it stands on.
+        contributions: of all effects.
 
     Raises:
         InputError: on all ranks alike: two parts prescribe different values where they meet.
     """
-    found = tuple(_condition(context, scales, part, condition) for part, condition in wanted)
-    named = [(part, bc) for (part, _), bc in zip(wanted, found, strict=True)]
-    _check_agreement(context, scales, named, DEFAULT.same)
+    found = tuple(
+        PrescribedComponent(
+            name=load_name(where, effect),
+            part=str(where),
+            component=stated.component,
+            facets=context.part_facets[str(where)],
+            value=stated.value,
+            condition=_condition(context, scales, context.part_facets[str(where)], stated),
+        )
+        for where, effect, contribution in contributions
+        for stated in contribution.conditions
+    )
+    _check_agreement(context, scales, found)
     return found
 
 
-def values(context: DomainForms, conditions: Sequence[fem.DirichletBC]) -> Array:
-    """What the conditions prescribe at the local scalar dofs, zero at the others.
+def values(context: DomainForms, prescribed: Sequence[PrescribedComponent]) -> Array:
+    """What is prescribed at the local scalar dofs, zero at the others.
 
     Args:
         context: spaces, parts and vertices.
-        conditions: the conditions.
+        prescribed: the components.
     """
     found = np.zeros(len(context.points) * context.dimension)
-    for condition in conditions:
-        condition.set(found)
+    for one in prescribed:
+        one.condition.set(found)
     return found
 
 
-def _condition(context: DomainForms, scales: Scales, part: str, condition: Condition) -> fem.DirichletBC:
-    facets, dim = context.part_facets[part], context.dimension - 1
+def _condition(context: DomainForms, scales: Scales, facets: Entities, condition: Condition) -> fem.DirichletBC:
+    dim = context.dimension - 1
     component = context.space.sub(condition.component)
     if condition.value.is_number and edge_share(context.space) == 0.0:
         value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
@@ -284,27 +294,17 @@ def _condition(context: DomainForms, scales: Scales, part: str, condition: Condi
     return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
 
 
-def _check_agreement(
-    context: DomainForms, scales: Scales, named: Sequence[tuple[str, fem.DirichletBC]], rounding: float
-) -> None:
+def _check_agreement(context: DomainForms, scales: Scales, found: Sequence[PrescribedComponent]) -> None:
     """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
-    values = np.empty(len(context.points) * context.dimension)
-    prescribed = [(part, *_values(condition, values)) for part, condition in named]
+    prescribed = [(one.part, one.dofs, values(context, [one])[one.dofs]) for one in found]
     size = max((float(np.max(np.abs(v), initial=0.0)) for _, _, v in prescribed), default=0.0)
     bad: list[str] = []
     for (one, dofs, these), (other, more, those) in combinations(prescribed, 2):
         shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
-        apart = np.abs(these[i] - those[j]) > rounding * size
+        apart = np.abs(these[i] - those[j]) > DEFAULT.same * size
         differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
         bad += [_disagreement(context, int(dof), (one, other), (float(a), float(b)), scales) for dof, a, b in differing]
     refuse(context.domain.mesh.comm, bad[:1])
-
-
-def _values(condition: fem.DirichletBC, values: Array) -> tuple[Entities, Array]:
-    """The dofs of a condition and what it prescribes; ``values`` is room for all dofs."""
-    dofs = condition.dof_indices()[0]
-    condition.set(values)
-    return dofs, values[dofs]
 
 
 def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:

@@ -101,7 +101,7 @@ def _bounded(problem: Problem, part: str | None) -> int:
 
 def _prescribed(problem: Problem, part: str | None, contribution: Contribution) -> int:
     """Displacements that its conditions take away, over all ranks. Collective."""
-    own = [d for name, d in problem.held if name == part] if contribution.conditions else []
+    own = [one.dofs for one in problem.prescribed if one.part == part] if contribution.conditions else []
     size = problem.space.dofmap.index_map.size_local * problem.space.dofmap.index_map_bs
     dofs = np.unique(np.concatenate([np.empty(0, np.int32), *own]))
     return int(problem.domain.mesh.comm.allreduce(int(np.count_nonzero(dofs < size))))

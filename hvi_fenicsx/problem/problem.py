@@ -16,7 +16,6 @@ import numpy.typing as npt
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ..effects import load_name
 from ..formula import SpatialValue
 from ..mesh import nodes
 from ..mesh.boundary_part import BoundaryPart
@@ -114,14 +113,25 @@ class PrescribedComponent:
     """A displacement component that is prescribed.
 
     Attributes:
+        name: of its part and effect, such as ``grip.displacement``.
+        part: the boundary part.
         component: its number.
         facets: where, local facets.
         value: its value, m.
+        condition: the Dirichlet condition, nondimensional.
     """
 
+    name: str
+    part: str
     component: int
     facets: Entities
     value: SpatialValue
+    condition: fem.DirichletBC
+
+    @property
+    def dofs(self) -> Entities:
+        """The local scalar dofs that it prescribes."""
+        return self.condition.dof_indices()[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +146,6 @@ class Problem:
             them.
         bulk: the elastic operator, a(u, v).
         linear: UFL forms <g, v> by name of their place and effect.
-        conditions: Dirichlet conditions, nondimensional values.
         fixed: local scalar dofs (owned and ghost) that they prescribe.
         prescribed: the prescribed components.
         bounds: contact bounds, by part.
@@ -144,7 +153,6 @@ class Problem:
         surfaces: surfaces of the parts with bounds or laws, in the order of the parts.
         implausible: warnings of effects about their own numbers, in sentences.
         contributions: what each effect contributed.
-        held: the dofs of each condition, with its part.
         part_facets: the local facets of each boundary part.
         pieces: the boundary parts as they are stated, whatever the mesh.
         interfaces: where two bodies meet; their relative displacements are unknowns.
@@ -156,7 +164,6 @@ class Problem:
     points: Array
     bulk: Bulk
     linear: dict[str, Any]
-    conditions: tuple[fem.DirichletBC, ...]
     fixed: Entities
     prescribed: tuple[PrescribedComponent, ...]
     bounds: tuple[Bounds, ...]
@@ -164,7 +171,6 @@ class Problem:
     surfaces: tuple[Surface, ...]
     implausible: tuple[str, ...]
     contributions: tuple[PlacedContribution, ...]
-    held: tuple[tuple[str, Entities], ...]
     part_facets: Mapping[str, Entities]
     pieces: Mapping[str, BoundaryPart]
     interfaces: tuple[Interface, ...] = ()
@@ -281,11 +287,11 @@ class FactoredProblem:
 
     def __init__(self, problem: Problem, scaled: Collection[str]) -> None:
         self._factor = fem.Constant(problem.space.mesh, PETSc.ScalarType(1.0))
-        conditions, self._values = list(problem.conditions), list[tuple[fem.Function, Array]]()
-        names = [load_name(where, effect) for where, effect, c in problem.contributions for _ in c.conditions]
-        for number in (number for number, name in enumerate(names) if name in scaled):
-            conditions[number], values = _scaled_condition(problem, number)
-            self._values.append((values, values.x.array.copy()))
+        prescribed, self._values = list(problem.prescribed), list[tuple[fem.Function, Array]]()
+        for number, one in enumerate(problem.prescribed):
+            if one.name in scaled:
+                prescribed[number], values = _scaled(problem, one)
+                self._values.append((values, values.x.array.copy()))
         bounds = [
             replace(once, lower=once.lower.copy(), upper=once.upper.copy())
             if once.move is not None and once.move.name in scaled
@@ -297,7 +303,7 @@ class FactoredProblem:
             problem,
             linear=self._times_factor(problem.linear, scaled),
             bulk=replace(problem.bulk, strains=self._times_factor(problem.bulk.strains, scaled)),
-            conditions=tuple(conditions),
+            prescribed=tuple(prescribed),
             bounds=tuple(bounds),
         )
 
@@ -320,14 +326,13 @@ class FactoredProblem:
         return self._problem
 
 
-def _scaled_condition(problem: Problem, number: int) -> tuple[fem.DirichletBC, fem.Function]:
-    """A condition of its own, and its values, which will be changed. Collective."""
-    prescribed = problem.prescribed[number]
+def _scaled(problem: Problem, prescribed: PrescribedComponent) -> tuple[PrescribedComponent, fem.Function]:
+    """A component with a condition of its own, and its values, which will be changed. Collective."""
     component = problem.space.sub(prescribed.component)
     collapsed, _ = component.collapse()
     dofs = fem.locate_dofs_topological((component, collapsed), problem.domain.dimension - 1, prescribed.facets)
     everywhere = np.zeros(len(problem.points) * problem.scales.dimension)
-    problem.conditions[number].set(everywhere)
+    prescribed.condition.set(everywhere)
     values = fem.Function(collapsed)
     values.x.array[dofs[1]] = everywhere[dofs[0]]
-    return fem.dirichletbc(values, dofs, component), values
+    return replace(prescribed, condition=fem.dirichletbc(values, dofs, component)), values

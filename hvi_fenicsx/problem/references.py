@@ -150,7 +150,7 @@ def demanded(problem: Problem) -> Array:
         away = _outside(np.zeros_like(bounds.lower), bounds.lower, bounds.upper)
         np.maximum.at(displacement, problem.bodies.labels[bounds.surface.blocks], away)
     prescribed = fem.Function(problem.space)
-    for condition in problem.conditions:
+    for condition in (one.condition for one in problem.prescribed):
         condition.set(prescribed.x.array)
     sizes = np.max(np.abs(prescribed.x.array.reshape(-1, problem.scales.dimension)), axis=1)
     np.maximum.at(displacement, problem.bodies.labels, sizes)

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx.fem.petsc import set_bc
 
-from ..effects.base import load_name
 from ..errors import InputError
 from ..problem.law_term import LawTerm
 from ..problem.vectors import new_vector, turn
@@ -43,7 +42,7 @@ class Loading:
 def load_names(system: System) -> tuple[str, ...]:
     """All that a factor can scale: ``part.effect`` of each load, prescribed displacement and moved obstacle."""
     moved = [bounds.move.name for bounds in system.bounds if bounds.move is not None]
-    return tuple(dict.fromkeys([*system.forces, *_conditions(system), *moved]))
+    return tuple(dict.fromkeys([*system.forces, *(one.name for one in system.problem.prescribed), *moved]))
 
 
 def obstacle_shift(system: System, scaled: Collection[str]) -> Array:
@@ -99,12 +98,6 @@ def loading_of(system: System, scaled: Collection[str] | None) -> Loading:
     return Loading(applied=applied, prescribed=prescribed, lifted=lifted, pulled=pulled)
 
 
-def _conditions(system: System) -> list[str]:
-    """The names of the conditions, in their order."""
-    placed = system.problem.contributions
-    return [load_name(where, effect) for where, effect, part in placed for _ in part.conditions]
-
-
 def _column(system: System, chosen: Collection[str]) -> tuple[Array, Array, Array, Array]:
     """Applied, prescribed, lifted and pulled of these loads and conditions. Collective."""
     problem, fixed = system.problem, system.problem.fixed_here
@@ -112,8 +105,7 @@ def _column(system: System, chosen: Collection[str]) -> tuple[Array, Array, Arra
     for name in system.forces.keys() & set(chosen):
         applied.axpy(1.0, system.forces[name])
     applied.array[:] = problem.combined(applied.array_r)
-    named = zip(problem.conditions, _conditions(system), strict=True)
-    set_bc(prescribed, [condition for condition, name in named if name in chosen])
+    set_bc(prescribed, [one.condition for one in problem.prescribed if one.name in chosen])
     pull = system.holding.pull(prescribed)
     for vector in (applied, pull):
         turn(vector, system.rotation)
@@ -127,8 +119,8 @@ def _column(system: System, chosen: Collection[str]) -> tuple[Array, Array, Arra
 
 def _check_overlap(system: System, prescribed: Array, chosen: Collection[str]) -> None:
     """Refuse an unknown that is prescribed twice, scaled and not, unless it is zero. Collective."""
-    held = [(n in chosen, dofs) for n, (_, dofs) in zip(_conditions(system), system.problem.held, strict=True)]
-    sides = [{int(dof) for is_scaled, dofs in held if is_scaled == side for dof in dofs} for side in (True, False)]
+    known = system.problem.prescribed
+    sides = [{int(dof) for one in known if (one.name in chosen) == side for dof in one.dofs} for side in (True, False)]
     both = [dof for dof in sides[0] & sides[1] if dof < len(prescribed)]
     if any(agree(system.comm, bool(np.any(prescribed[both] != 0.0)))):
         raise InputError(

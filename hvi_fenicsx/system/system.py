@@ -260,7 +260,7 @@ class System:
         matrix = self._coupled(self.problem.bulk.matrix())
         load, prescribed = new_vector(self.problem.space), new_vector(self.problem.space)
         self.holding, fixed = HoldingForces(self.problem, matrix), self.problem.fixed_here
-        set_bc(prescribed, list(self.problem.conditions))
+        set_bc(prescribed, [one.condition for one in self.problem.prescribed])
         pull = self.holding.pull(prescribed)
         load.array[:] = self._loads.ravel() - pull.array_r
         load.array[fixed] = prescribed.array_r[fixed]

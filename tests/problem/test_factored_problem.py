@@ -39,10 +39,10 @@ def test_loads_and_displacements_are_those_of_the_scene_with_multiplied_values()
     found = made.at(FACTOR)
     for name, form in wanted.problem.linear.items():
         np.testing.assert_allclose(nodal(found.linear[name]), nodal(form), rtol=0, atol=1e-14)
-    for one, other in zip(found.conditions, wanted.problem.conditions, strict=True):
+    for one, other in zip(found.prescribed, wanted.problem.prescribed, strict=True):
         values = np.zeros((2, len(problem.points) * 2))
-        one.set(values[0])
-        other.set(values[1])
+        one.condition.set(values[0])
+        other.condition.set(values[1])
         np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-15)
     strain = assembled(forms.compiled(found.bulk.strains["body.temperature"]))
     np.testing.assert_allclose(strain.array, wanted.system.forces["body.temperature"].array, rtol=0, atol=1e-14)
