@@ -1,4 +1,4 @@
-"""The array types of the package."""
+"""The array types of the package, and how large an array is."""
 
 from __future__ import annotations
 
@@ -13,3 +13,12 @@ Integers = npt.NDArray[np.int64]
 """Whole numbers."""
 Mask = npt.NDArray[np.bool_]
 """Yes or no."""
+
+
+def magnitude(values: npt.ArrayLike) -> float:
+    """The largest absolute value, 0 of none.
+
+    Args:
+        values: numbers.
+    """
+    return float(np.max(np.abs(values), initial=0.0))

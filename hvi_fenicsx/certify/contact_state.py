@@ -20,7 +20,7 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References, elastic_forces
 from ..problem.vectors import nodal_values
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers, Mask, magnitude
 from . import force_attribution
 from .thresholds import DEFAULT
 
@@ -239,7 +239,7 @@ class LawState:
     def unsettled(self) -> float:
         """The largest relative change of the energies of the term if they were frozen anew."""
         found = self.term.energies_of(self.components, self._near_rest)
-        return float(np.max(np.abs(found / self.term.energies - 1.0), initial=0.0))
+        return magnitude(found / self.term.energies - 1.0)
 
     @property
     def carried(self) -> Array:

@@ -18,7 +18,7 @@ from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..system import local_frames
 from ..system.rigid_motions import SUMMATION
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers, Mask, magnitude
 from .thresholds import DEFAULT
 
 
@@ -271,7 +271,7 @@ def nearest_sum(carriers: Sequence[Carrier], wanted: Array) -> tuple[list[Array]
     for carrier, part in zip(carriers, parts, strict=True):
         every[carrier.rows] += part
     asked = [wanted[c.rows] * part / every[c.rows] for c, part in zip(carriers, parts, strict=True)]
-    settled = float(np.finfo(np.float64).eps * np.max(np.abs(wanted), initial=0.0))
+    settled = float(np.finfo(np.float64).eps) * magnitude(wanted)
     _sweep(carriers, asked, wanted, settled)
     for _ in range(DEFAULT.shared_steps if any(np.any(c.at_rest) for c in carriers) else 0):
         left = _left(carriers, asked, wanted)
@@ -299,7 +299,7 @@ def _sweep(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, settl
             before = carrier.nearest(asked[i])[0] * carrier.visible
             asked[i] = left[carrier.rows] + before
             left[carrier.rows] += before - carrier.nearest(asked[i])[0] * carrier.visible
-        moved = float(np.max(np.abs(left - old), initial=0.0))
+        moved = magnitude(left - old)
 
 
 def _newton(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left: Array) -> bool:

@@ -32,7 +32,7 @@ from ..rigid import Mode
 from ..runtime.mpi import agree, largest, total
 from ..system import existence, rigid_motions
 from ..system.system import System
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .certificate import Examination
 from .contact_state import LawState
 from .second_order import growth, negative_eigenvalues, on_places
@@ -55,7 +55,7 @@ def needed_falls(state: LawState) -> Array | None:
     energy, rounding = graph.primitive(x), DEFAULT.near * state.scale
     for arc in (a for a in (Arc(*map(float, row)) for row in graph.table) if not state.term.radial or a.low >= 0.0):
         falls = np.maximum(falls, _needed(arc, x, energy, traction, rounding))
-    falls[falls <= DEFAULT.near * float(np.max(np.abs(graph.slopes)))] = 0.0
+    falls[falls <= DEFAULT.near * magnitude(graph.slopes)] = 0.0
     falls /= state.term.stretch
     if state.term.radial:
         return np.where(state.hidden | (traction < 0.0), np.inf, falls)
@@ -224,7 +224,7 @@ def _steepness(term: LawTerm) -> str:
 
 
 def _size(values: Sequence[Array]) -> float:
-    return max((float(np.max(np.abs(v), initial=0.0)) for v in values), default=0.0)
+    return max((magnitude(v) for v in values), default=0.0)
 
 
 def _stiffer(system: System, motions: Motions, falls: Sequence[Array]) -> bool:

@@ -7,7 +7,6 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 
 from .. import console
@@ -18,7 +17,7 @@ from ..runtime import log
 from ..runtime.mpi import on_root
 from ..solvers import obstacle_force
 from ..system import existence
-from ..typing import Array
+from ..typing import Array, magnitude
 from ..workflow import Preparation, prepare
 
 COMM = MPI.COMM_WORLD
@@ -63,7 +62,7 @@ def _sizes(prepared: Preparation) -> dict[str, Any]:
     obstacles = {} if pressed is None else {pressed.name: pressed.force * pressed.direction}
 
     def shown(force: Array) -> list[float]:
-        rounding = 1e-12 * np.max(np.abs(force))
+        rounding = 1e-12 * magnitude(force)
         return [float(f) * problem.scales.force if abs(f) > rounding else 0.0 for f in force]
 
     return {

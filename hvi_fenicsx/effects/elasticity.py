@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from ..errors import InputError
 from ..geometry import ROUNDING
 from ..schema import Finite, Names, Positive, refusal
-from ..typing import Array
+from ..typing import Array, magnitude
 from .base import Effect, FormContext, Place, Sides, from_python
 from .contribution import Averaged, Contribution
 
@@ -217,7 +217,7 @@ class _ByMatrix(Elasticity):
 
 
 def _definite(matrix: Array, hint: str) -> None:
-    largest = float(np.max(np.abs(matrix)))
+    largest = magnitude(matrix)
     if not 0.0 < largest < np.inf:
         raise refusal("the elasticity is zero, or its numbers are too large or too far apart; give moduli in N/m²")
     lowest = float(np.linalg.eigvalsh(matrix / largest)[0])
@@ -293,7 +293,7 @@ class Anisotropic(_ByMatrix):
         if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
             raise refusal(f"matrix must have {size} rows of {size} numbers for {self.model}")
         c = self.stiffness()
-        if np.max(np.abs(c - c.T)) > ROUNDING * np.max(np.abs(c)):
+        if magnitude(c - c.T) > ROUNDING * magnitude(c):
             i, j = np.unravel_index(np.argmax(np.abs(c - c.T)), c.shape)
             raise refusal(f"matrix is not symmetric: C[{i + 1}][{j + 1}] = {c[i, j]:g}, not {c[j, i]:g}")
         _definite(c, "some strain would cost no energy")

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from ..errors import InputError
 from ..formula import SpatialValue
 from ..schema import Finite, refusal
-from ..typing import Array
+from ..typing import Array, magnitude
 from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, SideMoments, Sides, SurfaceLoad, from_python
 from .contribution import Condition, Contribution
 from .elasticity import Elasticity, strain, voigt
@@ -258,7 +258,7 @@ def _rotation(second: Array, moment: tuple[float, ...]) -> tuple[Array, bool]:
     inertia = np.trace(wide) * np.eye(3) - wide
     wanted = np.array([0.0, 0.0, *moment] if len(moment) == 1 else moment)
     rate = np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ wanted
-    return rate, bool(np.allclose(inertia @ rate, wanted, rtol=0.0, atol=1e-9 * np.max(np.abs(wanted))))
+    return rate, bool(np.allclose(inertia @ rate, wanted, rtol=0.0, atol=1e-9 * magnitude(wanted)))
 
 
 class Temperature(OneValue):

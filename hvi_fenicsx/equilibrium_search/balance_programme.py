@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .relaxation import Relaxation
 from .scalar_problem import Box, ScalarProblem
 from .thresholds import EPSILON, LIMITS
@@ -63,7 +63,7 @@ class BalanceProgramme:
         along = np.divide(away, half[owner], out=np.zeros_like(away), where=half[owner] > 0.0)
         pull = 2.0 * (matrix @ middle) - problem.force
         cost = self._split.diagonal[owner] * self._x**2 + self._x * self._t + pull[owner] * away
-        price = scale * float(np.max(np.abs([self._low, self._high]))) / (LIMITS.enough * unit)
+        price = scale * magnitude([self._low, self._high]) / (LIMITS.enough * unit)
         pushing = self._push * self._bounds * scale[self._pushed] / unit
         spare, each = np.zeros(len(self._push) + 2 * n), np.arange(n)
         ones = np.ones(n)

@@ -13,7 +13,7 @@ from ..reduced.condensation import Condensation
 from ..runtime.mpi import agree
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.method import SolveResult
-from ..typing import Array
+from ..typing import Array, magnitude
 from ..workflow import Preparation, Solution, certified, finish
 from .condensed_form import scalar_problem
 from .scalar_problem import ScalarProblem
@@ -151,9 +151,9 @@ class Equilibria:
 
     def _check_same(self, x: Array) -> None:
         """Refuse points that differ from rank to rank. Collective."""
-        comm, allowed = self._prepared.system.comm, LIMITS.accuracy * np.max(np.abs(x), initial=0.0)
-        same = np.max(np.abs(comm.bcast(x) - x), initial=0.0) <= allowed
-        if not all(agree(comm, bool(same))):
+        comm, allowed = self._prepared.system.comm, LIMITS.accuracy * magnitude(x)
+        same = magnitude(comm.bcast(x) - x) <= allowed
+        if not all(agree(comm, same)):
             raise SolverError("the ranks found different equilibria; run on one")
 
     def solution(self, point: StationaryPoint) -> Solution:

@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..laws import Superpotential
 from ..laws.traction_graph import TractionGraph
 from ..reduced.condensed_problem import Bonds, CondensedProblem
-from ..typing import Array
+from ..typing import Array, magnitude
 from .arcs import FREE, Chain, chain, total
 from .lengths import Lengths
 from .rigid_balance import without_resistance
@@ -135,7 +135,7 @@ def _argument(bonds: Bonds, far: Array) -> float:
 
 def _far(laws: Sequence[Bonds]) -> float:
     """A displacement beyond all that the laws tell apart."""
-    sizes = [np.max(np.abs([b.law.length_scale, *b.law.breaks])) for b in laws]
+    sizes = [magnitude([b.law.length_scale, *b.law.breaks]) for b in laws]
     return LIMITS.far * max([1.0, *map(float, sizes)])
 
 

@@ -19,7 +19,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.optimize import brentq
 
 from ..laws.traction_graph import Arc
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers, Mask, magnitude
 from .arcs import ArcTable, apart, arcs_of
 from .scalar_problem import ScalarProblem
 from .thresholds import LIMITS
@@ -151,7 +151,7 @@ class _Programme:
 
     def _stationary(self, x: Array) -> bool:
         largest = float(np.max(np.abs(self._b), initial=1e-300))
-        return bool(np.max(np.abs(self._residual(x)), initial=0.0) <= LIMITS.rounding * largest)
+        return magnitude(self._residual(x)) <= LIMITS.rounding * largest
 
     def bounded(self, found: _Iterate) -> Optimum:
         """The point with a bound that allows for its residual r and for rounding.

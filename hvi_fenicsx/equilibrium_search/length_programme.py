@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..typing import Array, Mask
+from ..typing import Array, Mask, magnitude
 from .arcs import ArcTable
 from .convex_programme import Optimum, minimise, never
 from .lengths import Frames, left_out, parts, unknowns_of
@@ -208,7 +208,7 @@ class LengthProgramme:
         """Where the unknowns end: in vectors at the problem's bounds, or far away, (n,) each."""
         problem, n = self.problem, len(self.b)
         low, high, members = self.low[:n].copy(), self.high[:n].copy(), problem.lengths.members
-        far = 2.0 * float(np.max(np.abs([low, high])))
+        far = 2.0 * magnitude([low, high])
         low[members], high[members] = np.maximum(problem.lower, -far)[members], np.minimum(problem.upper, far)[members]
         return low, high
 

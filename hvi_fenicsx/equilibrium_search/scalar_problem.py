@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, magnitude
 from .arcs import INF, ArcTable, Chain
 from .lengths import Lengths
 from .thresholds import LIMITS
@@ -60,12 +60,12 @@ class ScalarProblem:
         Args:
             x: the point, (n,).
         """
-        return bool(np.max(np.abs(x), initial=0.0) >= (1.0 - LIMITS.accuracy) * self.far)
+        return magnitude(x) >= (1.0 - LIMITS.accuracy) * self.far
 
     @cached_property
     def force_size(self) -> float:
         """The largest force, not zero."""
-        return float(np.max(np.abs(self.force), initial=0.0)) or 1.0
+        return magnitude(self.force) or 1.0
 
     @cached_property
     def joint(self) -> float:

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from ..reduced.condensed_problem import Bonds, CondensedProblem
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers, Mask, magnitude
 from .scalar_problem import ScalarProblem
 from .thresholds import LIMITS
 
@@ -48,7 +48,7 @@ def subdifferential(problem: ScalarProblem, x: Array) -> Subdifferential:
         x: the point, (n,).
     """
     arcs, accuracy = problem.arcs, LIMITS.accuracy
-    near = accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
+    near = accuracy * (1.0 + magnitude(x))
     here = (arcs.low <= x[:, None] + near) & (arcs.high >= x[:, None] - near)
     at = np.clip(x[:, None], np.where(here, arcs.low, -np.inf), np.where(here, arcs.high, np.inf))
     t = arcs.tractions + arcs.slopes * (at - arcs.anchors)
@@ -71,7 +71,7 @@ def with_bounds(problem: ScalarProblem, x: Array, laws: Subdifferential) -> Subd
         x: the point, (n,).
         laws: what the laws allow there.
     """
-    near = LIMITS.accuracy * (1.0 + np.max(np.abs(x), initial=0.0))
+    near = LIMITS.accuracy * (1.0 + magnitude(x))
     force = problem.force - problem.stiffness @ x
     below, above = x <= problem.lower + near, x >= problem.upper - near
     kept = (below & above) | (below & (force <= laws.low)) | (above & (force >= laws.high))
@@ -106,7 +106,7 @@ def kind(problem: ScalarProblem, x: Array, here: Subdifferential | None = None) 
     if here.falls.any():
         return Kind.SADDLE
     force = problem.force - problem.stiffness @ x
-    near = LIMITS.accuracy * max(float(np.max(np.abs(force), initial=0.0)), 1e-300)
+    near = LIMITS.accuracy * max(magnitude(force), 1e-300)
     jumps = here.high - here.low > near
     inside = jumps & (force > here.low + near) & (force < here.high - near)
     surely, perhaps = np.flatnonzero(~jumps), np.flatnonzero(~inside)
@@ -160,8 +160,8 @@ class PointList(list[StationaryPoint]):
         """
         if point is None:
             return False
-        near = self._same * (1.0 + float(np.max(np.abs(point.x), initial=0.0)))
-        new = all(np.max(np.abs(p.x - point.x), initial=0.0) >= near for p in self)
+        near = self._same * (1.0 + magnitude(point.x))
+        new = all(magnitude(p.x - point.x) >= near for p in self)
         if new:
             self.append(point)
         return new
@@ -181,7 +181,7 @@ def stationary_point(near: ScalarProblem, problem: CondensedProblem, x: Array) -
     for _ in range(LIMITS.most_steps):
         force, allowed = near.force - near.stiffness @ x, _subdifferential(near, problem, x)
         rest = force - np.clip(force, allowed.low, allowed.high)
-        missing = float(np.max(np.abs(rest), initial=0.0))
+        missing = magnitude(rest)
         if best is not None and missing >= 0.5 * best[0] and best[0] <= LIMITS.accuracy * near.force_size:
             break  # at a fold, where two points are one, a step leaves a quarter of the rest
         best = missing, x, allowed
@@ -190,7 +190,7 @@ def stationary_point(near: ScalarProblem, problem: CondensedProblem, x: Array) -
         step = np.zeros(len(x))
         step[free] = np.linalg.lstsq(matrix, rest[free], rcond=None)[0]
         x = np.clip(x + step, near.lower, near.upper)
-        if not np.max(np.abs(x - start)) <= LIMITS.longest * (1.0 + np.max(np.abs(start))):
+        if not magnitude(x - start) <= LIMITS.longest * (1.0 + magnitude(start)):
             break
     if best is None or best[0] > LIMITS.accuracy**1.5 * near.force_size:
         return None
@@ -200,7 +200,7 @@ def stationary_point(near: ScalarProblem, problem: CondensedProblem, x: Array) -
 
 def _subdifferential(near: ScalarProblem, problem: CondensedProblem, x: Array) -> Subdifferential:
     """What the laws and bounds allow at a point."""
-    close = LIMITS.accuracy * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+    close = LIMITS.accuracy * (1.0 + magnitude(x))
     low, high, slope = np.zeros((3, near.size))
     falls = np.zeros(near.size, dtype=np.bool_)
     for bonds in problem.bonds:

@@ -27,7 +27,7 @@ from ..problem.elastic_operator import stiffness_tensor
 from ..problem.problem import Bounds, PrescribedComponent, Problem
 from ..problem.scaling import DEFAULT as composition
 from ..runtime.mpi import total
-from ..typing import Array, Entities
+from ..typing import Array, Entities, magnitude
 from .bubbles import DEFAULT, of_facet, quadrature, shape
 from .traces import ContactFacets, contact_facets, part_points
 
@@ -337,7 +337,7 @@ def _moved_pressure(
         within: what interpolation between the nodes leaves of the gap at the sample points, (f, q).
     """
     comm = problem.domain.mesh.comm
-    if comm.allreduce(float(np.max(np.abs(within), initial=0.0)), op=MPI.MAX) <= CERTIFICATE.near:
+    if comm.allreduce(magnitude(within), op=MPI.MAX) <= CERTIFICATE.near:
         return np.zeros(len(within))
     spread = part_points(problem, bubbles, surface, 1).spread
     normals = spread.by_facet(surface.normals).mean(axis=1)

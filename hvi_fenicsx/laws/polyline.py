@@ -13,7 +13,7 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from ..errors import InputError
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .base import DEFAULT, ConvexPart, Directional, Superpotential
 from .traction_graph import TractionGraph
 
@@ -178,9 +178,7 @@ class PolylineLaw(Superpotential):
         g = self.graph
         inside = np.abs(g.breaks) <= a
         ends = np.array([-a, a])
-        return float(
-            np.max(np.abs(np.concatenate([g.left[inside], g.right[inside], self.left(ends), self.right(ends)])))
-        )
+        return float(magnitude(np.concatenate([g.left[inside], g.right[inside], self.left(ends), self.right(ends)])))
 
 
 @dataclass(frozen=True)
@@ -267,7 +265,7 @@ def _sampled(traction: Callable[[Array], Array], ends: Sequence[float], samples:
         raise InputError(f"the traction function must return one finite value for each displacement, not {values!r}")
     values, kept = values.reshape(x.shape), np.ones(x.shape, dtype=bool)
     before = np.append(0.0, values[:-1, -1])
-    joined = np.abs(values[:, 0] - before) <= DEFAULT.resolution * np.max(np.abs(values))
+    joined = np.abs(values[:, 0] - before) <= DEFAULT.resolution * magnitude(values)
     values[0, 0] *= not joined[0]
     kept[1:, 0] = ~joined[1:]
     return np.column_stack([x[kept], values[kept]])

@@ -32,7 +32,7 @@ from ..reduced.condensation import Condensation
 from ..runtime.mpi import total
 from ..solvers import frozen_mixity
 from ..system.system import System
-from ..typing import Array
+from ..typing import Array, magnitude
 
 ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
 """The events whose states are examined with the whole body, and that a film shows first."""
@@ -143,7 +143,7 @@ class Certifier:
             other = self._stepped(problem, graphs, state.factor)
         except np.linalg.LinAlgError:
             return None
-        change, size = (float(np.max(np.abs(x), initial=0.0)) for x in (other.x - state.x, state.x))
+        change, size = (magnitude(x) for x in (other.x - state.x, state.x))
         near = change <= THRESHOLDS.largest_rounding * size  # the steps took out no more than rounding
         return other.u if near and self._is_certified(state, other) else None
 

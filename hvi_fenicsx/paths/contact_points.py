@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from ..errors import InputError
 from ..laws import Mixity
 from ..reduced.condensed_problem import CondensedProblem
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers, Mask, magnitude
 from .thresholds import ROUNDING
 from .vertex_laws import VertexLaw, is_straight, vertex_laws
 
@@ -104,7 +104,7 @@ def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence
     diagonal[diagonal <= ROUNDING * largest] = largest
     lengths = {law.group: law.law.length_scale for law in laws}.values()
     bounds = np.abs(np.concatenate([problem.lower, problem.upper]))
-    elastic = np.max(np.abs(problem.force_rate) / diagonal, initial=0.0)
+    elastic = magnitude(problem.force_rate / diagonal)
     length = max(lengths, default=max(elastic, float(np.max(bounds[np.isfinite(bounds)], initial=0.0))) or 1.0)
     for group in groups:
         diagonal[group] = diagonal[group].mean()

@@ -16,7 +16,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch import Branch, Move, Passage, Refused, StepEnd
 from .equations import CurvePoint
 from .events import Crossing, CurveStep, Events, displacement_rate
@@ -66,13 +66,13 @@ class CurvedBranch(Events):
         distances, _ = self._ends()
         if np.isfinite(min(float(np.min(distances, initial=np.inf)), self._until(aim))):
             return False
-        return not self.points.bent or float(np.max(np.abs(self.here.values.s), initial=0.0)) > self._far
+        return not self.points.bent or magnitude(self.here.values.s) > self._far
 
     def _ends(self) -> tuple[Array, Array]:
         """Along the tangent, the ways of all points to the ends of their segments, and these ends, (m,) each."""
         points, s = self.points, self.here.values.s
         rates = self.directions
-        largest = float(np.max(np.abs(self.here.tangent)))
+        largest = magnitude(self.here.tangent)
         ends = np.where(rates > 0.0, points.high, points.low)
         there = np.abs(ends - s) <= points.allowances(self.here.values, rates, largest)
         rests = np.where((there & points.bent) | self.stood, DEFAULT.undecided, DEFAULT.standing)
@@ -110,7 +110,7 @@ class CurvedBranch(Events):
 
     def _safe(self) -> float:
         """The longest way that is safe."""
-        largest = float(np.max(np.abs(self.here.tangent)))
+        largest = magnitude(self.here.tangent)
         if not self.points.bent:
             return np.inf
         rates = np.abs(self.directions)
@@ -121,9 +121,9 @@ class CurvedBranch(Events):
         """Refuse a step whose corrector went far beside its length; else adapt the length of the next one."""
         if not self.points.bent:
             return
-        off = float(np.max(np.abs(y - predicted)))
-        size = way * float(np.max(np.abs(self.here.tangent)))
-        if off > 0.3 * size + 1e-12 * float(np.max(np.abs(y))):
+        off = magnitude(y - predicted)
+        size = way * magnitude(self.here.tangent)
+        if off > 0.3 * size + 1e-12 * magnitude(y):
             raise Refused
         grown = min(4.0, np.sqrt(0.05 * size / off)) if off > 0.0 else 4.0
         self._next = max(size, self.length if grown > 1.0 else 0.0) * max(grown, 0.3)
@@ -197,7 +197,7 @@ class CurvedBranch(Events):
             lowest *= np.sign(self._into_cell(lowest) or float(lowest @ motion)) or 1.0
             found = [lowest, motion, -lowest]
         for one in found:
-            for k in drops or [int(np.argmax([np.max(np.abs(one[group])) for group in groups]))]:
+            for k in drops or [int(np.argmax([magnitude(one[group]) for group in groups]))]:
                 yield one, k
 
     def _after_drops(self, drops: list[int], free: FreeMotions) -> Array:
@@ -210,7 +210,7 @@ class CurvedBranch(Events):
     def _into_cell(self, motion: Array) -> float:
         """How far a motion takes points at ends of their segments into these: many may be there at once."""
         points, values = self.points, self.here.values
-        allowed = points.allowances(values, self.directions, float(np.max(np.abs(self.here.tangent))))
+        allowed = points.allowances(values, self.directions, magnitude(self.here.tangent))
         low, high = (values.s <= points.low + allowed), (values.s >= points.high - allowed)
         return float((values.moves > 0.0) * (low * 1.0 - high) @ points.along(values, motion))
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..laws import VertexLaws
 from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..reduced.condensed_stiffness import CellColumns
-from ..typing import Array
+from ..typing import Array, magnitude
 from .relations import ContactPoints
 from .state import PathState
 from .thresholds import DEFAULT, ROUNDING
@@ -39,7 +39,7 @@ class Distances:
         """
         problem, x = self._problem, state.x * self._factors
         elastic, load = problem.elastic @ x, problem.load(state.factor)
-        size = max(float(np.max(np.abs(f), initial=0.0)) for f in (elastic, load, problem.force_rate)) or 1.0
+        size = max(magnitude(f) for f in (elastic, load, problem.force_rate)) or 1.0
         force = load - elastic if carried is None else carried / self._factors
         return self._largest(x, force, self._present(state)) / size
 
@@ -53,7 +53,7 @@ class Distances:
 
     def _near(self, laws: VertexLaws, x: Array) -> float:
         """A difference of displacements that is none: beside a law's length, and as rounding of the largest one."""
-        return DEFAULT.reached * laws.law.length_scale + ROUNDING * float(np.max(np.abs(x), initial=0.0))
+        return DEFAULT.reached * laws.law.length_scale + ROUNDING * magnitude(x)
 
     def _largest(self, x: Array, force: Array, present: Sequence[VertexLaws]) -> float:
         """The largest distance of a force that laws and bounds should give."""
@@ -72,7 +72,7 @@ class Distances:
                 least, most = _interval(laws, at, DEFAULT.reached * np.abs(at) + self._near(laws, x))
                 np.add.at(low, unknowns[:, 0], least)
                 np.add.at(high, unknowns[:, 0], most)
-        allowed = DEFAULT.reached * float(np.max(np.abs(x), initial=0.0))
+        allowed = DEFAULT.reached * magnitude(x)
         low[x <= problem.lower + allowed], high[x >= problem.upper - allowed] = -np.inf, np.inf
         beyond = np.maximum(np.maximum(problem.lower - x, x - problem.upper), 0.0) * problem.elastic.diagonal
         away = np.maximum(np.maximum(low - rest, rest - high), 0.0) + beyond

@@ -10,7 +10,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .branch import Branch, Refused
 from .relations import ContactPoints, Values
 from .rigid_motions import are_same
@@ -59,7 +59,7 @@ class CurveEquations(Branch):
     def __init__(self, points: ContactPoints, constant: Array, rate: Array, z: Array, factor: float) -> None:
         self._rate, self.points = rate, points
         self.trend, self.unstable = 0, 0
-        largest = float(np.max(np.abs(rate) / points.forces, initial=0.0))
+        largest = magnitude(rate / points.forces)
         self.unit = 2.0 ** -round(np.log2(largest)) if largest > np.finfo(float).tiny else 1.0
         y = np.append(z, factor / self.unit)
         values = points.values(z)
@@ -106,7 +106,7 @@ class CurveEquations(Branch):
     @override
     def rising(self) -> float:
         rate, tangent = float(self.here.tangent[-1]), self.here.tangent
-        return rate if abs(rate) > DEFAULT.reached * float(np.max(np.abs(tangent))) else 0.0
+        return rate if abs(rate) > DEFAULT.reached * magnitude(tangent) else 0.0
 
     def residual(self, y: Array, values: Values) -> Array:
         """What is left of the forces, in their units, (n,): what is left here, and how the forces change from here.
@@ -182,11 +182,11 @@ class CurveEquations(Branch):
 
     def _refined(self, factors: Bordered, values: Values) -> Array | None:
         """The direction in which the equations stay satisfied, by factors of a point nearby; None: they are too far."""
-        found, last, size = factors.along, np.inf, float(np.max(np.abs(factors.along)))
+        found, last, size = factors.along, np.inf, magnitude(factors.along)
         change_along = self._changes(values)
         for _ in range(DEFAULT.corrections):
             step = factors.across(change_along(found))
-            change = float(np.max(np.abs(step)))
+            change = magnitude(step)
             if not change <= DEFAULT.near * last:
                 return found if change <= 1e-13 * size else None
             found, last = found - step, change
@@ -206,18 +206,18 @@ class CurveEquations(Branch):
             numpy.linalg.LinAlgError: it comes to a point whose equations are singular.
         """
         value, gradient = condition
-        size, last = 1.0 + float(np.max(np.abs(y))), np.inf
-        length = float(np.max(np.abs(y - self.here.y)))
+        size, last = 1.0 + magnitude(y), np.inf
+        length = magnitude(y - self.here.y)
         noise = max(1e-10 * (1.0 + length), 1e-14 / self._sharpness(gradient(y)) * size)
         expected = DEFAULT.near * length
         for _ in range(DEFAULT.corrections):
             values = self.points.values(y[:-1])
             left, off = self.residual(y, values), value(y)
-            digits = float(np.max(np.abs(left))) <= DEFAULT.digits * size
+            digits = magnitude(left) <= DEFAULT.digits * size
             if not self.points.bent and digits and abs(off) <= DEFAULT.digits * size:
                 return y
             step = self._correction(values, left, gradient(y), off, expected)
-            change = float(np.max(np.abs(step)))
+            change = magnitude(step)
             if not np.isfinite(change) or (change > 2.0 * last and change > 1e-9 * size):
                 break
             y = y - step
@@ -236,7 +236,7 @@ class CurveEquations(Branch):
         """
         if self._factors is not None and self._factors.takes(row):
             found = self._factors.step(left, row, off)
-            if np.max(np.abs(found)) <= expected:
+            if magnitude(found) <= expected:
                 return found
         return self._factorise(values, row).step(left, row, off)
 
@@ -366,7 +366,7 @@ class Bordered:
         """
         for place, value in zip(columns, values.T, strict=True):
             spread = self._inverse.solve(np.append(value, self._row[place]))
-            if self._inverse.is_long or not abs(spread[place]) > DEFAULT.small * np.max(np.abs(spread)):
+            if self._inverse.is_long or not abs(spread[place]) > DEFAULT.small * magnitude(spread):
                 return False
             self._inverse.exchange(spread, int(place))
         return self._has_tangent() and self.takes(self._row)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import toms748
 
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch import Move, Passage, Refused, StepEnd, event_between
 from .equations import CurveEquations, CurvePoint
 from .relations import ContactPoints
@@ -36,7 +36,7 @@ class CurveStep(Move):
     @property
     def size(self) -> float:
         """How far the fastest coordinate went."""
-        return float(np.max(np.abs(self.after.y - self.before.y)))
+        return magnitude(self.after.y - self.before.y)
 
 
 def displacement_rate(points: ContactPoints, place: CurvePoint) -> Array:
@@ -112,7 +112,7 @@ class Events(CurveEquations):
         """
         rate = self._rate_of(point)(self.here)
         beyond = move.after.values.s[point] - move.before.values.s[point]
-        largest = float(np.max(np.abs(self.here.tangent)))
+        largest = magnitude(self.here.tangent)
         if rate * beyond < 0.0 and abs(rate) > DEFAULT.undecided * largest and not self.points.outward[point]:
             raise Refused
         sets_out = rate * self.points.outward[point] > 0.0
@@ -153,14 +153,14 @@ class Events(CurveEquations):
             if way not in known:
                 known[way] = self._at(way, known)
             found = rate(known[way])
-            return found if abs(found) > DEFAULT.standing * float(np.max(np.abs(known[way].tangent))) else 0.0
+            return found if abs(found) > DEFAULT.standing * magnitude(known[way].tangent) else 0.0
 
         root = toms748(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, k=1)
         rate_at(root)
         return self._moved(outcome, point, known[root].y)
 
     def _turned(self, after: CurvePoint) -> tuple[StepEnd, int | None] | None:
-        largest = float(np.max(np.abs(after.tangent)))
+        largest = magnitude(after.tangent)
         if self.trend * after.tangent[-1] < -DEFAULT.undecided * largest:
             return StepEnd.FOLD, None
         rates = self.rates_at(after)
@@ -265,7 +265,7 @@ class Crossing:
         rates, allowed = self._curve.directions.copy(), np.full(len(self._points), DEFAULT.standing)
         if self._arrived is not None and self._points.bent:
             allowed[self._arrived] = DEFAULT.undecided
-        rates[np.abs(rates) <= allowed * np.max(np.abs(self._curve.here.tangent))] = 0.0
+        rates[np.abs(rates) <= allowed * magnitude(self._curve.here.tangent)] = 0.0
         rates[self._rests] = 0.0
         return rates
 
@@ -276,7 +276,7 @@ class Crossing:
             rates: how fast the points go, (m,).
         """
         points, values, speeds = self._points, self._curve.here.values, np.abs(rates)
-        allowed = points.allowances(values, rates, float(np.max(np.abs(self._curve.here.tangent))))
+        allowed = points.allowances(values, rates, magnitude(self._curve.here.tangent))
         low, high = values.s <= points.low + allowed, values.s >= points.high - allowed
         comes = ((rates < 0.0) & low) | ((rates > 0.0) & high) | points.turning_back(values, rates)
         if not np.any(comes):

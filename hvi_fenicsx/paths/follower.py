@@ -9,7 +9,7 @@ import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch import Branch, Move, Passage, Refused, StepEnd
 from .curve import branch_from
 from .energy_balance import EnergyBalance
@@ -215,7 +215,7 @@ class Follower(LoadHistory):
     def _is_adrift(self) -> bool:
         """Whether the load is back at zero and nothing would resist the next; where that is borne, it takes up all."""
         values, rate, none = self._branch.values, self._problem.force_rate, DEFAULT.none * self._peak
-        rests = abs(self.factor) <= none and np.max(np.abs(values.force)) <= none * np.max(np.abs(rate))
+        rests = abs(self.factor) <= none and magnitude(values.force) <= none * magnitude(rate)
         if self._peak == 0.0 or not len(self._points.rigid) or not rests:
             return False
         return bool(np.any(self._points.unresisted(values, rate).driven))

@@ -11,7 +11,7 @@ from enum import Enum
 import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch import Refused, StepEnd, advancing
 from .curve import branch_from
 from .motion import OverdampedMotion
@@ -102,6 +102,6 @@ def _constant_alone(problem: CondensedProblem, x: Array, forces: Array) -> Conde
     held = problem.elastic @ x + forces
     away, stiffest = problem.force - held, float(np.max(problem.elastic.diagonal, initial=0.0))
     sizes = held, problem.force, stiffest * x
-    if np.max(np.abs(away), initial=0.0) <= 1e-14 * sum(float(np.max(np.abs(f), initial=0.0)) for f in sizes):
+    if magnitude(away) <= 1e-14 * sum(magnitude(f) for f in sizes):
         return None
     return replace(problem, force=held, force_rate=away)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch import Branch, Refused, StepEnd, advancing
 from .curve import branch_from
 from .motion import OverdampedMotion
@@ -84,8 +84,8 @@ class Jump:
         if back or branch.rising > DEFAULT.undecided:
             return None
         forces = self._load, self._values.force
-        largest = max(float(np.max(np.abs(force), initial=0.0)) for force in forces)
-        none = DEFAULT.none * largest / float(np.max(np.abs(restraint)))
+        largest = max(magnitude(force) for force in forces)
+        none = DEFAULT.none * largest / magnitude(restraint)
         return self._at_its_end(branch, none)
 
     def _at_its_end(self, branch: Branch, none: float) -> Landing | None:
@@ -109,8 +109,8 @@ class Jump:
     def _landed(self, z: Array, inverse: CellInverse | None = None) -> Landing | None:
         """The landing at a stable equilibrium; None where it is the state itself, or a curve leads back from there."""
         x, before = self._points.values(z).x, self._values.x
-        size = max(float(np.max(np.abs(x), initial=0.0)), float(np.max(np.abs(before), initial=0.0)))
-        if float(np.max(np.abs(x - before), initial=0.0)) <= DEFAULT.none * size:
+        size = max(magnitude(x), magnitude(before))
+        if magnitude(x - before) <= DEFAULT.none * size:
             return None
         return Landing(z=z, inverse=inverse) if self._points.straight or self._leads_on(z) else None
 
@@ -132,7 +132,7 @@ class Jump:
         """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
         rate = self._problem.force_rate
         push = DEFAULT.slow * self._heading
-        push = push * np.max(np.abs(self._load)) / np.max(np.abs(rate), initial=1e-300)
+        push = push * magnitude(self._load) / np.max(np.abs(rate), initial=1e-300)
         return self._relaxed(self._z, self._load + push * rate, self._load)
 
     def _relaxed(self, z: Array, *loads: Array) -> Landing | None:
@@ -154,13 +154,13 @@ def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:
     """
     points, seen = branch.points, list[Array]()
     for motion, k in branch.leaving():
-        size = float(np.max(np.abs(motion), initial=0.0))
+        size = magnitude(motion)
         if size == 0.0:
             continue
         alone, group = np.zeros_like(motion), points.unknowns[k]
         alone[group] = motion[group]
         for force in (_evened(points, motion, size), motion, alone):
-            found = force / (np.max(np.abs(force)) or 1.0)
+            found = force / (magnitude(force) or 1.0)
             known = any(np.allclose(found, other, rtol=0.0, atol=DEFAULT.slow) for other in seen)
             if np.any(found) and not known:
                 seen.append(found)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import ExitCode
-from ..typing import Array
+from ..typing import Array, magnitude
 from .state import End, Event
 from .thresholds import DEFAULT
 
@@ -144,7 +144,7 @@ class LoadPath:
     def _shown(self, number: int) -> str:
         """The factor of a row in digits; 0 where it is rounding."""
         factor = self.factors[number]
-        return f"{factor:.6g}" if abs(factor) > DEFAULT.none * np.max(np.abs(self.factors)) else "0"
+        return f"{factor:.6g}" if abs(factor) > DEFAULT.none * magnitude(self.factors) else "0"
 
     def strongest(self, part: str) -> int:
         """The row in which the resultant at a part is largest.

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CondensedStiffness, DenseStiffness
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch import Branch, Refused, StepEnd, advancing
 from .curve import branch_from
 from .relations import ContactPoints
@@ -82,7 +82,7 @@ class OverdampedMotion:
         return self._extent() > self._infinite
 
     def _extent(self) -> float:
-        return float(np.max(np.abs(self._points.values(self.z).lengths), initial=0.0))
+        return magnitude(self._points.values(self.z).lengths)
 
     def _left(self) -> Array:
         """What is left of the forces, (n,)."""
@@ -93,8 +93,8 @@ class OverdampedMotion:
         """Whether hardly any force is left, and the body would not leave by itself what is left of it."""
         values = self._points.values(self.z)
         acting = (self._load, self._problem.elastic @ values.x, values.force)
-        size = max(float(np.max(np.abs(force), initial=0.0)) for force in acting)
-        rests = bool(np.max(np.abs(self._left()), initial=0.0) <= 1e-9 * size)
+        size = max(magnitude(force) for force in acting)
+        rests = magnitude(self._left()) <= 1e-9 * size
         self._points.elastic = self._problem.elastic  # without what holds back
         return rests and self._points.unstable_directions(values) == 0
 

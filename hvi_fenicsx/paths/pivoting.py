@@ -18,7 +18,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellInverse
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .branch import Move, Passage, StepEnd, event_between
 from .relations import ContactPoints
 from .segments import piece_at
@@ -58,7 +58,7 @@ class StraightBranch(StraightEquations):
     ) -> None:
         super().__init__(points, constant, rate, z, factor)
         self.heading, self.trend, self.unstable, self._leader = 1, 0, 0, 0
-        self._stiffest, self._live = _largest(self._stiffness.diagonal), _largest(rate)
+        self._stiffest, self._live = magnitude(self._stiffness.diagonal), magnitude(rate)
         random = np.random.default_rng(0)
         # coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them
         self.small = random.uniform(0.5, 1.5, len(z)) * np.where(z == points.high, -1.0, 1.0)
@@ -146,7 +146,7 @@ class StraightBranch(StraightEquations):
 
     def _correct(self, change: Array) -> None:
         """Take a change off, the driving variable held; if that is a slow one, to the nearest point of the branch."""
-        scale = _largest(self.motion) or 1.0
+        scale = magnitude(self.motion) or 1.0
         if self.driver != FACTOR and abs(self.rates[self.driver]) < DEFAULT.slow * scale:
             along = self.motion / scale
             way = float(along @ change[:-1]) / (float(along @ along) or 1.0)
@@ -215,7 +215,7 @@ class StraightBranch(StraightEquations):
 
     def _by_kind(self, values: Array) -> tuple[float, float]:
         """The largest value of coordinates that are displacements, and of forces."""
-        return _largest(values[self.points.moving]), _largest(values[~self.points.moving])
+        return magnitude(values[self.points.moving]), magnitude(values[~self.points.moving])
 
     @override
     def pass_on(self, move: Move) -> list[Passage]:
@@ -274,14 +274,14 @@ class StraightBranch(StraightEquations):
     @override
     def stands(self) -> bool:
         points = self.points
-        forces = _largest(np.where(points.moving, points.slope, points.rise) * self.directions)
-        size = self._stiffest * _largest(self.motion) + forces
+        forces = magnitude(np.where(points.moving, points.slope, points.rise) * self.directions)
+        size = self._stiffest * magnitude(self.motion) + forces
         return abs(self.rates[FACTOR]) * self._live < DEFAULT.reached * size
 
     @override
     def beyond(self) -> Array:
         found = self._first_end(self.factor)
-        length = self.points.scale / (_largest(self.directions) or 1.0) if found is None else found[1]
+        length = self.points.scale / (magnitude(self.directions) or 1.0) if found is None else found[1]
         return self.z + DEFAULT.near * length * self.directions
 
     @override
@@ -292,8 +292,3 @@ class StraightBranch(StraightEquations):
         chosen = self._first_end(aim)
         numbers, slack, _, _, allowed = self._ends()
         return chosen is None or not np.any((slack <= allowed)[numbers == chosen[0]])
-
-
-def _largest(values: Array) -> float:
-    """The largest absolute value, 0 of none."""
-    return float(np.abs(values).max(initial=0.0))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr
 
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .thresholds import DEFAULT
 
 
@@ -71,7 +71,7 @@ def are_same(motions: Array, others: Array) -> bool:
     """
     if len(motions) != len(others):
         return False
-    return bool(np.max(np.abs(others - (others @ motions.T) @ motions), initial=0.0) <= DEFAULT.slow)
+    return magnitude(others - (others @ motions.T) @ motions) <= DEFAULT.slow
 
 
 def pins(motions: Array) -> Integers:

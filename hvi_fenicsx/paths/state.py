@@ -8,7 +8,7 @@ from enum import Enum, StrEnum
 
 import numpy as np
 
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .thresholds import DEFAULT
 
 
@@ -237,7 +237,7 @@ class Cycles:
         Args:
             state: of an event.
         """
-        size, length = (float(np.max(np.abs(x), initial=0.0)) for x in (state.x, state.x - self._x))
+        size, length = (magnitude(x) for x in (state.x, state.x - self._x))
         self._way += length
         stands = length <= 1e-9 * size and abs(state.factor - self._factor) <= 1e-9 * (1.0 + abs(state.factor))
         self._factor, self.standing = state.factor, self.standing + 1 if stands else 0

@@ -6,7 +6,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellColumns, CellInverse
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch import Branch
 from .relations import ContactPoints
 from .rigid_motions import are_same, pins
@@ -119,7 +119,7 @@ class StraightEquations(Branch):
         for _ in range(2):
             found = self.solved(right)
             left = right - self._product(self.variables(found))
-            if np.max(np.abs(left), initial=0.0) <= DEFAULT.slow * np.max(np.abs(right), initial=0.0):
+            if magnitude(left) <= DEFAULT.slow * magnitude(right):
                 break
             self._inverse = self.factorised(self.driver)
         self.column = found + self.solved(left)
@@ -178,10 +178,10 @@ class StraightEquations(Branch):
             if self.driver != FACTOR:
                 found.exchange(self.column, self.driver)
             left = self._product(np.append(found.solve(rate), 0.0)) - rate
-            known = np.max(np.abs(left), initial=0.0) <= DEFAULT.slow * np.max(np.abs(rate), initial=0.0)
+            known = magnitude(left) <= DEFAULT.slow * magnitude(rate)
         return found if known else None
 
 
 def _strength(column: Array, place: int) -> float:
     """The pivot at a place over the largest entry of its column."""
-    return float(abs(column[place])) / (float(np.max(np.abs(column))) or 1.0)
+    return float(abs(column[place])) / (magnitude(column) or 1.0)

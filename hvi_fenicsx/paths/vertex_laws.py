@@ -10,7 +10,7 @@ import numpy as np
 from ..laws import Superpotential, TractionGraph, VertexLaws
 from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..reduced.condensed_stiffness import DenseStiffness
-from ..typing import Array
+from ..typing import Array, magnitude
 from .thresholds import ROUNDING
 
 
@@ -158,7 +158,7 @@ def _on_corner(graph: TractionGraph, x: float, traction: float, rounding: float)
     if abs(nearest - x) > rounding * abs(x):
         return x, traction
     ends = [float(graph.traction(np.array([nearest]), side)[0]) for side in ("left", "right")]
-    size = float(np.max(np.abs([graph.left, graph.right])))  # where a bond is broken, both ends are zero
+    size = magnitude([graph.left, graph.right])  # where a bond is broken, both ends are zero
     return nearest, next((end for end in ends if abs(end - traction) <= rounding * size), traction)
 
 

@@ -16,7 +16,7 @@ from ..formula import SpatialValue
 from ..geometry import spot
 from ..mesh import nodes
 from ..runtime.mpi import agree, refuse
-from ..typing import Array, Entities
+from ..typing import Array, Entities, magnitude
 from . import contact_surface
 from .contact_surface import Surface
 from .domain_forms import DomainForms
@@ -297,7 +297,7 @@ def _condition(context: DomainForms, scales: Scales, facets: Entities, condition
 def _check_agreement(context: DomainForms, scales: Scales, found: Sequence[PrescribedComponent]) -> None:
     """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
     prescribed = [(one.part, one.dofs, values(context, [one])[one.dofs]) for one in found]
-    size = max((float(np.max(np.abs(v), initial=0.0)) for _, _, v in prescribed), default=0.0)
+    size = max((magnitude(v) for _, _, v in prescribed), default=0.0)
     bad: list[str] = []
     for (one, dofs, these), (other, more, those) in combinations(prescribed, 2):
         shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)

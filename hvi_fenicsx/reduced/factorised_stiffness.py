@@ -21,7 +21,7 @@ from ..runtime.mpi import agree
 from ..system.factorisation import Factorisation
 from ..system.interior import Interior
 from ..system.petsc_options import CHOLESKY
-from ..typing import Array, Mask
+from ..typing import Array, Mask, magnitude
 from .condensed_stiffness import CellColumns, CellInverse, CondensedStiffness
 
 _KNOWN = 8
@@ -103,7 +103,7 @@ class FactorisedStiffness(CondensedStiffness):
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
-        steepest = float(np.max(np.abs(slope[moving]), initial=0.0))
+        steepest = magnitude(slope[moving])
         shift = negligible * (self._size + self._added + steepest)
         return self._counts(moving.tobytes(), np.where(moving, slope + shift, 0.0).tobytes())
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..geometry import ROUNDING
-from ..typing import Array, Mask
+from ..typing import Array, Mask, magnitude
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
 from .solution_arrays import ContactPart, ResultError, SolutionArrays
@@ -79,7 +79,7 @@ class Result(Finished):
         found = self.arrays.displacement
         if self.certified or found is None:
             return False
-        return bool(np.max(np.abs(found)) > np.max(np.ptp(self.arrays.points, axis=0)))
+        return bool(magnitude(found) > np.max(np.ptp(self.arrays.points, axis=0)))
 
     @cached_property
     def parts(self) -> tuple[ContactPart, ...]:
@@ -235,7 +235,7 @@ class PathResult(Finished):
 
     def _way(self, part: str) -> tuple[float, float]:
         """The way of a part times its force, and the way."""
-        u, force = (float(np.max(np.abs(values))) for values in self.along(part))
+        u, force = (magnitude(values) for values in self.along(part))
         return u * force, u
 
     def along(self, part: str) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from ..runtime.mpi import on_root
-from ..typing import Array
+from ..typing import Array, magnitude
 from .cutting_planes import linear_programme
 from .motions import DEFAULT
 
@@ -87,7 +87,7 @@ class _CutModel:
     @property
     def size(self) -> float:
         """The largest distance of a side."""
-        return float(np.max(np.abs(self.sides.limits), initial=0.0)) or 1.0
+        return magnitude(self.sides.limits) or 1.0
 
     def cut(self, a: Array, values: Array, slopes: Array) -> float:
         """Add the planes that touch the energies at a, and return the whole energy there.
@@ -120,7 +120,7 @@ class _CutModel:
         heights, slopes = np.array(self.heights), np.array(self.slopes)
         rounds, parts, k = slopes.shape
         # unknowns: the move in units of the radius, then each part's energy in units of the largest change of one
-        size = radius * max(float(np.max(np.abs(v), initial=0.0)) for v in (self.work, slopes)) or 1.0
+        size = radius * max(magnitude(v) for v in (self.work, slopes)) or 1.0
         at_centre = heights + slopes @ centre
         level = np.max(at_centre, axis=0)
         planes = np.hstack([slopes.reshape(-1, k) * (radius / size), -np.tile(np.eye(parts), (rounds, 1))])
@@ -138,7 +138,7 @@ class _CutModel:
         return _Step(
             target,
             float(self.work @ target + np.sum(level) + size * np.sum(found.x[k:])),
-            bool(np.max(np.abs(found.x[:k])) < 1.0 - DEFAULT.rounding),
+            magnitude(found.x[:k]) < 1.0 - DEFAULT.rounding,
             -found.ineqlin.marginals[: len(room)],
         )
 
@@ -180,7 +180,7 @@ def _descend(comm: MPI.Comm, model: _CutModel, energy: Energy, best: Array) -> R
     """From an admissible position to the one of least energy. Collective."""
     reactions: Array = np.zeros(len(model.sides.limits))
     radius, lowest = model.size, model.cut(best, *energy(best))
-    tiny = DEFAULT.exact * max(float(np.max(np.abs(v), initial=0.0)) for v in (model.work, model.slopes[0]))
+    tiny = DEFAULT.exact * max(magnitude(v) for v in (model.work, model.slopes[0]))
     for _ in range(DEFAULT.max_rounds):
         step = on_root(comm, functools.partial(model.minimise, best, radius))
         if step is None or radius > 1.0 / DEFAULT.rounding:

@@ -17,7 +17,7 @@ from ..runtime.log import logger
 from ..runtime.mpi import largest
 from ..system.system import System
 from ..system.thresholds import DEFAULT
-from ..typing import Array
+from ..typing import Array, magnitude
 from . import nested_iteration
 from .convergence import Counts
 from .method import SolveTask
@@ -74,12 +74,12 @@ def _energies(problem: Problem, u: fem.Function) -> list[Array]:
     found, values = [], problem.relative(u.x.array)
     for term in problem.terms:
         components = term.slip(values)
-        size = largest(problem.domain.mesh.comm, float(np.max(np.abs(components), initial=0.0)))
+        size = largest(problem.domain.mesh.comm, magnitude(components))
         found.append(term.energies_of(components, np.full(len(components), DEFAULT.near * size)))
     return found
 
 
 def _change(system: System, energies: Sequence[Array]) -> float:
     """The largest relative change of the energies of separation. Collective."""
-    changes = (np.max(np.abs(e / t.energies - 1.0), initial=0.0) for t, e in zip(system.terms, energies, strict=True))
+    changes = (magnitude(e / t.energies - 1.0) for t, e in zip(system.terms, energies, strict=True))
     return largest(system.comm, float(max(changes, default=0.0)))

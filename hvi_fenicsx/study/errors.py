@@ -24,7 +24,7 @@ from ..mesh import nodes, transfer
 from ..problem import spaces
 from ..report.solution_arrays import ContactPart, SolutionArrays
 from ..runtime.mpi import joined
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers, Mask, magnitude
 from ..workflow import Solution
 
 NORMS: Mapping[str, tuple[str, str]] = {
@@ -172,7 +172,7 @@ def mesh_width(arrays: SolutionArrays) -> float:
     """The edge of an equilateral cell as large as the largest one, m: it halves where a mesh is refined uniformly."""
     d = arrays.points.shape[1]
     corners = arrays.points[cells_of(arrays)[:, : d + 1]]
-    largest = float(np.max(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])), initial=0.0))
+    largest = magnitude(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     return float((largest * (2.0 / np.sqrt(3.0) if d == 2 else np.sqrt(2.0))) ** (1.0 / d))
 
 

@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix, vstack
 
 from ..errors import Interrupted, SolverError
 from ..runtime.mpi import agree
-from ..typing import Array, Integers
+from ..typing import Array, Integers, magnitude
 from .factorisation import FactorForm, Factorisation
 from .petsc_options import CHOLESKY
 
@@ -131,11 +131,11 @@ class Interior:
 
     def is_held(self) -> bool:
         """Whether the kept unknowns hold the body, other than by rounding (inverse iteration). Collective."""
-        largest = max(agree(self._comm, float(np.max(np.abs(self._system.jacobian.matrix.getDiagonal().array_r)))))
+        largest = max(agree(self._comm, magnitude(self._system.jacobian.matrix.getDiagonal().array_r)))
         load = np.cos(np.arange(self._system.load.local_size) + 1.0)[:, None]
         for _ in range(2):
             load = self.solve(load)[: len(load)]
-            growth = max(agree(self._comm, float(np.max(np.abs(load), initial=0.0)))) * largest
+            growth = max(agree(self._comm, magnitude(load))) * largest
             load *= largest / (growth or 1.0)
         return bool(growth * self._system.thresholds.rounding < 1.0)
 

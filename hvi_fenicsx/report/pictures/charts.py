@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.markers import CARETDOWN
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
-from ...typing import Array, Mask
+from ...typing import Array, Mask, magnitude
 from ..reader import EquilibriaResult, PathResult, Row
 from ..units import Unit, number, unit_for
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, VERMILION, figure, titled
@@ -48,8 +48,8 @@ def path_chart(result: PathResult) -> Figure:
     u, force = result.along(result.driven)
     pulled, name = bool(np.any(force)), "N" if len(result.axes) == 3 else "N/m"
     load = force if pulled else result.columns["factor"]
-    units = [unit_for(float(np.max(np.abs(u))), "m")]
-    units += [unit_for(float(np.max(np.abs(load))), name) if pulled else Unit(1.0, "")]
+    units = [unit_for(magnitude(u), "m")]
+    units += [unit_for(magnitude(load), name) if pulled else Unit(1.0, "")]
     fig = figure(5.8)
     titled(fig, result.title, _path_subject(result), *_path_verdict(result))
     axes = fig.add_subplot()
