@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -65,9 +66,8 @@ def _certainty(errors: Sequence[float | None], power: int) -> Certainty:
     return Certainty(max(_LEAST, (known[0] / (2.0 ** (power * believed) - 1.0)) ** (1.0 / power)), order)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """A point: its setting, what it cost, how far off it is.
+class Row(SimpleNamespace):
+    """A point: its setting, what it cost, how far off it is. All but properties is its entry in ``study.json``.
 
     Attributes:
         point: its name.
@@ -93,29 +93,6 @@ class Row:
         epsilon_part: how far the point is from the exact law on its own mesh; None: it is exact, or that point failed.
         beyond_reference: quantities whose error is below the reference's own.
     """
-
-    point: str
-    mesh: str
-    degree: int
-    h: float | None
-    smoothing: str | None
-    epsilon: float | None
-    epsilon_absolute: float | None
-    method: str
-    linear_solver: str
-    tolerance: float
-    dofs: int | None
-    converged: bool
-    reason: str
-    exit_code: int
-    energy: float | None
-    iterations: Mapping[str, int] | None
-    seconds: float | None
-    runs: int | None
-    phases: Mapping[str, float] | None
-    errors: Errors | None = None
-    epsilon_part: Errors | None = None
-    beyond_reference: tuple[str, ...] = ()
 
     @property
     def law(self) -> str:
@@ -247,12 +224,12 @@ class Study:
             "exact": self.exact.point,
             "share_of_epsilon": {q: self.share_of_epsilon(q) for q in self.headlines()},
             "reference": {
-                **asdict(self.reference),
+                **vars(self.reference),
                 "certainty": {q: asdict(known) for q, known in self.certain.items()},
                 "errors_of_coarser_meshes": list(self.coarser),
             },
             "fronts": {q: [r.point for r in self.front(q)] for q in NORMS},
-            "points": [asdict(r) for r in self.rows],
+            "points": [vars(r) for r in self.rows],
             "left_out": list(self.left_out),
             "versions": versions(),
         }
@@ -260,7 +237,7 @@ class Study:
     def lines(self) -> list[dict[str, Any]]:
         """The lines of ``study.csv``, one for each point; errors are in columns ``error_QUANTITY``."""
         found = []
-        for data in map(asdict, self.rows):
+        for data in map(vars, self.rows):
             line = {key: value for key, value in data.items() if key not in _NESTED}
             for name, keys in _NESTED.items():
                 prefix = "error" if name == "errors" else name
@@ -301,15 +278,16 @@ def evaluate(plan: Plan, known: Mapping[str, Mapping[str, Any]], ranks: int) -> 
 
 def _row(point: Point, known: Mapping[str, Any], certain: Mapping[str, Certainty]) -> Row:
     """A point's setting, and its record."""
-    record = {key: value for key, value in known.items() if key != "limit"}
-    solver, errors = point.scene.solver, record.get("errors") or {}
+    solver, errors = point.scene.solver, known.get("errors") or {}
     found = [(q, error, certain[q].error) for q, error in errors.items()]
-    of_solver = ("smoothing", "epsilon_absolute", "method", "linear_solver", "tolerance")
-    setting: dict[str, Any] = {name: getattr(solver, name) for name in of_solver}
-    setting |= {"mesh": point.mesh, "degree": point.degree, "h": point.scene.domain.width() or record.get("h")}
-    setting["epsilon"] = (record.get("epsilon") or solver.epsilon) if solver.smoothing else None
-    beyond = tuple(q for q, error, least in found if error is not None and least is not None and error < least)
-    return Row(**{**record, **setting, "beyond_reference": beyond})
+    row = Row(point=point.name, mesh=point.mesh, degree=point.degree, h=None)
+    of_solver = ("smoothing", "epsilon", "epsilon_absolute", "method", "linear_solver", "tolerance")
+    vars(row).update({name: getattr(solver, name) for name in of_solver})
+    vars(row).update({key: value for key, value in known.items() if key != "limit"})
+    row.h, row.epsilon = point.scene.domain.width() or known.get("h"), known["epsilon"] or solver.epsilon
+    row.errors, row.epsilon_part = known.get("errors"), known.get("epsilon_part")
+    row.beyond_reference = tuple(q for q, e, least in found if None not in (e, least) and e < least)
+    return row
 
 
 def _sentences(study: Study) -> Iterator[str]:

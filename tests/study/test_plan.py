@@ -77,14 +77,14 @@ def test_a_bad_plan_says_how_to_mend_it(given: list[str], words: str) -> None:
 
 def study_of(pairs: list[tuple[float, float]], own_error: float = 1e-4, **keys: Any) -> Study:
     """Rows by their seconds and errors; the first is the scene's own setting, the last the exact law."""
-    empty = ("h", "smoothing", "epsilon", "epsilon_absolute", "energy", "iterations", "runs", "phases")
+    empty = ("h", "smoothing", "epsilon", "epsilon_absolute", "energy", "iterations", "runs", "phases", "epsilon_part")
     setting = {"mesh": "4 × 4 cells", "degree": 1, "method": "auto", "linear_solver": "auto", "tolerance": 1e-8}
     found = {"dofs": 1, "converged": True, "reason": "certified", "exit_code": 0}
     rows = []
     for i, (seconds, error) in enumerate(pairs):
         own = {"point": str(i), "seconds": seconds, "errors": dict.fromkeys(NORMS, error)}
         varied = {name: values[i] for name, values in keys.items()}
-        rows.append(Row(**{**dict.fromkeys(empty), **setting, **found, **own, **varied}))  # type: ignore[arg-type]
+        rows.append(Row(**{**dict.fromkeys(empty), **setting, **found, **own, **varied}))
     certain = dict.fromkeys(NORMS, Certainty(own_error, None))
     return Study(
         title="", rows=tuple(rows), own=rows[0], exact=rows[-1], certain=certain, reference=rows[-1], coarser=(),
@@ -97,8 +97,8 @@ def test_the_front_holds_what_nothing_cheaper_is_as_accurate_as() -> None:
     found = study_of(pairs).front("energy_norm")
     better = [not any(s < t and e < r for s, e in pairs) for t, r in pairs]
     assert {int(r.point) for r in found} <= {i for i, good in enumerate(better) if good}
-    assert all(a.errors["energy_norm"] > b.errors["energy_norm"] for a, b in pairwise(found))  # type: ignore[index, operator]
-    assert min(e for _, e in pairs) == pytest.approx(found[-1].errors["energy_norm"], rel=0.06)  # type: ignore[index]
+    assert all(a.errors["energy_norm"] > b.errors["energy_norm"] for a, b in pairwise(found))
+    assert min(e for _, e in pairs) == pytest.approx(found[-1].errors["energy_norm"], rel=0.06)
 
 
 def test_an_order_is_told_from_errors_that_the_reference_resolves() -> None:
