@@ -22,6 +22,7 @@ from mpi4py import MPI
 from .. import compat
 from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
+from . import nodes
 from .domain import DEFAULT, Domain
 from .transfer import Numbers, Rows, Transfer, renumbered, weighted_rows
 
@@ -270,17 +271,18 @@ class GridTransfer(Transfer):
     cells: Sequence[int]
     coarser_cells: Sequence[int]
 
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
         """Each fine vertex has barycentric weights in the coarse simplex that holds it. Collective."""
         cells = np.array(self.coarser_cells)
-        near, far = _grid_places(points[0], self.size, self.cells), _grid_places(points[1], self.size, cells)
+        near, far = _grid_places(fine, self.size, self.cells), _grid_places(coarse, self.size, cells)
         if np.array_equal(2 * cells, self.cells):  # the mean of the ends of an edge, of whatever direction
             ends = np.stack([near // 2, (near + 1) // 2], axis=1)
             weights: Array = np.full((len(near), 2), 0.5)
         else:
             ends, weights = _in_simplices(near * cells / np.array(self.cells), cells)
-        own = _flat(far[: coarse.dofmap.index_map.size_local], cells)
-        return weighted_rows(renumbered(coarse, own, _flat(ends, cells)), weights, fine.dofmap.index_map_bs)
+        return weighted_rows(
+            renumbered(coarse, _flat(far, cells), _flat(ends, cells)), weights, fine.dofmap.index_map_bs
+        )
 
 
 def _in_simplices(places: Array, cells: Integers) -> tuple[Integers, Array]:
@@ -293,6 +295,7 @@ def _in_simplices(places: Array, cells: Integers) -> tuple[Integers, Array]:
     return corner[:, None] + ways, -np.diff(falling, axis=1)
 
 
-def _grid_places(points: Array, size: Sequence[float], cells: Sequence[int] | Numbers) -> Integers:
-    """Grid coordinates of vertices of a grid, (n, d)."""
-    return np.rint(points[:, : len(size)] * (np.array(cells) / np.array(size))).astype(np.int64)
+def _grid_places(space: fem.FunctionSpace, size: Sequence[float], cells: Sequence[int] | Numbers) -> Integers:
+    """Grid coordinates of the vertices of a grid that this rank owns, (n, d)."""
+    owned = nodes.points(space)[: space.dofmap.index_map.size_local]
+    return np.rint(owned[:, : len(size)] * (np.array(cells) / np.array(size))).astype(np.int64)

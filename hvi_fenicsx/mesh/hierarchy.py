@@ -26,11 +26,13 @@ from . import refinement
 from .coarsening import coarsen
 from .domain import DEFAULT, Domain, MeshThresholds
 from .joined import PlacedBody, coarsening
-from .transfer import InterpolationTransfer
+from .transfer import Transfer
 
 
 def with_hierarchy(domain: Domain, thresholds: MeshThresholds = DEFAULT) -> Domain:
     """The domain with coarser levels, where it is large enough and gmsh can make them. Collective.
+
+    Pieces of which gmsh can make none stay as they are.
 
     Args:
         domain: on any mesh; a domain that has a mesh hierarchy keeps it.
@@ -40,7 +42,9 @@ def with_hierarchy(domain: Domain, thresholds: MeshThresholds = DEFAULT) -> Doma
     if domain.coarsening is not None or unknowns < thresholds.hierarchy_from:
         return domain
     if len(found := pieces(domain)) > 1:
-        return _in_pieces(domain, found, thresholds)
+        domains = with_hierarchies([piece.domain for piece in found], thresholds)
+        bodies = [PlacedBody(name="", domain=one, origin=np.zeros(d), rotation=np.eye(d)) for one in domains]
+        return replace(domain, coarsening=coarsening(domain.mesh, bodies, [piece.numbers for piece in found]))
     domain = replace(domain, one_piece=True)  # known from now on
     factor = 2.0 ** max(1, round(np.log2(unknowns / thresholds.coarsest) / d))
     coarsest = coarsen(domain, factor)
@@ -48,7 +52,7 @@ def with_hierarchy(domain: Domain, thresholds: MeshThresholds = DEFAULT) -> Doma
         return domain
     growth = unknowns / _unknowns(coarsest)  # round bodies may need more vertices
     coarser = refinement.repeated(coarsest, max(0, round(np.log2(growth) / d) - 1))
-    return replace(domain, coarsening=lambda: (coarser, InterpolationTransfer()))
+    return replace(domain, coarsening=lambda: (coarser, Transfer()))
 
 
 def with_hierarchies(domains: Sequence[Domain], thresholds: MeshThresholds = DEFAULT) -> list[Domain]:
@@ -70,14 +74,6 @@ def with_hierarchies(domains: Sequence[Domain], thresholds: MeshThresholds = DEF
 def _unknowns(domain: Domain) -> int:
     """Displacements at the vertices."""
     return int(domain.dimension * domain.mesh.topology.index_map(0).size_global)
-
-
-def _in_pieces(domain: Domain, pieces: Sequence[Piece], thresholds: MeshThresholds) -> Domain:
-    """The domain with the coarser meshes of its pieces; those that have none stay as they are. Collective."""
-    d = domain.dimension
-    domains = with_hierarchies([piece.domain for piece in pieces], thresholds)
-    bodies = [PlacedBody(name="", domain=one, origin=np.zeros(d), rotation=np.eye(d)) for one in domains]
-    return replace(domain, coarsening=coarsening(domain.mesh, bodies, [piece.numbers for piece in pieces]))
 
 
 @dataclass(frozen=True, kw_only=True)

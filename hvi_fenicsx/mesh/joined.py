@@ -197,7 +197,7 @@ class JoinedTransfer(Transfer):
 
     bodies: tuple[PlacedTransfer, ...]
 
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
         """Each fine vertex has the weights that its body's transfer gives it. Collective."""
         whole = self.bodies[0].prolongation(fine, coarse)
         for body in self.bodies[1:]:

@@ -7,7 +7,6 @@ edge. Onto a mesh that is not nested the prolongation is linear interpolation. B
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import dolfinx
@@ -30,34 +29,34 @@ Rows = tuple[Numbers, Numbers, Array]
 """Compressed rows of a sparse matrix: where each begins, columns, values."""
 
 
-class Transfer(ABC):
-    """The way from a coarser mesh to a finer one of the same body, and so of P1 fields on it."""
+class Transfer:
+    """The way from a coarser mesh to a finer one of the same body, and so of P1 fields on it.
 
-    @abstractmethod
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+    It interpolates, whatever the meshes are; a subclass knows how they are nested.
+    """
+
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
         """The rows of this rank's fine unknowns, columns being the coarse unknowns' global numbers. Collective.
 
         Args:
             fine: P1 vectors on the finer mesh.
             coarse: P1 vectors on the coarser mesh.
-            points: the owned vertices of the finer mesh (n, 3) and all local ones of the coarser mesh (m, 3), m.
         """
+        owned = nodes.points(fine)[: fine.dofmap.index_map.size_local]
+        corners, weights = interpolation_weights(owned, coarse)
+        return weighted_rows(corners, weights, fine.dofmap.index_map_bs)
 
-    def prolongation(
-        self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array] | None = None
-    ) -> PETSc.Mat:
+    def prolongation(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> PETSc.Mat:
         """The prolongation of P1 vector fields in Cartesian components. Collective.
 
         Args:
             fine: P1 vectors on the finer mesh.
             coarse: P1 vectors on the coarser mesh.
-            points: the local vertices of the finer and of the coarser mesh, m, (n, 3), where they are at hand.
 
         Returns:
             Rows are the fine unknowns, columns the coarse ones.
         """
-        near, far = points or (nodes.points(fine), nodes.points(coarse))
-        rows = self.rows(fine, coarse, (near[: fine.dofmap.index_map.size_local], far))
+        rows = self.rows(fine, coarse)
         matrix = PETSc.Mat().createAIJ((_sizes(fine), _sizes(coarse)), csr=rows, comm=fine.mesh.comm)
         matrix.assemble()
         return matrix
@@ -76,7 +75,7 @@ class ParentCellTransfer(Transfer):
     parents: Entities
     halves: Halves
 
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
         """The functions of the parent cells, in the bases of the two spaces. Local."""
         code = self.halves.reshape(len(self.halves), -1) @ 3 ** np.arange(self.halves[:1].size)
         _, first, kind = np.unique(code, return_index=True, return_inverse=True)
@@ -98,21 +97,11 @@ class ParentCellTransfer(Transfer):
 class DegreeTransfer(Transfer):
     """From degree 1 to degree 2 on one mesh: exact."""
 
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
+    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
         """The functions of degree 1, in the basis of degree 2. Local."""
         count, corners = coarse.dofmap.list.shape
         itself = np.broadcast_to(2 * np.eye(corners, dtype=np.int8), (count, corners, corners))
-        return ParentCellTransfer(np.arange(count, dtype=np.int32), itself).rows(fine, coarse, points)
-
-
-@dataclass(frozen=True)
-class InterpolationTransfer(Transfer):
-    """Between meshes of the same body that are not nested."""
-
-    def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace, points: tuple[Array, Array]) -> Rows:
-        """Each fine vertex has barycentric weights in the coarse cell that holds it. Collective."""
-        corners, weights = interpolation_weights(points[0], coarse, points[1])
-        return weighted_rows(corners, weights, fine.dofmap.index_map_bs)
+        return ParentCellTransfer(np.arange(count, dtype=np.int32), itself).rows(fine, coarse)
 
 
 def renumbered(space: fem.FunctionSpace, own: Numbers, wanted: Numbers) -> Numbers:
@@ -150,7 +139,7 @@ def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:
     return space.dofmap.index_map.size_local * d, space.dofmap.index_map.size_global * d
 
 
-def interpolation_weights(points: Array, space: fem.FunctionSpace, vertices: Array) -> tuple[Integers, Array]:
+def interpolation_weights(points: Array, space: fem.FunctionSpace) -> tuple[Integers, Array]:
     """The vertices of the cell that holds each point, and the point's weights of them. Collective.
 
     Each rank is sent the cells that may hold its points. A point outside of all cells is moved to the nearest one.
@@ -158,13 +147,12 @@ def interpolation_weights(points: Array, space: fem.FunctionSpace, vertices: Arr
     Args:
         points: this rank's points, m, (m, 3).
         space: P1 on the mesh in which they are located.
-        vertices: local vertices of that mesh, m, (n, 3).
 
     Returns:
         Global numbers of vertices (blocks), and barycentric weights, (m, d+1) both.
     """
-    comm, d = space.mesh.comm, space.mesh.geometry.dim
-    corners, numbers = _gathered(comm, points, vertices, space)
+    d = space.mesh.geometry.dim
+    corners, numbers = _gathered(points, space)
     if not len(points):  # nor has it cells to look in
         return np.empty((0, d + 1), dtype=np.int64), np.empty((0, d + 1))
     distinct, local = np.unique(numbers, return_inverse=True)
@@ -178,11 +166,11 @@ def interpolation_weights(points: Array, space: fem.FunctionSpace, vertices: Arr
     return numbers[found], clipped(np.where(weights < ROUNDING, 0.0, weights))
 
 
-def _gathered(comm: MPI.Comm, points: Array, vertices: Array, space: fem.FunctionSpace) -> tuple[Array, Integers]:
+def _gathered(points: Array, space: fem.FunctionSpace) -> tuple[Array, Integers]:
     """Corners (k, d+1, d) and their global numbers (k, d+1) of all cells near this rank's points. Collective."""
-    d = space.mesh.geometry.dim
+    comm, d = space.mesh.comm, space.mesh.geometry.dim
     blocks = space.dofmap.list
-    corners = vertices[blocks][:, :, :d]
+    corners = nodes.points(space)[blocks][:, :, :d]
     numbers = space.dofmap.index_map.local_to_global(blocks.ravel()).reshape(blocks.shape)
     low, high = corners.min(axis=1), corners.max(axis=1)
     widest = max(agree(comm, float(np.max(high - low, initial=0.0))))

@@ -313,8 +313,8 @@ def prolongation(fine: System, coarse: System, transfer: Transfer) -> PETSc.Mat:
         transfer: the transfer from the coarser mesh to the finer one.
     """
     to, origin = fine.problem, coarse.problem
-    name, points = f"prolongation from degree {nodes.degree(origin.space)}", (to.points, origin.points)
-    step = to.once(name, None, lambda: transfer.prolongation(to.space, origin.space, points))
+    name = f"prolongation from degree {nodes.degree(origin.space)}"
+    step = to.once(name, None, lambda: transfer.prolongation(to.space, origin.space))
     if origin.coupling is not None:
         step = step.matMult(origin.coupling.matrix)
     if to.coupling is not None:

@@ -25,7 +25,7 @@ from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
 from hvi_fenicsx.mesh.shapes import HalfDisk
-from hvi_fenicsx.mesh.transfer import InterpolationTransfer
+from hvi_fenicsx.mesh.transfer import Transfer
 
 HERE = Path(__file__).parent
 DEMOS = Path(__file__).parents[2] / "demos"
@@ -86,7 +86,7 @@ def test_linear_fields_are_prolonged_as_they_are(name: str, tmp_path: Path) -> N
     fields = [fem.Function(space) for space in (fine, coarse)]
     for field in fields:
         field.interpolate(lambda x: np.array([1 + 2 * x[0] - x[1], x[0] + 3 * x[1]]))
-    found = InterpolationTransfer().prolongation(fine, coarse) * fields[1].x.petsc_vec
+    found = Transfer().prolongation(fine, coarse) * fields[1].x.petsc_vec
     assert found.array == pytest.approx(fields[0].x.array, abs=1e-12)
 
 

@@ -23,7 +23,7 @@ from hvi_fenicsx.mesh import coarsening, gmsh_file
 from hvi_fenicsx.mesh.domain import Domain
 from hvi_fenicsx.mesh.domain import MeshThresholds as Thresholds
 from hvi_fenicsx.mesh.hierarchy import with_hierarchy
-from hvi_fenicsx.mesh.transfer import InterpolationTransfer
+from hvi_fenicsx.mesh.transfer import Transfer
 from hvi_fenicsx.system.thresholds import Thresholds as SolverThresholds
 
 HERE = Path(__file__).parent
@@ -70,7 +70,7 @@ def test_a_bored_block_keeps_its_sides_and_regions(bored: Path) -> None:
 def test_a_linear_field_is_prolonged_exactly(tmp_path: Path) -> None:
     body, coarse = with_coarser(meshes.make(tmp_path / "m.msh", meshes.BORED.format(radius=0, size=0.12)))
     fine, under = space_on(body.mesh), space_on(coarse.mesh)
-    assert lost(InterpolationTransfer().prolongation(fine, under), fine, under, linear=True) < 1e-10
+    assert lost(Transfer().prolongation(fine, under), fine, under, linear=True) < 1e-10
 
 
 @pytest.mark.long

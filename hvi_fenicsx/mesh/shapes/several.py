@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -108,19 +108,11 @@ class SeveralBodies(DomainShape):
         return next((d for d in known if d is not None), None)
 
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
-        """The meshed bodies. Collective."""
-        return self._joined(comm, [body.build(comm, dimension) for body in self.bodies.values()])
-
-    def build_hierarchy(self, comm: MPI.Comm, dimension: int) -> Domain:
-        """The meshed bodies, with the coarser meshes of each. Collective."""
+        """The meshed bodies in their places, with the coarser meshes of each. Collective."""
         from ..hierarchy import with_hierarchies
-
-        domains = [body.build_hierarchy(comm, dimension) for body in self.bodies.values()]
-        return self._joined(comm, with_hierarchies(domains))
-
-    def _joined(self, comm: MPI.Comm, domains: Sequence[Domain]) -> Domain:
         from ..joined import check_places, joined
 
+        domains = with_hierarchies([body.build_hierarchy(comm, dimension) for body in self.bodies.values()])
         found = zip(self.bodies.items(), domains, strict=True)
         placed = [body.placed(name, domain) for (name, body), domain in found]
         check_places(comm, placed)
