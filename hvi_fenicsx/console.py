@@ -165,7 +165,7 @@ def _deviations(solution: Solution, examination: Examination) -> Iterator[str]:
 
 def _cost(solution: Solution, energy: float, counts: Counts) -> str:
     """The energy, and what it took to find it."""
-    unit, times = "J/m" if solution.problem.scales.dimension == 2 else "J", solution.timer.seconds
+    unit, times = "J/m" if solution.problem.dimension == 2 else "J", solution.timer.seconds
     return (
         f"energy {energy * solution.problem.scales.energy:.10g} {unit}; {counts.branch} branch steps, {counts.newton} "
         f"Newton steps, {counts.linear} linear iterations, {times['setup'] + times['solve']:.2f} s"

@@ -202,7 +202,7 @@ def _unresolved(problem: Problem) -> Entities:
     What no mesh has seen no estimate is sure of: a gap is first of all known at vertices. A load that jumps at one
     place does so within one facet of any mesh: it is the part as a whole that decides.
     """
-    space, comm = bubbles.space(problem.space.mesh, nodes.degree(problem.space)), problem.domain.mesh.comm
+    space, comm = bubbles.space(problem.space.mesh, nodes.degree(problem.space)), problem.comm
     found: list[Entities] = [np.empty(0, dtype=np.int32)]
     for facets, value in data_errors.everything(problem):
         at = data_errors.facet_modes(problem, space, facets)

@@ -105,7 +105,7 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: nothing was solved, since no solution exists.
         """
         parts = contact_parts(self.problem, self._examined.states)
-        return self.problem.domain.mesh.comm.bcast(_ContactParts(parts), root=0)
+        return self.problem.comm.bcast(_ContactParts(parts), root=0)
 
     @cached_property
     def resultants(self) -> Mapping[str, Array]:
@@ -119,7 +119,7 @@ class ModelSolution(Solution):
         """
         if self.forces is None:
             raise InputError(self._nothing)
-        found = self.forces.resultants(self.problem.domain.mesh.comm)
+        found = self.forces.resultants(self.problem.comm)
         return {name: force * self.problem.scales.force for name, force in found.items()}
 
     def resultant(self, part: str) -> Array:
@@ -148,7 +148,7 @@ class ModelSolution(Solution):
         require_kind("picture", picture, (str, type(None)), "the name of a picture, or None")
         result, figures = gathering.result(self), list[Figure]()
         wanted = picture or ("escape" if self.solve_result is None else "body")
-        on_root(self.problem.domain.mesh.comm, lambda: figures.append(_figure(result, wanted)))
+        on_root(self.problem.comm, lambda: figures.append(_figure(result, wanted)))
         return figures[0] if figures else None
 
     def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
@@ -165,7 +165,7 @@ class ModelSolution(Solution):
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
         require_path("folder", folder)
-        with ResultFolder(self.problem.domain.mesh.comm, Path(folder), force=force) as target:
+        with ResultFolder(self.problem.comm, Path(folder), force=force) as target:
             write_whole(target, self, GIVEN, self.timer, _LOG.warning, pictures=pictures)
             target.commit(self.scene)
 

@@ -52,7 +52,7 @@ def rounding_sample(problem: Problem, u: Array) -> Array:
         u: nondimensional, a local array.
     """
     shuffled = fem.Function(problem.space)
-    signs = np.random.default_rng(problem.domain.mesh.comm.rank).choice([-1.0, 1.0], len(u))
+    signs = np.random.default_rng(problem.comm.rank).choice([-1.0, 1.0], len(u))
     shuffled.x.array[:] = u * signs * np.finfo(float).eps
     shuffled.x.scatter_forward()
     return problem.combined(problem.bulk.force(shuffled))
@@ -143,7 +143,7 @@ def largest_penetration(problem: Problem, states: Sequence[ContactState]) -> flo
         if state.bounds is not None:
             for beyond in (state.normal - state.bounds.upper, state.bounds.lower - state.normal):
                 found = max(found, _largest(problem, state, beyond))
-    return largest(problem.domain.mesh.comm, found)
+    return largest(problem.comm, found)
 
 
 def _largest(problem: Problem, state: ContactState, beyond: Array) -> float:
@@ -152,7 +152,7 @@ def _largest(problem: Problem, state: ContactState, beyond: Array) -> float:
     everywhere.array[:] = -np.inf
     everywhere.array[state.surface.blocks] = beyond
     everywhere.scatter_forward()
-    steps = itertools.product(range(_STEPS + 1), repeat=problem.scales.dimension)
+    steps = itertools.product(range(_STEPS + 1), repeat=problem.dimension)
     lattice = np.array([step for step in steps if sum(step) == _STEPS]) / _STEPS
     functions = spaces.simplex_functions(nodes.degree(problem.space), lattice, spaces.edge_share(problem.space))
     local = everywhere.array[nodes.facet_nodes(problem.space, state.surface.facets)]

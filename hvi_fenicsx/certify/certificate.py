@@ -121,7 +121,7 @@ def examine(
         inertia: whether to factorise the Hessian where the states leave the second order undecided (it costs a
             direct solve or two).
     """
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     forces = contact_state.forces(problem, u)
     known = references.of(problem, forces.load)
     states = contact_state.states(known, u, forces.reaction)
@@ -163,7 +163,7 @@ def _energy(problem: Problem, u: fem.Function, forces: Forces, states: Sequence[
         for state in states
         for law in state.laws
     )
-    return total(problem.domain.mesh.comm, elastic + laws)
+    return total(problem.comm, elastic + laws)
 
 
 def _mixity(comm: MPI.Comm, states: Sequence[ContactState]) -> float | None:
@@ -243,7 +243,7 @@ def rounding_errors(
 def _rounding_of_laws(references: References, u: fem.Function, states: Sequence[ContactState]) -> Array:
     """By how much the last digits of u move what the laws give, relative to their scales, by body. Collective."""
     worst: Array = np.zeros(references.count)
-    vectors = np.abs(u.x.array.reshape(-1, references.problem.scales.dimension)) * np.finfo(float).eps
+    vectors = np.abs(u.x.array.reshape(-1, references.problem.dimension)) * np.finfo(float).eps
     for law in (law for state in states for law in state.laws):
         blocks = law.term.surface.blocks
         digits = np.einsum("mkd,md->mk", np.abs(law.term.directions), vectors[blocks])

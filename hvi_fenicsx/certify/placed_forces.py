@@ -110,7 +110,7 @@ def second_tractions(problem: Problem, states: Sequence[ContactState]) -> Array:
         problem: what was solved.
         states: of the parts of Γc.
     """
-    found = np.full((problem.space.dofmap.index_map.size_local, problem.scales.dimension), np.nan)
+    found = np.full((problem.space.dofmap.index_map.size_local, problem.dimension), np.nan)
     for state in states:
         interface = problem.interface_of(state.surface)
         if interface is not None:

@@ -89,7 +89,7 @@ def _scales(problem: Problem) -> Iterator[str]:
 
 def _uneven_parts(problem: Problem) -> Iterator[str]:
     """Contact parts that seem to be meant flat, in a mesh with few digits in its coordinates."""
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     for surface in (bounds.surface for bounds in problem.bounds):
         turn = largest_turn(comm, surface)
         if composition.DEFAULT.same < turn < composition.DEFAULT.uneven:
@@ -102,7 +102,7 @@ def _uneven_parts(problem: Problem) -> Iterator[str]:
 
 def _polygons(problem: Problem) -> Iterator[str]:
     """Contact parts of degree 2 whose facets seem to be those of a curve that the program does not know. Collective."""
-    domain, comm = problem.domain, problem.domain.mesh.comm
+    domain, comm = problem.domain, problem.comm
     if nodes.degree(problem.space) == 1:
         return
     known = np.concatenate([np.empty(0, np.int32), *(domain.sides[name] for name in domain.curves)])
@@ -140,13 +140,13 @@ def _straightened(problem: Problem) -> Iterator[str]:
 
 
 def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Iterator[str]:
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     load = total(comm, sum(float(np.abs(force.array_r).sum()) for force in forces.values()))
     for term in problem.terms:
         peak = max(term.exact.peak.minus, term.exact.peak.plus)
         most = peak * total(comm, float(term.weights.sum()))
         if most < PLAUSIBILITY.negligible * load and not _holds(problem, forces, term, DEFAULT.near):
-            unit = "N" if problem.scales.dimension == 3 else "N/m"
+            unit = "N" if problem.dimension == 3 else "N/m"
             yield (
                 f"{_key(problem, term.surface.part, term.direction)}: the law can carry "
                 f"{most * problem.scales.force:.3g} {unit} at most, {most / load:.1e} of the load, "
@@ -157,7 +157,7 @@ def _weak_laws(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Iterator[st
 
 def _holds(problem: Problem, forces: Mapping[str, PETSc.Vec], term: LawTerm, rounding: float) -> bool:
     """Whether a rigid motion that the supports leave works against the law. Collective."""
-    comm, surface = problem.domain.mesh.comm, term.surface
+    comm, surface = problem.comm, term.surface
     for body, rigid in zip(problem.bodies, existence.rigid_problems(problem, forces), strict=True):
         basis = kernel(comm, body, rigid.fixed)
         mine = existence.inside(problem, body, surface.blocks)
@@ -178,7 +178,7 @@ def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> 
     """
     warnings = [*_strain(problem, u)]
     if examination.certificate.passed:
-        size = _most(problem.domain.mesh.comm, np.abs(u.x.array))
+        size = _most(problem.comm, np.abs(u.x.array))
         warnings += _dips(problem, examination, size)
         for state in examination.states:
             warnings += _distant_obstacle(problem, state, size)
@@ -190,10 +190,10 @@ def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> 
 
 def _strain(problem: Problem, u: fem.Function) -> Iterator[str]:
     """By the edges: of P1, the strain along an edge is its change of length over its length."""
-    d = problem.scales.dimension
+    d = problem.dimension
     edges, changes = (_along_edges(problem, field) for field in (problem.points[:, :d], u.x.array.reshape(-1, d)))
     strain = problem.scales.displacement * max(
-        _most(problem.domain.mesh.comm, np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge))
+        _most(problem.comm, np.abs(np.einsum("nd,nd->n", edge, change)) / np.einsum("nd,nd->n", edge, edge))
         for edge, change in zip(edges, changes, strict=True)
     )
     if strain > PLAUSIBILITY.large:
@@ -202,7 +202,7 @@ def _strain(problem: Problem, u: fem.Function) -> Iterator[str]:
 
 def _along_edges(problem: Problem, values: Array) -> Iterator[Array]:
     """The difference of vectors (nodes, d) between the ends of each edge of the cells, (cells, d)."""
-    d = problem.scales.dimension
+    d = problem.dimension
     corners = np.take(values, problem.space.dofmap.list[:, : d + 1], axis=0)
     for a, b in combinations(range(d + 1), 2):
         yield corners[:, b] - corners[:, a]
@@ -220,7 +220,7 @@ def _dips(problem: Problem, examination: Examination, size: float) -> Iterator[s
 
 def _distant_obstacle(problem: Problem, state: ContactState, size: float) -> Iterator[str]:
     """An obstacle that nothing comes near."""
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     if state.bounds is None:
         return
     gap = -largest(comm, -float(np.min(state.bounds.upper, initial=np.inf)))
@@ -234,7 +234,7 @@ def _distant_obstacle(problem: Problem, state: ContactState, size: float) -> Ite
 
 def _slip_and_kink(problem: Problem, law: LawState) -> Iterator[str]:
     """A law whose kinks are of another order than what the solution does to it."""
-    comm, term, far = problem.domain.mesh.comm, law.term, 1.0 / PLAUSIBILITY.negligible
+    comm, term, far = problem.comm, law.term, 1.0 / PLAUSIBILITY.negligible
     kink, reached, weights = term.exact.length_scale, np.abs(law.argument), term.weights
     if term.exact.is_linear or np.any(term.exact.kinks == 0.0):
         return
@@ -259,7 +259,7 @@ def _slip_and_kink(problem: Problem, law: LawState) -> Iterator[str]:
 
 def _wide_smoothing(problem: Problem, law: LawState) -> Iterator[str]:
     """A smoothing so wide that the law which is solved is another one."""
-    comm, term = problem.domain.mesh.comm, law.term
+    comm, term = problem.comm, law.term
     if term.law is term.exact:
         return
     peak = max(term.exact.peak.minus, term.exact.peak.plus)

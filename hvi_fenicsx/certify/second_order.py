@@ -46,7 +46,7 @@ def status(references: References, u: fem.Function, forces: Array, tolerance: fl
         inertia: whether to factorise the Hessian where the laws leave it open.
     """
     problem = references.problem
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     found = growth(references, problem.relative(u.x.array), forces, tolerance)
     if comm.allreduce(bool(np.any(found.falls)), op=MPI.LOR):
         return NO_MINIMISER

@@ -164,7 +164,7 @@ def _doubt(system: System, motions: Motions) -> str | None:
     if not _is_tried(system):
         return (
             f"a law falls, and it was not tried whether the body is stiffer: more than {UNIQUENESS.most_on_boundary} "
-            f"unknowns on Γc, or {UNIQUENESS.most_unknowns[system.problem.scales.dimension - 2]:,} in all"
+            f"unknowns on Γc, or {UNIQUENESS.most_unknowns[system.problem.dimension - 2]:,} in all"
         )
     each = [np.asarray(fall / term.stretch, dtype=np.float64) for term, fall in zip(system.terms, falls, strict=True)]
     if (moved := _moved(system, motions, each)) is not None:
@@ -193,7 +193,7 @@ def _supported(system: System, motions: Motions, examination: Examination) -> st
 def _is_tried(system: System) -> bool:
     """Whether the problem is small enough for a factorisation. Collective."""
     unknowns = int(total(system.comm, float(len(system.jacobian.rows.dofs))))
-    most = UNIQUENESS.most_unknowns[system.problem.scales.dimension - 2]
+    most = UNIQUENESS.most_unknowns[system.problem.dimension - 2]
     return unknowns <= UNIQUENESS.most_on_boundary and system.dofs <= most
 
 

@@ -55,7 +55,7 @@ def _sizes(prepared: Preparation) -> dict[str, Any]:
     Raises:
         InputError: on all ranks alike: forces press several obstacles.
     """
-    problem, d = prepared.problem, prepared.problem.scales.dimension
+    problem, d = prepared.problem, prepared.problem.dimension
     loads = existence.loads_of_rigid_motions(problem, prepared.system.forces)
     sums = {name: COMM.allreduce(force.array_r.reshape(-1, d).sum(axis=0)) for name, force in loads.items()}
     pressed = obstacle_force.pressed(problem)

@@ -133,7 +133,7 @@ def _row(bodies: Equilibria, point: StationaryPoint, solution: Solution) -> Row:
     problem, examination = solution.problem, solution.examination
     assert bodies.problem is not None
     assert examination is not None
-    comm, unit = problem.domain.mesh.comm, problem.scales.displacement
+    comm, unit = problem.comm, problem.scales.displacement
     slips = [np.linalg.norm(s.slip, axis=1) for s in examination.states]
     openings = [np.where(np.isfinite(s.gap), s.gap, -s.normal) for s in examination.states]
     slip, opening = (largest(comm, np.max(np.hstack([0.0, *found]))) * unit for found in (slips, openings))
@@ -149,7 +149,7 @@ def _row(bodies: Equilibria, point: StationaryPoint, solution: Solution) -> Row:
 
 
 def _lines(prepared: Preparation, found: Found, rows: list[Row]) -> Iterator[str]:
-    unit = "J/m" if prepared.problem.scales.dimension == 2 else "J"
+    unit = "J/m" if prepared.problem.dimension == 2 else "J"
     for row in rows[:MOST_TOLD]:
         uncertified = "" if row["certified"] else "  NOT CERTIFIED"
         yield f"{row['index']:4d}  {row['energy']:.10g} {unit}  {row['kind']}  {row['broken']} broken{uncertified}"

@@ -329,7 +329,7 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
         problem: whose elastic operator it is.
         bubbles: the space of bubbles.
     """
-    d, v, integrals = problem.scales.dimension, ufl.TestFunction(bubbles), []
+    d, v, integrals = problem.dimension, ufl.TestFunction(bubbles), []
     for form, heights, shares in _energies(problem):
         each = [_energy(problem, form, heights, axis) for axis in range(d)]
         for along in zip(*each, strict=True):
@@ -342,7 +342,7 @@ def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
 
 def _energies(problem: Problem) -> Iterator[tuple[Any, tuple[Any, Any], dict[Index, float]]]:
     """The forms whose sum is a bubble's energy, the two functions that each is taken of, and the bubbles' shares."""
-    mesh, d = problem.space.mesh, problem.scales.dimension
+    mesh, d = problem.space.mesh, problem.dimension
     cell, degree = mesh.topology.cell_name(), nodes.degree(problem.space)
     barycentric, weights = quadrature(cell, 4 * degree)
     values = {index: shape(index, barycentric) for index in of_cell(degree, cell)}
@@ -362,7 +362,7 @@ def _energies(problem: Problem) -> Iterator[tuple[Any, tuple[Any, Any], dict[Ind
 
 def _energy(problem: Problem, form: Any, heights: tuple[Any, Any], axis: int) -> list[Any]:
     """The integrals over cells of a bilinear form of two functions along an axis, in UFL."""
-    d, arguments = problem.scales.dimension, problem.bulk.form.arguments()
+    d, arguments = problem.dimension, problem.bulk.form.arguments()
     moved = (ufl.as_vector([height if i == axis else 0.0 for i in range(d)]) for height in heights)
     found = ufl.replace(form, dict(zip(arguments, moved, strict=True)))
     return [integral for integral in found.integrals() if integral.integral_type() == "cell"]

@@ -168,7 +168,7 @@ def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities) 
         bubbles: the space of bubbles.
         facets: the local facets.
     """
-    found, d = contact_facets(problem, bubbles, facets), problem.scales.dimension
+    found, d = contact_facets(problem, bubbles, facets), problem.dimension
     degree, kind = DEFAULT.data_degree[d - 2], "interval" if d == 2 else "triangle"
     barycentric, weights = quadrature(kind, 2 * degree)
     family, cell = basix.PolynomialType.legendre, basix.CellType[kind]
@@ -281,7 +281,7 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[Conta
         bubbles: the space of bubbles.
         states: of the parts of Γc at the solution.
     """
-    found = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
+    found = np.zeros(problem.domain.mesh.topology.index_map(problem.dimension).size_local)
 
     known: dict[int, FacetModes] = {}
 
@@ -311,7 +311,7 @@ def squares(problem: Problem, bubbles: fem.FunctionSpace, states: Sequence[Conta
 def _unprescribed(problem: Problem, on: FacetModes, part: PrescribedComponent) -> Array:
     """Energies of what interpolation of twice the degree leaves of a prescribed displacement, (f,)."""
     rest = on.beyond_nodes(part.value)
-    for index in of_facet(on.facets.degree, problem.scales.dimension):
+    for index in of_facet(on.facets.degree, problem.dimension):
         there = on.beyond_nodes(part.value, np.array([index]) / sum(index))
         rest -= there * shape(index, on.barycentric)
     rest /= problem.scales.displacement
@@ -336,7 +336,7 @@ def _moved_pressure(
         nodal: pressure of the body against the obstacle, and distance from it, at the nodes, (m,) both.
         within: what interpolation between the nodes leaves of the gap at the sample points, (f, q).
     """
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     if comm.allreduce(magnitude(within), op=MPI.MAX) <= CERTIFICATE.near:
         return np.zeros(len(within))
     spread = part_points(problem, bubbles, surface, 1).spread
@@ -352,5 +352,5 @@ def _moved_pressure(
 
 def _is_supported(problem: Problem, normals: Array) -> bool:
     """Whether a prescribed component holds the body against a translation along a part's mean normal. Collective."""
-    mean = [abs(total(problem.domain.mesh.comm, float(along))) for along in normals.sum(axis=0)]
+    mean = [abs(total(problem.comm, float(along))) for along in normals.sum(axis=0)]
     return any(mean[part.component] > composition.turned_to_prescribed * max(mean) for part in problem.prescribed)

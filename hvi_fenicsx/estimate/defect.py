@@ -75,7 +75,7 @@ class BubbleBounds:
 
 def _prescribed(problem: Problem, u: fem.Function, space: fem.FunctionSpace) -> Iterator[BubbleBounds]:
     """What prescribed displacements ask of the bubbles: equal bounds along an axis. Collective."""
-    d = problem.scales.dimension
+    d = problem.dimension
     for part in problem.prescribed:
         points = _Points(space, _on(space, part.facets))
         wanted = part.value.at(points.positions(needed=not part.value.is_number)) / problem.scales.displacement
@@ -128,7 +128,7 @@ def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.
         bounds: at the nodes of the part.
         space: the bubbles.
     """
-    d = problem.scales.dimension
+    d = problem.dimension
     points, field = _Points(space, _on(space, bounds.surface.facets)), fem.Function(problem.space)
 
     def middle(values: Array) -> Array:

@@ -76,7 +76,7 @@ class DualNorm:
         x, out = system.unknowns(field), system.load.duplicate()
         system.jacobian.elastic_product(x, out)
         cartesian = out if system.rotation is None else system.rotation * out
-        return np.array(cartesian.array_r).reshape(-1, system.problem.scales.dimension)
+        return np.array(cartesian.array_r).reshape(-1, system.problem.dimension)
 
     def keep_within_bounds(self, error: fem.Function) -> bool:
         """Put u + an error on the bounds that it leaves, in place; from then on it is held there. Collective.
@@ -171,7 +171,7 @@ def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> floa
         if state.bounds is not None:
             beyond = np.maximum(state.bounds.beyond(state.normal), 0.0)
             local += float(np.sum(state.surface.weights * np.abs(state.contact_pressure) * beyond))
-    return total(problem.domain.mesh.comm, local)
+    return total(problem.comm, local)
 
 
 def law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool) -> Array:
@@ -182,7 +182,7 @@ def law_forces(problem: Problem, states: Sequence[ContactState], *, exact: bool)
         states: of the parts of Γc.
         exact: whether the unsmoothed laws are asked, not those that were solved.
     """
-    d = problem.scales.dimension
+    d = problem.dimension
     forces = np.zeros((problem.space.dofmap.index_map.size_local, d))
     for state in states:
         for law in state.laws:

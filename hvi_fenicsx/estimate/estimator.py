@@ -97,7 +97,7 @@ def estimate(system: System, levels: Levels, u: fem.Function, examination: Exami
     smoothing = inverse.solve(dual_norm.law_forces(problem, examination.states, exact=True))[1] if smoothed else 0.0
     _, algebraic = inverse.solve(dual_norm.algebraic(problem, examination), DEFAULT.rough_tolerance[0])
     inverse.destroy()
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     beyond = dual_norm.penetration_energy(problem, examination.states)
     squares = {
         "discretisation": total(comm, float(cells.sum())),
@@ -116,7 +116,7 @@ def _discretisation(traces: LawTraces, inverse: DualNorm, energy: float) -> tupl
     stiffness, limit = BubbleStiffness(traces.problem, traces.bubbles), DEFAULT.coupled[traces.degree - 1]
     if limit and not within_facets(traces):
         cells = _between_nodes(traces, inverse, stiffness)
-        if total(traces.problem.domain.mesh.comm, float(cells.sum())) <= limit**2 * energy:
+        if total(traces.problem.comm, float(cells.sum())) <= limit**2 * energy:
             return None, cells
     return of_solution(traces, inverse, stiffness)
 
@@ -135,7 +135,7 @@ def _between_nodes(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffn
 def _energy(problem: Problem, u: fem.Function, examination: Examination) -> float:
     """a(u, u). Collective."""
     internal = examination.forces.reaction + examination.forces.load
-    return total(problem.domain.mesh.comm, float(problem.relative(u.x.array)[: internal.size] @ internal.ravel()))
+    return total(problem.comm, float(problem.relative(u.x.array)[: internal.size] @ internal.ravel()))
 
 
 def warnings(errors: Estimate) -> tuple[str, ...]:
@@ -161,7 +161,7 @@ def within_facets(traces: LawTraces) -> bool:
         for state in traces.states
         for law in state.laws
     ]
-    return bool(traces.problem.domain.mesh.comm.allreduce(any(found), op=MPI.LOR))
+    return bool(traces.problem.comm.allreduce(any(found), op=MPI.LOR))
 
 
 def heights(points: Trace, law: LawState, of: Superpotential) -> Array:
@@ -210,7 +210,7 @@ class Coupled:
         """The energy norm of the error. Collective."""
         problem = self._traces.problem
         relative = problem.relative(self.error.nodes.x.array)[: self._force.size]
-        of_nodes = total(problem.domain.mesh.comm, float(np.vdot(relative, self._force)))
+        of_nodes = total(problem.comm, float(np.vdot(relative, self._force)))
         return float(np.sqrt(max(self._least.energy + 2 * self._shared + of_nodes, 0.0)))
 
     def find_bubbles(self) -> None:
@@ -237,11 +237,11 @@ class Coupled:
             self._force = inverse.force(nodes)
         self._moved.x.array[:] += nodes.x.array
         work = float(np.vdot(nodes.x.array[: of_bubbles.size], of_bubbles))
-        self._shared = total(traces.problem.domain.mesh.comm, work)
+        self._shared = total(traces.problem.comm, work)
 
     def _settled(self, laws: Array) -> bool:
         """Whether the laws' force on the nodes is nearly the one before. Collective."""
-        comm = self._traces.problem.domain.mesh.comm
+        comm = self._traces.problem.comm
         changed = np.sqrt(total(comm, float(np.sum((laws - self._answer) ** 2))))
         self._answer, self._strongest = laws, max(self._strongest, changed)
         return bool(changed <= DEFAULT.coupled_change * self._strongest)
@@ -358,7 +358,7 @@ def _uncertainty(traces: LawTraces, inverse: DualNorm) -> fem.Function:
             dropped.append(points.with_nodes(tau))
             count += int(np.count_nonzero(np.any(tau, axis=(1, 2))))
     field, _ = inverse.solve(collected(problem.space, dropped))
-    field.x.array[:] /= np.sqrt(max(problem.domain.mesh.comm.allreduce(count), 1))
+    field.x.array[:] /= np.sqrt(max(problem.comm.allreduce(count), 1))
     return field
 
 

@@ -64,7 +64,7 @@ def _mean(on: FacetModes, ends: Array) -> Array:
 
 def _yielding(problem: Problem, part: str, states: Sequence[ContactState]) -> tuple[Array, Array]:
     """What laws of a part put on the body off their kinks, and how fast that rises; owned blocks (n, d)."""
-    forces = np.zeros((problem.space.dofmap.index_map.size_local, problem.scales.dimension))
+    forces = np.zeros((problem.space.dofmap.index_map.size_local, problem.dimension))
     rates = np.zeros_like(forces)
     for state in (state for state in states if state.surface.part == part):
         for law in state.laws:
@@ -98,7 +98,7 @@ def _at_ends(problem: Problem, part: _Part, forces: Array, reaction: Array) -> A
 def _areas(problem: Problem, facets: Entities) -> Array:
     """The lumped areas of facets at the local nodes, nondimensional, (n,). Collective."""
     found = la.vector(problem.space.dofmap.index_map)
-    owned = references.lumped(problem, facets) / problem.scales.length ** (problem.scales.dimension - 1)
+    owned = references.lumped(problem, facets) / problem.scales.length ** (problem.dimension - 1)
     found.array[: len(owned)] = owned
     found.scatter_forward()
     return np.asarray(found.array, dtype=np.float64)
@@ -109,7 +109,7 @@ def _means(problem: Problem, facets: Entities, forces: Array, areas: Array, coun
 
     Collective.
     """
-    space, d, owned = problem.space, problem.scales.dimension, len(forces)
+    space, d, owned = problem.space, problem.dimension, len(forces)
     field, count = fem.Function(space), la.vector(space.dofmap.index_map)
     values = field.x.array.reshape(-1, d)
     values[:owned] = forces / np.where(areas > 0.0, areas, np.inf)[:owned, None]
@@ -179,7 +179,7 @@ def squares(
         examination: of the same u.
         inverse: of the system's stiffness.
     """
-    cells = np.zeros(problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local)
+    cells = np.zeros(problem.domain.mesh.topology.index_map(problem.dimension).size_local)
     parts, owned = list(_parts(problem, bubbles)), np.arange(len(examination.forces.reaction), dtype=np.int32)
     if not parts:
         return cells
@@ -215,7 +215,7 @@ def _held(problem: Problem, part: _Part, forces: Array, examination: Examination
 def _loads(problem: Problem, part: _Part) -> Array:
     """The tractions that the mesh lacks of the loads on a part, at the sample points, nondimensional, (f, q, d)."""
     on, missing = part.on, part.missing
-    found: Array = np.zeros((*missing.shape, problem.scales.dimension))
+    found: Array = np.zeros((*missing.shape, problem.dimension))
     for load in (effect.surface_load() for where, effect, _ in problem.contributions if where == part.name):
         if load is None:
             continue
@@ -231,12 +231,12 @@ def _loads(problem: Problem, part: _Part) -> Array:
 
 def _sums(problem: Problem, part: _Part) -> Array:
     """The same of sums over a part: spread over more than it, they are less everywhere. Collective."""
-    on, d = part.on, problem.scales.dimension
+    on, d = part.on, problem.dimension
     at, found = on.points.reshape(-1, 3), np.zeros((*part.share.shape, d))
     spread = [effect for where, effect, _ in problem.contributions if where == part.name and effect.is_sum]
     for sign, counted in ((1.0, part.share), (-1.0, part.meshed)) if spread else ():
         areas = (on.areas * counted).ravel() * problem.scales.length ** (d - 1)
-        moments = domain_forms.of_points(problem.domain.mesh.comm, at[:, :d], areas)
+        moments = domain_forms.of_points(problem.comm, at[:, :d], areas)
         for effect in spread:
             found += sign * counted[:, :, None] * effect.spread_at(moments, at).reshape(found.shape)
     return np.asarray(found / problem.scales.stress)
@@ -244,7 +244,7 @@ def _sums(problem: Problem, part: _Part) -> Array:
 
 def _of_loads(problem: Problem, inverse: DualNorm, parts: Sequence[_Part], lacking: Sequence[Array]) -> Array:
     """η_K² of the owned cells that lacking tractions (f, q, d) on the parts' facets add. Collective."""
-    comm, d = problem.domain.mesh.comm, problem.scales.dimension
+    comm, d = problem.comm, problem.dimension
     cells = np.zeros(problem.domain.mesh.topology.index_map(d).size_local)
     forces: list[tuple[Entities, Array]] = []
     for part, tractions in zip(parts, lacking, strict=True):
@@ -262,6 +262,6 @@ def _of_loads(problem: Problem, inverse: DualNorm, parts: Sequence[_Part], lacki
 
 def _outward(problem: Problem, on: FacetModes) -> Array:
     """The outward unit normals of facets, (f, d)."""
-    d = problem.scales.dimension
+    d = problem.dimension
     inner = problem.positions[problem.space.dofmap.list[on.facets.cells]].mean(axis=1)[:, :d]
     return outward(on.nodes[:, :d, :d], inner)

@@ -95,7 +95,7 @@ class Trace:
 
     def of_bubbles(self, e: fem.Function) -> Array:
         """The values of bubbles, (f, q, k). Collective."""
-        found = np.zeros((*self.weights.shape, self._problem.scales.dimension))
+        found = np.zeros((*self.weights.shape, self._problem.dimension))
         for side in self._points.sides:
             known = side.by_facet(e.x.array.reshape(-1, found.shape[2])[side.blocks])
             for i, values in enumerate(side.shapes):
@@ -202,7 +202,7 @@ def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) 
         space: of bubbles.
         local: the local facets.
     """
-    topology, d = problem.domain.mesh.topology, problem.scales.dimension
+    topology, d = problem.domain.mesh.topology, problem.dimension
     topology.create_connectivity(d - 1, d)
     topology.create_connectivity(d, d - 1)
     of_facet, of_cell = topology.connectivity(d - 1, d), topology.connectivity(d, d - 1)
@@ -289,7 +289,7 @@ def _of_interface(problem: Problem, space: fem.FunctionSpace, side: Facets, name
     """The global numbers of the bubbles of all facets of an interface's side, (facets, k). Collective."""
     local = contact_facets(problem, space, problem.domain.facets([name]))
     own = [_numbers(problem.space, local.nodes), _numbers(space, local.bubbles)]
-    nodes_of, found = (np.concatenate(parts) for parts in zip(*agree(problem.domain.mesh.comm, own), strict=True))
+    nodes_of, found = (np.concatenate(parts) for parts in zip(*agree(problem.comm, own), strict=True))
     numbers = np.empty_like(found)
     numbers[np.lexsort(side.nodes.T)] = found[np.lexsort(nodes_of.T)]
     return np.asarray(numbers)
@@ -335,8 +335,8 @@ def part_points(problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, 
         surface: the part.
         degree: of the quadrature.
     """
-    comm, on = problem.domain.mesh.comm, contact_facets(problem, bubbles, surface.facets)
-    at, weights = quadrature("interval" if problem.scales.dimension == 2 else "triangle", degree)
+    comm, on = problem.comm, contact_facets(problem, bubbles, surface.facets)
+    at, weights = quadrature("interval" if problem.dimension == 2 else "triangle", degree)
     functions = spaces.simplex_functions(on.degree, at, spaces.edge_share(problem.space))
     count, own = len(on.nodes), _numbers(problem.space, surface.blocks)
     known, kept = np.unique(np.concatenate(agree(comm, own))), np.ones(on.nodes.shape, dtype=np.bool_)
@@ -373,7 +373,7 @@ def interface_points(problem: Problem, bubbles: fem.FunctionSpace, interface: In
         interface: one of the problem's.
         degree: of the quadrature.
     """
-    d, comm, first = problem.scales.dimension, problem.domain.mesh.comm, interface.first
+    d, comm, first = problem.dimension, problem.comm, interface.first
     overlaps, names = interface.overlaps, interface.sides
     own = np.arange(comm.rank, len(overlaps.areas), comm.size)
     rule, weights = quadrature("interval" if d == 2 else "triangle", degree)
@@ -437,7 +437,7 @@ def _of_carriers(problem: Problem, interface: Interface) -> Spread:
     for facet, node in dual_basis.adopted(first, interface.overlaps, kept).items():
         at[facet, 0], carriers[facet, :, 0] = np.searchsorted(known, node), 1.0
     return Spread(
-        comm=problem.domain.mesh.comm,
+        comm=problem.comm,
         count=len(known),
         own=np.searchsorted(known, own),
         at=at,

@@ -117,7 +117,7 @@ class PathRun:
                 self._take(state, verdict)
                 keep({**asdict(state), "verdict": asdict(verdict)})
         return LoadPath(
-            dimension=self.prepared.problem.scales.dimension,
+            dimension=self.prepared.problem.dimension,
             scaled=self.scaled,
             rows=tuple(self._rows),
             end=str(follower.end or End.LOST),

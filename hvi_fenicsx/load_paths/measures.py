@@ -156,7 +156,7 @@ def driven(problem: Problem) -> Iterator[str]:
 def _attributed(problem: Problem, parts: tuple[str, ...]) -> tuple[dict[str, Integers], dict[str, Integers]]:
     """The scalar unknowns of this rank that count for each part: those held, and those contact and laws act on."""
     taken: set[int] = set()
-    here = problem.space.dofmap.index_map.size_local * problem.scales.dimension
+    here = problem.space.dofmap.index_map.size_local * problem.dimension
     held: dict[str, list[int]] = {part: [] for part in parts}
     touched: dict[str, list[int]] = {part: [] for part in parts}
     for one in problem.prescribed:
@@ -231,7 +231,7 @@ def find(problem: Problem, parts: Mapping[int, int], prescribed: Array, *, remem
             direction[here] * term.weights[here, None],
             np.einsum("md,mdc->mc", direction[here], prescribed[dofs[here]]) / term.stretch[here, None],
         )
-        numbers, forces, arguments = (np.concatenate(agree(problem.domain.mesh.comm, e)) for e in entries)
+        numbers, forces, arguments = (np.concatenate(agree(problem.comm, e)) for e in entries)
         known = numbers >= 0
         ones = np.ones(np.count_nonzero(known))
         laws, of_known = VertexLaws(law=term.law, factors=ones, weights=ones), (numbers[known], forces[known])

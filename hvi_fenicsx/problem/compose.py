@@ -119,7 +119,7 @@ def _problem(
     constraints.check_bounds(context, bounds, prescribed, fixed)
     constraints.check_contradictions(context, scales, bounds)
     law_term.check_laws(contributions)
-    law_term.check_moved(context.domain.mesh.comm, contributions, surfaces)
+    law_term.check_moved(context.mesh.comm, contributions, surfaces)
     terms = law_term.make_terms(context, scales, surfaces, contributions, fixed, model.modify)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(

@@ -46,8 +46,8 @@ def make_surfaces(
     towards = {w: b.towards for w, _, c in contributions for b in c.bounds if w in parts and b.towards is not None}
     stated = {name: _stated(context, surfaces[name], obstacle) for name, obstacle in towards.items()}
     if not context.domain.one_piece:
-        contact_surface.refuse_facing_sides(context.domain.mesh.comm, surfaces.values(), context.length)
-    return contact_surface.decide(context.domain.mesh.comm, surfaces, stated, fixed, context.length)
+        contact_surface.refuse_facing_sides(context.mesh.comm, surfaces.values(), context.length)
+    return contact_surface.decide(context.mesh.comm, surfaces, stated, fixed, context.length)
 
 
 def _surface(context: DomainForms, where: str) -> Surface:
@@ -76,7 +76,7 @@ def _stated(context: DomainForms, where: Surface, obstacle: Towards) -> Array:
     found = obstacle.towards(where.points[:, : context.dimension])
     bad = np.flatnonzero(~np.all(np.isfinite(found), axis=1))
     said = f"boundary.{where.part}.contact: no direction leads from {{}} to the obstacle; state one"
-    refuse(context.domain.mesh.comm, [said.format(where.spot(i)) for i in bad[:1]])
+    refuse(context.mesh.comm, [said.format(where.spot(i)) for i in bad[:1]])
     return found
 
 
@@ -142,7 +142,7 @@ def _bounds(
         if formula is None:
             return np.full(len(where.blocks), np.inf)
         found = _coefficients(context, where, formula) / scales.displacement
-        if not all(agree(context.domain.mesh.comm, bool(np.all(np.isfinite(found))))):
+        if not all(agree(context.mesh.comm, bool(np.all(np.isfinite(found))))):
             reason = "the gap is not finite everywhere there; see its formula, or where the obstacle lies"
             raise InputError(f"boundary.{where.part}.{effect.key}: {reason}")
         return found
@@ -163,7 +163,7 @@ def _bounds(
                 "give it a direction along the force"
             )
         rate = (-value(stated.lower) - upper) * scales.displacement
-        if not any(agree(context.domain.mesh.comm, bool(np.any(rate < 0.0)))):
+        if not any(agree(context.mesh.comm, bool(np.any(rate < 0.0)))):
             raise InputError(f"boundary.{name}: the force moves the obstacle away from the body; turn it round")
         size = float(np.linalg.norm(stated.vector))
         direction = np.array(stated.vector) / size
@@ -204,7 +204,7 @@ def check_bounds(context: DomainForms, bounds: Sequence[Bounds], prescribed: Arr
             "there"
             for i in np.flatnonzero(out)[:1]
         ]
-    refuse(context.domain.mesh.comm, bad)
+    refuse(context.mesh.comm, bad)
 
 
 def check_contradictions(context: DomainForms, scales: Scales, bounds: Sequence[Bounds]) -> None:
@@ -220,7 +220,7 @@ def check_contradictions(context: DomainForms, scales: Scales, bounds: Sequence[
     """
     pairs = combinations_with_replacement(bounds, 2)
     bad = [text for one, other in pairs for text in _contradiction(one, other, scales.displacement)]
-    refuse(context.domain.mesh.comm, bad)
+    refuse(context.mesh.comm, bad)
 
 
 def _contradiction(one: Bounds, other: Bounds, unit: float) -> list[str]:
@@ -304,7 +304,7 @@ def _check_agreement(context: DomainForms, scales: Scales, found: Sequence[Presc
         apart = np.abs(these[i] - those[j]) > DEFAULT.same * size
         differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
         bad += [_disagreement(context, int(dof), (one, other), (float(a), float(b)), scales) for dof, a, b in differing]
-    refuse(context.domain.mesh.comm, bad[:1])
+    refuse(context.mesh.comm, bad[:1])
 
 
 def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:

@@ -96,7 +96,7 @@ def _terms(contribution: Contribution) -> Iterator[str]:
 
 def _bounded(problem: Problem, part: str | None) -> int:
     """Vertices of a part, over all ranks. Collective."""
-    return int(problem.domain.mesh.comm.allreduce(sum(len(s.blocks) for s in problem.surfaces if s.part == part)))
+    return int(problem.comm.allreduce(sum(len(s.blocks) for s in problem.surfaces if s.part == part)))
 
 
 def _prescribed(problem: Problem, part: str | None, contribution: Contribution) -> int:
@@ -104,7 +104,7 @@ def _prescribed(problem: Problem, part: str | None, contribution: Contribution) 
     own = [one.dofs for one in problem.prescribed if one.part == part] if contribution.conditions else []
     size = problem.space.dofmap.index_map.size_local * problem.space.dofmap.index_map_bs
     dofs = np.unique(np.concatenate([np.empty(0, np.int32), *own]))
-    return int(problem.domain.mesh.comm.allreduce(int(np.count_nonzero(dofs < size))))
+    return int(problem.comm.allreduce(int(np.count_nonzero(dofs < size))))
 
 
 def _output(effect: Effect, contribution: Contribution) -> Iterator[str]:

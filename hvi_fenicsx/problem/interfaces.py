@@ -80,7 +80,7 @@ def _gathered(context: DomainForms, local: Entities) -> Facets:
         (context.points if is_curved(space) else context.points_on_curves)[blocks][:, :, :d],
         outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
     ]
-    every = agree(context.domain.mesh.comm, parts)
+    every = agree(context.mesh.comm, parts)
     numbers, points, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
     order = np.lexsort(np.round(points[:, :d].mean(axis=1) / context.length, 12).T)
     return Facets(
@@ -176,7 +176,7 @@ def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: E
     if not wanted:
         return ()
     pairs = {name: _pair(context, name, sides) for name, sides in wanted.items()}
-    taken = np.concatenate(agree(context.domain.mesh.comm, spaces.global_numbers(context.space, occupied)))
+    taken = np.concatenate(agree(context.mesh.comm, spaces.global_numbers(context.space, occupied)))
     return tuple(_interface(context, name, pairs, taken) for name in wanted)
 
 
@@ -201,7 +201,7 @@ def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)
     surface = _surface(context, pair, overlaps, rows)
     gap = _gaps(context, surface, pair, rows)
-    check_apart(context.domain.mesh.comm, pair, surface, gap)
+    check_apart(context.mesh.comm, pair, surface, gap)
     start, end = context.space.dofmap.index_map.local_range
     both = np.union1d(pair.first.nodes, pair.second.nodes)
     return Interface(

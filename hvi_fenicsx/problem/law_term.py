@@ -255,7 +255,7 @@ def _term(
         )
     if law.contradictions is not None:
         said = law.contradictions(where.points)
-        refuse(context.domain.mesh.comm, [f"boundary.{where.part}.{key}: {text}" for text in said])
+        refuse(context.mesh.comm, [f"boundary.{where.part}.{key}: {text}" for text in said])
     return LawTerm(
         surface=where,
         direction=law.direction,
@@ -284,7 +284,7 @@ def _factor(context: DomainForms, where: Surface, key: str, given: SpatialValue)
         f"every vertex, from {1.0 / most:g} to {most:g}. Where there is no law, leave that piece out: `where`"
         for i in bad[:1]
     ]
-    refuse(context.domain.mesh.comm, said)
+    refuse(context.mesh.comm, said)
     return found
 
 

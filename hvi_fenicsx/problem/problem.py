@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..formula import SpatialValue
@@ -175,6 +176,16 @@ class Problem:
     pieces: Mapping[str, BoundaryPart]
     interfaces: tuple[Interface, ...] = ()
 
+    @property
+    def comm(self) -> MPI.Comm:
+        """The communicator."""
+        return self.domain.mesh.comm
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.scales.dimension
+
     @functools.cached_property
     def fixed_here(self) -> Entities:
         """The scalar dofs that are prescribed and that this rank owns."""
@@ -331,7 +342,7 @@ def _scaled(problem: Problem, prescribed: PrescribedComponent) -> tuple[Prescrib
     component = problem.space.sub(prescribed.component)
     collapsed, _ = component.collapse()
     dofs = fem.locate_dofs_topological((component, collapsed), problem.domain.dimension - 1, prescribed.facets)
-    everywhere = np.zeros(len(problem.points) * problem.scales.dimension)
+    everywhere = np.zeros(len(problem.points) * problem.dimension)
     prescribed.condition.set(everywhere)
     values = fem.Function(collapsed)
     values.x.array[dofs[1]] = everywhere[dofs[0]]

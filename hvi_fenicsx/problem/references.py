@@ -47,7 +47,7 @@ class References:
 
     def norms(self, values: Array) -> Array:
         """Euclidean norms of values at this rank's vertices, any shape of (vertices, d), by body. Collective."""
-        by_vertex = values.reshape(-1, self.problem.scales.dimension)
+        by_vertex = values.reshape(-1, self.problem.dimension)
         squares = np.einsum("vd,vd->v", by_vertex, by_vertex)  # a sum over a short axis is much slower
         return np.sqrt(_sums(self.problem, squares))
 
@@ -60,7 +60,7 @@ class References:
         """
         labels, known = self.problem.bodies.labels[blocks], np.where(np.isnan(values), np.inf, values)
         found = np.array([np.max(known, initial=0.0, where=labels == body) for body in range(self.count)])
-        self.problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
+        self.problem.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
         return found
 
     @property
@@ -80,7 +80,7 @@ class References:
         Args:
             u: at this rank's vertices, in units of u0, any shape of (vertices, d).
         """
-        sizes = functools.reduce(np.maximum, np.abs(u.reshape(-1, self.problem.scales.dimension)).T)
+        sizes = functools.reduce(np.maximum, np.abs(u.reshape(-1, self.problem.dimension)).T)
         found = self.largest(np.arange(len(sizes)), sizes)
         return np.where(self.driven & (found > 0.0), found, np.maximum(found, self.scale))
 
@@ -106,7 +106,7 @@ class References:
 
         Collective when first used.
         """
-        d, owned = self.problem.scales.dimension, self.problem.space.dofmap.index_map.size_local
+        d, owned = self.problem.dimension, self.problem.space.dofmap.index_map.size_local
         return _sums(self.problem, np.ones(owned)) ** (-(d - 1) / (2 * d))
 
     def traction_scale(self, term: LawTerm) -> Array:
@@ -152,9 +152,9 @@ def demanded(problem: Problem) -> Array:
     prescribed = fem.Function(problem.space)
     for condition in (one.condition for one in problem.prescribed):
         condition.set(prescribed.x.array)
-    sizes = np.max(np.abs(prescribed.x.array.reshape(-1, problem.scales.dimension)), axis=1)
+    sizes = np.max(np.abs(prescribed.x.array.reshape(-1, problem.dimension)), axis=1)
     np.maximum.at(displacement, problem.bodies.labels, sizes)
-    problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, displacement, op=MPI.MAX)
+    problem.comm.Allreduce(MPI.IN_PLACE, displacement, op=MPI.MAX)
     return np.maximum(force, displacement)
 
 
@@ -166,7 +166,7 @@ def _sums(problem: Problem, values: Array, blocks: Entities | slice = slice(None
     """Sums of values at this rank's vertices, or at some of them, by body, over all ranks. Collective."""
     labels = problem.bodies.labels[blocks][: len(values)]
     found = np.bincount(labels, weights=values, minlength=len(problem.bodies.bodies))
-    return problem.domain.mesh.comm.allreduce(found)
+    return problem.comm.allreduce(found)
 
 
 def lumped(problem: Problem, facets: Entities) -> Array:
@@ -210,7 +210,7 @@ def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) 
     Returns:
         u itself where none is.
     """
-    comm, found = problem.domain.mesh.comm, u
+    comm, found = problem.comm, u
     for places, owned, motions in problem.once("rigid motions of displacements", None, lambda: _motions(problem)):
         values = u.x.array[places]
         with np.errstate(invalid="ignore"):  # what is no number is told by who judges it
@@ -227,13 +227,13 @@ def _motions(problem: Problem) -> list[tuple[Integers, int, Array]]:
 
     The motions are orthonormal over all ranks.
     """
-    points, d = problem.points / problem.scales.length, problem.scales.dimension
+    points, d = problem.points / problem.scales.length, problem.dimension
     here, every = problem.space.dofmap.index_map.size_local, list[tuple[Integers, int, Array]]()
     for body in problem.bodies:
         blocks = np.flatnonzero(problem.bodies.labels == body.index)
         fields = problem.bodies.fields(points[blocks], blocks, body).transpose(1, 0, 2)
         places = (blocks[:, None] * d + np.arange(d)).ravel()
         values, owned = fields.reshape(len(fields), -1), d * int(np.count_nonzero(blocks < here))
-        factor = np.linalg.cholesky(problem.domain.mesh.comm.allreduce(values[:, :owned] @ values[:, :owned].T))
+        factor = np.linalg.cholesky(problem.comm.allreduce(values[:, :owned] @ values[:, :owned].T))
         every.append((places, owned, np.asarray(np.linalg.solve(factor, values))))
     return every

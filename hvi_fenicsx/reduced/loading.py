@@ -294,7 +294,7 @@ def carriers_of(system: System, interior: Interior, laws: CondensedLaws, moved: 
     lower, upper, shift = (interior.gathered(v) for v in (system.lower.array_r, system.upper.array_r, moved))
     bounded = np.isfinite(lower) | np.isfinite(upper)
     with_law = [b.unknowns.ravel() for b in laws.bonds]
-    d = system.problem.scales.dimension
+    d = system.problem.dimension
     named = np.full(system.load.local_size, "", dtype=object)
     for bounds in system.bounds:
         named[bounds.component()[0]] = bounds.surface.part

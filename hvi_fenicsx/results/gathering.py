@@ -57,7 +57,7 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
         stress: in the parts of the cells that this rank owns, N/m², (c, 3, 3); left out where it is None.
     """
     problem = solution.problem
-    comm, d, owned = problem.domain.mesh.comm, problem.scales.dimension, problem.space.dofmap.index_map.size_local
+    comm, d, owned = problem.comm, problem.dimension, problem.space.dofmap.index_map.size_local
     fields: dict[str, Any] = {"points": problem.positions[:owned, :d]}
     fields["cells"] = spaces.global_numbers(problem.space, nodes.linear_cells(problem.space))
     if solution.solve_result is not None:
@@ -77,13 +77,13 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
 def _facets(problem: Problem, facets: Entities) -> Integers:
     """The facets that ranks know by their global nodes, each once and ascending, (k, d); on rank 0. Collective."""
     corners = spaces.global_numbers(problem.space, nodes.linear_facets(problem.space, facets))
-    return np.unique(joined(problem.domain.mesh.comm, np.sort(corners, axis=1)), axis=0)
+    return np.unique(joined(problem.comm, np.sort(corners, axis=1)), axis=0)
 
 
 def _regions(problem: Problem) -> dict[str, Integers]:
     """The cells of each region, by their numbers among the cells of all ranks; on rank 0. Collective."""
-    comm, parts = problem.domain.mesh.comm, nodes.parts_of_cell(problem.space)
-    owned = problem.domain.mesh.topology.index_map(problem.scales.dimension).size_local
+    comm, parts = problem.comm, nodes.parts_of_cell(problem.space)
+    owned = problem.domain.mesh.topology.index_map(problem.dimension).size_local
     first = int(sum(agree(comm, owned)[: comm.rank]))
 
     def numbers(cells: Entities) -> npt.NDArray[Any]:
@@ -105,7 +105,7 @@ def _loads(problem: Problem) -> dict[str, LoadArrays]:
 
 def _load(problem: Problem, facets: Entities, loads: Sequence[SurfaceLoad]) -> LoadArrays:
     """The loads on one part, added up, each vertex once; on rank 0. Collective."""
-    comm, d = problem.domain.mesh.comm, problem.scales.dimension
+    comm, d = problem.comm, problem.dimension
     local = np.unique(nodes.facet_nodes(problem.space, facets))
     values = np.zeros((len(local), d + 1))
     for load in loads:
@@ -125,7 +125,7 @@ def contact_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str,
         problem: what was solved.
         states: of the parts.
     """
-    comm, scales, found = problem.domain.mesh.comm, problem.scales, {}
+    comm, scales, found = problem.comm, problem.scales, {}
     for state in sorted(states, key=lambda state: state.surface.part):
         columns = {name: joined(comm, values) for name, values in columns_of(problem, state).items()}
         others = {name: joined(comm, values) for name, values in _others(problem, state).items()}
@@ -167,7 +167,7 @@ def columns_of(problem: Problem, state: ContactState) -> dict[str, Array]:
         problem: what was solved.
         state: of the part.
     """
-    scales, d = problem.scales, problem.scales.dimension
+    scales, d = problem.scales, problem.dimension
     u, p = scales.displacement, scales.stress
     found = {axis: state.surface.points[:, i] for i, axis in enumerate("xyz"[:d])}
     found["u_n"] = state.normal_displacement * u

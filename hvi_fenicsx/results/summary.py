@@ -53,7 +53,7 @@ def common(of: Solution | Preparation, dofs: int) -> dict[str, Any]:
         of: what was found, or the scene, assembled.
         dofs: the number of unknowns.
     """
-    comm = of.problem.domain.mesh.comm
+    comm = of.problem.comm
     return {
         "scene": of.scene.title,
         "dofs": dofs,
@@ -93,7 +93,7 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
     """Over all parts with contact: vertices, those closed, largest gap and penetration (m), resultant (N/m or N)."""
     examination, scales = solution.examination, solution.problem.scales
     states = [s for s in examination.states if s.bounds is not None] if examination else []
-    comm = solution.problem.domain.mesh.comm
+    comm = solution.problem.comm
     if not sum(agree(comm, len(solution.problem.bounds))) or examination is None:
         return None
     gaps = scales.displacement * np.concatenate([np.empty(0), *(s.gap[np.isfinite(s.gap)] for s in states)])
@@ -110,7 +110,7 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
 
 def _mode_mixity(solution: Solution) -> dict[str, float] | None:
     """By part with a law of both modes: the share of the slip in ∫ δ² ds; null without such a law. Collective."""
-    examination, comm = solution.examination, solution.problem.domain.mesh.comm
+    examination, comm = solution.examination, solution.problem.comm
     found = {}
     for state in examination.states if examination else ():
         if (law := state.of_both_modes) is not None:
@@ -124,7 +124,7 @@ def _resultants(solution: Solution) -> dict[str, list[float]] | None:
     """The forces on the body by place, N/m or N; null where nothing was solved. Collective."""
     if solution.forces is None:
         return None
-    found = solution.forces.resultants(solution.problem.domain.mesh.comm)
+    found = solution.forces.resultants(solution.problem.comm)
     return {name: [float(f) * solution.problem.scales.force for f in force] for name, force in found.items()}
 
 

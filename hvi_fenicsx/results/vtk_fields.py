@@ -53,7 +53,7 @@ def write_body(path: Path, solution: Solution, stress: Array) -> None:
     if len(problem.bodies.single()) > 1:
         cells["body"] = _in_parts(problem, problem.bodies.number_at(nodes.owned_cells(problem.space)[:, 0]))
     grid = _grid(problem, {"displacement": u, "reaction": _reactions(solution)}, cells)
-    vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", grid)])
+    vtk_files.write(path, problem.comm, [(0.0, 0, "", grid)])
 
 
 def _strain_of_parts(problem: Problem, u: Array) -> Array:
@@ -63,7 +63,7 @@ def _strain_of_parts(problem: Problem, u: Array) -> Array:
         problem: with the space.
         u: a displacement by its values at the nodes, (n, d).
     """
-    space, d = problem.space, problem.scales.dimension
+    space, d = problem.space, problem.dimension
     cell, variant = basix.CellType[space.mesh.topology.cell_name()], basix.LagrangeVariant.gll_warped
     lagrange = basix.create_element(basix.ElementFamily.P, cell, nodes.degree(space), variant)
     slopes: Array = np.asarray(lagrange.tabulate(1, nodes.middles_of_parts(space)[:, 1:]))[1:, :, :, 0]
@@ -80,7 +80,7 @@ def _reactions(solution: Solution) -> Array:
     problem = solution.problem
     assert solution.forces is not None
     reaction = fem.Function(problem.space)
-    by_vertex = reaction.x.array.reshape(-1, problem.scales.dimension)
+    by_vertex = reaction.x.array.reshape(-1, problem.dimension)
     for part in solution.forces.reactions.values():
         by_vertex[part.blocks] += part.values * problem.scales.force
     reaction.x.scatter_forward()
@@ -104,7 +104,7 @@ def _grid(
         cells=(np.cumsum(used) - 1)[cells],
         at_points={name: v[used] if v.ndim == 1 else in_space(v[used]) for name, v in at_points.items()},
         in_cells={n: v.reshape(len(v), math.prod(v.shape[1:])).astype(np.float32) for n, v in in_cells.items()},
-        units=_UNITS | {"reaction": "N/m" if problem.scales.dimension == 2 else "N"},
+        units=_UNITS | {"reaction": "N/m" if problem.dimension == 2 else "N"},
     )
 
 
@@ -127,7 +127,7 @@ def write_series(path: Path, problem: Problem, states: Iterable[tuple[float, flo
             grid = _grid(problem, {"displacement": field}, {"factor": np.full(count, factor)})
             yield time, 0, f"-{number:05d}", grid
 
-    vtk_files.write(path, problem.domain.mesh.comm, entries())
+    vtk_files.write(path, problem.comm, entries())
 
 
 def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
@@ -143,7 +143,7 @@ def write_escape(path: Path, problem: Problem, mode: Mode) -> None:
     """
     points = problem.points / problem.scales.length
     grid = _grid(problem, {"escape_mode": problem.bodies.motion(points, mode)}, {})
-    vtk_files.write(path, problem.domain.mesh.comm, [(0.0, 0, "", grid)])
+    vtk_files.write(path, problem.comm, [(0.0, 0, "", grid)])
 
 
 def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) -> None:
@@ -165,12 +165,12 @@ def write_contact(path: Path, problem: Problem, states: Sequence[ContactState]) 
         facets = problem.domain.facets([interface.sides.second for interface in problem.interfaces])
         second = _on_facets(problem, facets, {"traction": _second_tractions(problem, states)})
         entries.append((0.0, 1, "-second", second))
-    vtk_files.write(path, problem.domain.mesh.comm, entries)
+    vtk_files.write(path, problem.comm, entries)
 
 
 def _on_facets(problem: Problem, facets: Entities, nodal: Mapping[str, Array]) -> Grid:
     """This rank's facets as a mesh of their own, with some values at all local nodes of the body."""
-    mesh, d = problem.domain.mesh, problem.scales.dimension
+    mesh, d = problem.domain.mesh, problem.dimension
     owned = facets[facets < mesh.topology.index_map(d - 1).size_local]
     return _grid(problem, nodal, {}, nodes.linear_facets(problem.space, owned))
 

@@ -115,7 +115,7 @@ def _write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None
     if states:
         vtk_fields.write_contact(folder / "contact.pvd", problem, states)
     rows = list(boundary_rows(solution))
-    on_root(problem.domain.mesh.comm, lambda: write_table(folder / "boundary.csv", BOUNDARY, rows))
+    on_root(problem.comm, lambda: write_table(folder / "boundary.csv", BOUNDARY, rows))
 
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:
@@ -198,8 +198,8 @@ def boundary_rows(solution: Solution) -> Iterator[tuple[Any, ...]]:
     for one in problem.interfaces:
         facets[f"{one.name}{placed_forces.SECOND}"] = problem.domain.facets([one.sides.second])
     for name, own in facets.items():
-        rows = joined(problem.domain.mesh.comm, _at_vertices(solution, loads, name, own))
-        order = np.lexsort(rows[:, problem.scales.dimension - 1 :: -1].T)
+        rows = joined(problem.comm, _at_vertices(solution, loads, name, own))
+        order = np.lexsort(rows[:, problem.dimension - 1 :: -1].T)
         yield from ((name, *row) for row in rows[order].tolist())
 
 
@@ -207,7 +207,7 @@ def _at_vertices(solution: Solution, loads: Mapping[str, NodalForces], part: str
     """The numbers at the vertices of a part that this rank owns, (m, 12); NaN: none. Collective."""
     problem, forces = solution.problem, solution.forces
     blocks = own_nodes(problem.space, facets)
-    d, scales = problem.scales.dimension, problem.scales
+    d, scales = problem.dimension, problem.scales
     found = np.full((len(blocks), len(_QUANTITIES), 3), np.nan)
     found[:, 0, :d] = problem.positions[blocks, :d]
     if part in loads:

@@ -71,7 +71,7 @@ class ConvergenceTest:
         self._system, self._thresholds = system, system.thresholds
         rows = system.jacobian.rows.dofs
         self._limits = traction_limits(system)[rows]
-        self._blocks = rows // system.problem.scales.dimension
+        self._blocks = rows // system.problem.dimension
         self._near = self._thresholds.near * system.references.at(self._blocks)
         self._loads = NodalForces.of(system.pushing)
         self._masks: list[Mask] | None = None

@@ -74,7 +74,7 @@ def _energies(problem: Problem, u: fem.Function) -> list[Array]:
     found, values = [], problem.relative(u.x.array)
     for term in problem.terms:
         components = term.slip(values)
-        size = largest(problem.domain.mesh.comm, magnitude(components))
+        size = largest(problem.comm, magnitude(components))
         found.append(term.energies_of(components, np.full(len(components), DEFAULT.near * size)))
     return found
 

@@ -136,7 +136,7 @@ def decides_stability(options: SolverTable, system: System) -> bool:
     """
     if options.second_order is not None:
         return options.second_order
-    return system.thresholds.is_direct(system.dofs, system.problem.scales.dimension)
+    return system.thresholds.is_direct(system.dofs, system.problem.dimension)
 
 
 @functools.cache

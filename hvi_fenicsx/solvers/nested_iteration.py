@@ -325,7 +325,7 @@ def make_admissible(x: PETSc.Vec, system: System) -> None:
         x: the unknowns, changed in place.
         system: with bounds and prescribed values.
     """
-    at, d = system.jacobian.rows.dofs, system.problem.scales.dimension
+    at, d = system.jacobian.rows.dofs, system.problem.dimension
     near = system.thresholds.near * system.references.at(at // d)
     values, lower, upper = (vector.array_r[at] for vector in (x, system.lower, system.upper))
     values = np.where(values <= lower + near, lower, np.where(values >= upper - near, upper, values))

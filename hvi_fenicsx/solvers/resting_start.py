@@ -46,7 +46,7 @@ def resting_start(
     system = solver.system
     rtol = system.thresholds.loose if rtol is None else rtol
     contact = contact_dofs(system)
-    bodies = system.problem.bodies.labels[contact // system.problem.scales.dimension]
+    bodies = system.problem.bodies.labels[contact // system.problem.dimension]
     closing = contact[system.references.driven[bodies]]
     x = system.undisplaced()
     x.array[closing] = closed(system.lower.array_r[closing], system.upper.array_r[closing])

@@ -40,7 +40,7 @@ def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvabilit
         problem: the problem.
         forces: its load vectors by name.
     """
-    comm = problem.domain.mesh.comm
+    comm = problem.comm
     found = combine([analyse(comm, body) for body in rigid_problems(problem, forces)])
     if (obstacles := _with_obstacles(problem, forces)) is not None:
         known = [_of_body(body, analyse(comm, body)) for body in obstacles]
@@ -59,7 +59,7 @@ def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], *loads: str)
     Raises:
         InputError: on all ranks alike: there is no such load.
     """
-    comm, bodies = problem.domain.mesh.comm, _with_obstacles(problem, forces) or rigid_problems(problem, forces)
+    comm, bodies = problem.comm, _with_obstacles(problem, forces) or rigid_problems(problem, forces)
     known = list(dict.fromkeys(n for body in bodies for n in body.loads))
     names = [load_name(known, load) for load in loads]
     found = rigid.combine_factors([_limits(body, rigid.load_factors(comm, body, *names)) for body in bodies])
@@ -149,7 +149,7 @@ def motions(problem: Problem, *, contact_closed: bool, without: Sequence[Mode] =
     found: list[Mode] = []
     for body in problem.bodies:
         held = [normals(problem, body, b.surface) for b in problem.bounds] if contact_closed else []
-        basis = kernel(problem.domain.mesh.comm, body, (prescribed(problem, body), *held))
+        basis = kernel(problem.comm, body, (prescribed(problem, body), *held))
         left_out = np.array([mode.coefficients for mode in without if mode.body == body.index])
         if len(left_out):
             basis = basis @ null_space(left_out @ basis)
@@ -224,14 +224,14 @@ def prescribed(problem: Problem, body: JoinedBodies) -> Array:
         problem: the problem.
         body: the body.
     """
-    d, dofs = problem.scales.dimension, problem.fixed_here
+    d, dofs = problem.dimension, problem.fixed_here
     dofs = dofs[inside(problem, body, dofs // d)]
     return works(np.eye(d)[dofs % d], problem.motions_at(dofs // d, body))
 
 
 def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: JoinedBodies) -> tuple[dict[str, Array], float]:
     """<g, y> of each load on the rigid basis, and the sum of the absolute nodal forces. Collective."""
-    comm, d = problem.domain.mesh.comm, problem.scales.dimension
+    comm, d = problem.comm, problem.dimension
     points = problem.points
     found, size = {}, 0.0
     for name, force in forces.items():
@@ -252,7 +252,7 @@ def acts_on(problem: Problem, body: JoinedBodies, surface: Surface) -> bool:
         surface: the part.
     """
     mine = bool(inside(problem, body, surface.blocks).any())
-    return bool(problem.domain.mesh.comm.allreduce(mine, op=MPI.LOR))
+    return bool(problem.comm.allreduce(mine, op=MPI.LOR))
 
 
 def _resistance(problem: Problem, body: JoinedBodies, term: LawTerm) -> Resistance:
@@ -315,10 +315,10 @@ def _body(problem: Problem, nodes: Integers) -> int:
     """The number of the body of a side. Collective."""
     start, end = problem.space.dofmap.index_map.local_range
     here = nodes[(nodes >= start) & (nodes < end)] - start
-    found = agree(problem.domain.mesh.comm, problem.bodies.number_at(here[:1]))
+    found = agree(problem.comm, problem.bodies.number_at(here[:1]))
     return int(np.concatenate(found)[0])
 
 
 def _most(problem: Problem, values: Array) -> float:
     """The largest value of all ranks. Collective."""
-    return largest(problem.domain.mesh.comm, float(values.max(initial=-np.inf)))
+    return largest(problem.comm, float(values.max(initial=-np.inf)))

@@ -277,7 +277,7 @@ class LinearSettings:
             levels: whether the system has coarser levels when it is solved.
         """
         thresholds = system.thresholds
-        small = thresholds.is_direct(system.dofs, system.problem.scales.dimension)
+        small = thresholds.is_direct(system.dofs, system.problem.dimension)
         if wanted != "auto":
             return cls(wanted, small)
         stiff, degree = system.problem.bulk.volumetric_ratio, nodes.degree(system.problem.space)

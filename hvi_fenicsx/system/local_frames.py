@@ -82,7 +82,7 @@ class LocalFrames:
             problem: the problem.
             like: a matrix with the same rows.
         """
-        d = problem.scales.dimension
+        d = problem.dimension
         q = PETSc.Mat().createAIJ(like.getSizes(), bsize=d, nnz=d, comm=like.comm)
         start, end = like.getOwnershipRange()
         rows = np.arange(start // d, end // d, dtype=PETSc.IntType)
@@ -97,7 +97,7 @@ def frames_of(problem: Problem) -> LocalFrames | None:
     Args:
         problem: the problem.
     """
-    d, comm = problem.scales.dimension, problem.domain.mesh.comm
+    d, comm = problem.dimension, problem.comm
     if not any(agree(comm, any(_slanted(s.normals).any() for s in problem.surfaces))):
         return None
     slanted = _normals_at_slanted(problem)

@@ -201,7 +201,7 @@ class Algebraic:
     def __init__(self, system: System, options: Mapping[str, object]) -> None:
         self._system, self._options = system, options
         self.pc, self.matrix = self._new(), system.jacobian.matrix.copy()
-        self.matrix.setBlockSize(system.problem.scales.dimension)
+        self.matrix.setBlockSize(system.problem.dimension)
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.matrix.setOption(PETSc.Mat.Option.SPD, True)
         self.matrix.setNearNullSpace(system.near_null)

@@ -141,7 +141,7 @@ class Motions:
         if len(fields) and closed:
             fixed = existence.prescribed(problem, body)
             rows = [existence.normals(problem, body, surface, mask) for surface, mask in closed]
-            unseen = kernel(problem.domain.mesh.comm, body, [fixed, *rows])
+            unseen = kernel(problem.comm, body, [fixed, *rows])
             if unseen.shape[1] < len(fields):
                 combined = np.linalg.pinv(coefficients) @ unseen
                 fields = np.concatenate([fields, np.tensordot(combined, fields, (0, 0))])
@@ -155,10 +155,10 @@ class Motions:
 
 def _supported(problem: Problem, body: JoinedBodies) -> tuple[Array, Array]:
     """The motions that the supports of a body leave, as coefficients, and at this rank's vertices. Collective."""
-    free = kernel(problem.domain.mesh.comm, body, [existence.prescribed(problem, body)])
+    free = kernel(problem.comm, body, [existence.prescribed(problem, body)])
     here = problem.space.dofmap.index_map.size_local
     mine = np.flatnonzero(problem.bodies.labels[:here] == body.index).astype(np.int32)
-    fields = np.zeros((free.shape[1], here, problem.scales.dimension))
+    fields = np.zeros((free.shape[1], here, problem.dimension))
     fields[:, mine] = np.moveaxis(np.tensordot(problem.motions_at(mine, body), free, (1, 0)), 2, 0)
     return free, fields
 
@@ -280,7 +280,7 @@ def along(references: References, motions: Motions, acting: ActingForces) -> Net
     )
     left = np.tensordot(motions.fields, acting.left)
     sums = np.array([left, loads[0], carry[1], could[1], loads[2] + carry[2], motions.squares, *spare])
-    references.problem.domain.mesh.comm.Allreduce(MPI.IN_PLACE, sums)
+    references.problem.comm.Allreduce(MPI.IN_PLACE, sums)
     left, push, held, able, sizes, squares, fall, rise = sums
     scale = np.max([np.abs(push), held, able], axis=0) * np.sqrt(squares) * references.surface[motions.body]
     free = np.maximum(np.abs(left) - np.where(left > 0, fall, rise), 0.0)

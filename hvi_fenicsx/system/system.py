@@ -81,7 +81,7 @@ class System:
     @property
     def comm(self) -> MPI.Comm:
         """The communicator."""
-        return self.problem.domain.mesh.comm
+        return self.problem.comm
 
     @property
     def _owned(self) -> int:
@@ -231,7 +231,7 @@ class System:
 
     def _sum_of(self, forces: Mapping[str, PETSc.Vec]) -> Array:
         """The sum of some load vectors as bounds and laws balance it, (vertices, d). Collective."""
-        d = self.problem.scales.dimension
+        d = self.problem.dimension
         total = sum((force.array_r for force in forces.values()), np.zeros(self._owned))
         return self.problem.combined(np.array(total).reshape(-1, d))
 
@@ -248,7 +248,7 @@ class System:
             return stiffness
         coupled = stiffness.ptap(self.problem.coupling.matrix)
         coupled.setLGMap(*stiffness.getLGMap())
-        coupled.setBlockSize(self.problem.scales.dimension)
+        coupled.setBlockSize(self.problem.dimension)
         stiffness.destroy()
         return coupled
 
