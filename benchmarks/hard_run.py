@@ -7,6 +7,7 @@ import inspect
 import time
 import traceback
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Any
 
 import hard_scenes
@@ -90,7 +91,7 @@ def _equilibrium(case: Case, data: Mapping[str, Any], prepared: Preparation, lat
         "branch": found.counts.branch,
         "claimed": found.converged,
         "energy": proof.energy,
-        "certificate": proof.certificate.as_dict(),
+        "certificate": asdict(proof.certificate),
     }
 
 

@@ -7,7 +7,7 @@ largest of all bodies; ``passed`` means that all of them are within the toleranc
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
@@ -67,10 +67,6 @@ class Certificate:
         """Whether it is missed by no more than rounding may be."""
         names = ("equilibrium", "net_force", "penetration", "tension", "complementarity", "inclusion")
         return not self.passed and max(getattr(self, name) for name in names) <= DEFAULT.largest_rounding
-
-    def as_dict(self) -> dict[str, float | str | bool | None]:
-        """For ``summary.json``."""
-        return asdict(self)
 
     def __str__(self) -> str:
         mixity = "" if self.mixity is None else f", mixity {self.mixity:.1e}"

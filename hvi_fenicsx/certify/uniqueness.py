@@ -18,7 +18,7 @@ motions: contact that bears F tells the obstacle's position. With rigid motions 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -99,10 +99,6 @@ class Uniqueness:
 
     state: Literal["unique", "lowest", "unknown"]
     why: str
-
-    def as_dict(self) -> dict[str, str]:
-        """For ``summary.json``."""
-        return asdict(self)
 
 
 def is_convex(system: System) -> bool:

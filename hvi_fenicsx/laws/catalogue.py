@@ -22,8 +22,15 @@ from .registry import require_number, require_ordered, require_positive
 from .traction_graph import TractionGraph
 
 
+class _PositiveLaw(PolylineLaw):
+    """A law all of whose parameters are > 0."""
+
+    def __post_init__(self) -> None:
+        require_positive(self._title, **vars(self))
+
+
 @dataclass(frozen=True)
-class QuadraticLinear(PolylineLaw):
+class QuadraticLinear(_PositiveLaw):
     """j(x) = min{γ1/(2δ) x², γ2 |x|}: the traction rises to γ1 at δ, drops to γ2 = γ1/2 and stays there.
 
     Ovcharova and Gwinner, section 5.1, read as an even law. The two pieces cross at 2 δ γ2/γ1; only with
@@ -36,8 +43,9 @@ class QuadraticLinear(PolylineLaw):
     gamma2: float
     delta: float
 
+    @override
     def __post_init__(self) -> None:
-        require_positive(self._title, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
+        super().__post_init__()
         if abs(self.gamma1 - 2.0 * self.gamma2) > 1e-12 * self.gamma1:
             raise InputError(
                 f"{self._title}: gamma1 = {self.gamma1!r} must be 2 gamma2 = {2 * self.gamma2!r}: then "
@@ -51,7 +59,7 @@ class QuadraticLinear(PolylineLaw):
 
 
 @dataclass(frozen=True)
-class QuadraticLinearLiteral(PolylineLaw):
+class QuadraticLinearLiteral(_PositiveLaw):
     """j(x) = min{γ1/(2δ) x², γ2 x}, the formula of Ovcharova and Gwinner read literally, on the whole line.
 
     For x < 0 the traction is +γ2 and pushes the body on; at 0 it drops to 0 (a concave kink), then rises to
@@ -63,9 +71,6 @@ class QuadraticLinearLiteral(PolylineLaw):
     gamma1: float
     gamma2: float
     delta: float
-
-    def __post_init__(self) -> None:
-        require_positive(self._title, gamma1=self.gamma1, gamma2=self.gamma2, delta=self.delta)
 
     @override
     def build(self) -> TractionGraph:
@@ -79,7 +84,7 @@ class QuadraticLinearLiteral(PolylineLaw):
 
 
 @dataclass(frozen=True)
-class Tresca(PolylineLaw):
+class Tresca(_PositiveLaw):
     """j(x) = yield_traction |x|: no slip below the yield traction, slip at it. The kink at 0 is convex.
 
     The law has no length of its own; `reference_slip` (m) serves its energy scale and so the relative
@@ -91,25 +96,19 @@ class Tresca(PolylineLaw):
     yield_traction: float
     reference_slip: float = 1e-6
 
-    def __post_init__(self) -> None:
-        require_positive(self._title, yield_traction=self.yield_traction, reference_slip=self.reference_slip)
-
     @override
     def build(self) -> TractionGraph:
         return TractionGraph.from_points([(0.0, self.yield_traction)])
 
 
 @dataclass(frozen=True)
-class LinearSpring(PolylineLaw):
+class LinearSpring(_PositiveLaw):
     """j(x) = ½ stiffness x², stiffness in N/m³. There is no kink; `reference_slip` (m) gives the energy scale only."""
 
     name = "linear_spring"
     units: ClassVar[Units] = {"stiffness": "traction"}
     stiffness: float
     reference_slip: float = 1e-6
-
-    def __post_init__(self) -> None:
-        require_positive(self._title, stiffness=self.stiffness, reference_slip=self.reference_slip)
 
     @override
     def build(self) -> TractionGraph:

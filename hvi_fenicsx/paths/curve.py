@@ -40,10 +40,7 @@ class CurvedBranch(Events):
         length: of the next step.
     """
 
-    def __init__(self, points: ContactPoints, constant: Array, rate: Array, z: Array, factor: float) -> None:
-        super().__init__(points, constant, rate, z, factor)
-        self.length = self._next = 0.1
-        self._far = DEFAULT.far * float(np.max(np.abs(self.here.values.s), initial=1.0))
+    length = _next = 0.1
 
     @override
     def advance(self, aim: float) -> CurveStep:
@@ -264,5 +261,7 @@ def branch_from(
         inverse: of the straight equations, where it is known.
     """
     if points.straight:
-        return StraightBranch(points, constant, rate, z, factor, inverse)
+        branch = StraightBranch(points, constant, rate, z, factor)
+        branch.start(inverse)
+        return branch
     return CurvedBranch(points, constant, rate, z, factor)

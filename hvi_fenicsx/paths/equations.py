@@ -66,6 +66,7 @@ class CurveEquations(Branch):
         self._held: Array = np.empty((0, len(z)))
         left = (points.stiffness @ values.x + values.force - constant - factor * rate) / points.forces
         self.here = CurvePoint(y=y, tangent=np.zeros_like(y), values=values, left=left)
+        self._far = DEFAULT.far * max(magnitude(values.s), 1.0)
         self._factors: Bordered | None = None
         self.stood = np.zeros(len(points), dtype=bool)
 

@@ -20,7 +20,6 @@ from typing_extensions import override
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, Integers, magnitude
 from .branch import Move, Passage, StepEnd, event_between
-from .relations import ContactPoints
 from .segments import piece_at
 from .state import Position
 from .straight_equations import FACTOR, StraightEquations
@@ -36,32 +35,27 @@ class StraightBranch(StraightEquations):
         rate: f1, (n,).
         z: their coordinates, (n,).
         factor: λ.
-        inverse: of the equations, where it is known and the factor drives.
 
     Attributes:
         heading: the direction of the variable that drives, 1 or -1.
         small: parts of the order ε of the coordinates, (n,).
         rates: how all variables change with the driving one, (n + 1,).
-
-    Raises:
-        numpy.linalg.LinAlgError: the tangent is singular.
     """
 
-    def __init__(
-        self,
-        points: ContactPoints,
-        constant: Array,
-        rate: Array,
-        z: Array,
-        factor: float,
-        inverse: CellInverse | None = None,
-    ) -> None:
-        super().__init__(points, constant, rate, z, factor)
+    def start(self, inverse: CellInverse | None) -> None:
+        """Set out with the factor.
+
+        Args:
+            inverse: of the equations, where it is known.
+
+        Raises:
+            numpy.linalg.LinAlgError: the tangent is singular.
+        """
         self.heading, self.trend, self.unstable, self._leader = 1, 0, 0, 0
-        self._stiffest, self._live = magnitude(self._stiffness.diagonal), magnitude(rate)
-        random = np.random.default_rng(0)
+        self._stiffest, self._live = magnitude(self._stiffness.diagonal), magnitude(self.rate)
+        random, z = np.random.default_rng(0), self.z
         # coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them
-        self.small = random.uniform(0.5, 1.5, len(z)) * np.where(z == points.high, -1.0, 1.0)
+        self.small = random.uniform(0.5, 1.5, len(z)) * np.where(z == self.points.high, -1.0, 1.0)
         self._lag = random.uniform(0.5, 1.5, len(z))
         self._behind = self._lag.copy()
         self._begin(FACTOR, inverse)

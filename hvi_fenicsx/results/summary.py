@@ -33,10 +33,10 @@ def summary(solution: Solution) -> dict[str, Any]:
             "contact": _contact(solution),
             "mode_mixity": _mode_mixity(solution),
             "resultants": _resultants(solution),
-            "certificate": solution.certificate.as_dict() if solution.certificate else None,
+            "certificate": asdict(solution.certificate) if solution.certificate else None,
             "last_borne": _last_borne(solution),
             "obstacle": solution.obstacle.summary() if solution.obstacle else None,
-            "uniqueness": solution.uniqueness.as_dict() if solution.uniqueness else None,
+            "uniqueness": asdict(solution.uniqueness) if solution.uniqueness else None,
             "estimate": _estimate(solution),
             "accuracy": None,
             "warnings": list(solution.warnings),
@@ -69,7 +69,7 @@ def _last_borne(solution: Solution) -> dict[str, Any] | None:
     """The factor of the loads under which the state that is written is in equilibrium, and its certificate."""
     if solution.last_borne is None or solution.examination is None:
         return None
-    return {"factor": solution.last_borne.factor, "certificate": solution.examination.certificate.as_dict()}
+    return {"factor": solution.last_borne.factor, "certificate": asdict(solution.examination.certificate)}
 
 
 def _iterations(solution: Solution) -> dict[str, int] | None:

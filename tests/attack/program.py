@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,7 @@ def run(scene_file: Path, limit: float = 60.0) -> Answer:
         state=str(verdict.state),
         factors=(verdict.lambda_held, verdict.lambda_peak),
         paper=bool(verdict.paper.satisfied),
-        certificate=seen.certificate.as_dict() if seen else None,
+        certificate=asdict(seen.certificate) if seen else None,
         energy=seen.energy * problem.scales.energy if seen else np.nan,
         points=points.copy(),
         u=found.u.x.array.reshape(-1, d)[: len(points)] * problem.scales.displacement if found else None,
