@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix, vstack
+from scipy.sparse import csr_array, vstack
 
 from ..errors import Interrupted, SolverError
 from ..runtime.mpi import agree
@@ -77,16 +77,16 @@ class Interior:
         first = sum(agree(self._comm, len(self.kept))[: self._comm.rank])
         return slice(first, first + len(self.kept))
 
-    def _columns(self, matrix: PETSc.Mat) -> csr_matrix:
+    def _columns(self, matrix: PETSc.Mat) -> csr_array:
         """The columns of kept unknowns in a matrix, this rank's rows, (rows, n)."""
         rows, total = matrix.getLocalSize()[0], matrix.getSize()[1]
-        return csr_matrix(matrix.getValuesCSR()[::-1], shape=(rows, total))[:, self._everywhere]
+        return csr_array(matrix.getValuesCSR()[::-1], shape=(rows, total))[:, self._everywhere]
 
-    def _coupled(self) -> csr_matrix:
-        found = csr_matrix(vstack([self._columns(block) for block in self.form.columns]))
+    def _coupled(self) -> csr_array:
+        found = csr_array(vstack([self._columns(block) for block in self.form.columns]))
         inner = np.ones(found.shape[0])
         inner[self._held] = 0.0
-        return csr_matrix(found.multiply(inner[:, None]))
+        return csr_array(found.multiply(inner[:, None]))
 
     def solve(self, right: Array) -> Array:
         """A_ii⁻¹ times columns, zero at kept unknowns, (inner, k). Collective.
@@ -104,10 +104,10 @@ class Interior:
         found[: len(right)] = right
         return found
 
-    def own(self) -> csr_matrix:
+    def own(self) -> csr_array:
         """This rank's rows of A_kk, (kept unknowns here, n)."""
         rows = self.form.contact_rows
-        return csr_matrix(self._columns(rows.bulk)[np.searchsorted(rows.dofs, self.kept)])
+        return csr_array(self._columns(rows.bulk)[np.searchsorted(rows.dofs, self.kept)])
 
     def stiffness(self, interrupted: Callable[[], bool] = lambda: False) -> Array:
         """The Schur complement S, (n, n). Collective.
@@ -153,7 +153,7 @@ class Interior:
         Args:
             inner: as :meth:`solve` returns it, (inner, k).
         """
-        return np.asarray(self._comm.allreduce(self.coupling.T @ inner))
+        return self._comm.allreduce(self.coupling.T @ inner)
 
     def loads(self, right: Array) -> Array:
         """The condensed loads b_k - A_ki A_ii⁻¹ b_i, (n, k). Collective.
