@@ -36,20 +36,17 @@ class Block(DomainShape):
 
     @model_validator(mode="after")
     def _affordable(self) -> Self:
-        unknowns = self._unknowns()
+        unknowns = self.unknowns(self.dimension)
         if unknowns > _MOST_UNKNOWNS:
             text = f"make {unknowns:.1e} unknowns; {_MOST_UNKNOWNS:.1e} at most: use fewer cells"
             raise validation_error([Mistake(("cells",), text)])
         return self
 
-    def _unknowns(self) -> int:
-        return self.dimension * math.prod(n + 1 for n in self.cells)
-
     def build(self, comm: MPI.Comm, dimension: int) -> Domain:
         """The block in triangles or tetrahedra. Collective."""
         from .. import blocks, domain
 
-        domain.check_affordable(comm, self._unknowns(), self.dimension, "domain.cells", "use fewer cells")
+        domain.check_affordable(comm, self.unknowns(dimension), self.dimension, "domain.cells", "use fewer cells")
         return blocks.block(comm, self.size, self.cells)
 
     def build_hierarchy(self, comm: MPI.Comm, dimension: int) -> Domain:
@@ -94,7 +91,7 @@ class Block(DomainShape):
 
     def unknowns(self, dimension: int) -> float:
         """The number of unknowns."""
-        return float(self._unknowns())
+        return float(self.dimension * math.prod(n + 1 for n in self.cells))
 
 
 class Rectangle(Block):
@@ -196,9 +193,14 @@ class PlaneShape(DomainShape):
 
 
 class Round(PlaneShape):
-    """A disk or a part of it that touches y = 0 at the origin, where its mesh may be finer."""
+    """A disk or a part of it that touches y = 0 at the origin, where its mesh may be finer.
+
+    Class attributes:
+        order: the sides between the corners of the outline, counterclockwise from the left one.
+    """
 
     mesh_sizes = ("mesh_size", "mesh_size_below")
+    order: ClassVar[tuple[str, ...]]
 
     radius: Length
     """radius of the disk, m"""
@@ -211,6 +213,13 @@ class Round(PlaneShape):
     def finest(self) -> float:
         """The mesh size at the lowest point, m."""
         return self.mesh_size_below or self.mesh_size
+
+    def outline(self) -> Outline:
+        """The arcs, the lowest point being a corner, and the flat side of a part."""
+        r, coarse = self.radius, self.mesh_size
+        sides = [(name, None if name == "top" else (0.0, r)) for name in self.order]
+        count, points = len(sides), [(-r, r), (0.0, 0.0), (r, r), (0.0, 2 * r)]
+        return Outline(points[:count], sides, [coarse, self.finest, coarse, coarse][:count])
 
     def box_area(self) -> float:
         """Area of the square around the whole disk, m²."""
@@ -227,55 +236,50 @@ class Disk(Round):
     """A disk whose lowest point is the origin."""
 
     normals: ClassVar = {"lower_arc": None, "upper_arc": None}
+    order = ("lower_arc", "lower_arc", "upper_arc", "upper_arc")
 
     shape: Literal["disk"] = "disk"
     """the centre is (0, radius); sides lower_arc, upper_arc"""
-
-    def outline(self) -> Outline:
-        """Four arcs, the lowest point being a corner."""
-        r, coarse = self.radius, self.mesh_size
-        sides = [("lower_arc", (0.0, r))] * 2 + [("upper_arc", (0.0, r))] * 2
-        return Outline([(-r, r), (0.0, 0.0), (r, r), (0.0, 2 * r)], sides, [coarse, self.finest, coarse, coarse])
 
 
 class HalfDisk(Round):
     """The lower half of a disk whose lowest point is the origin."""
 
     normals: ClassVar = {"arc": None, "top": 1}
+    order = ("arc", "arc", "top")
 
     shape: Literal["half_disk"] = "half_disk"
     """the centre is (0, radius); sides arc, top (the flat side)"""
 
-    def outline(self) -> Outline:
-        """Two arcs, the lowest point being a corner, and the flat top."""
-        r, coarse = self.radius, self.mesh_size
-        sides = [("arc", (0.0, r)), ("arc", (0.0, r)), ("top", None)]
-        return Outline([(-r, r), (0.0, 0.0), (r, r)], sides, [coarse, self.finest, coarse])
+
+class _Cut(PlaneShape):
+    """A rectangle without a part of it, whose size is the field ``part``."""
+
+    part: ClassVar[str]
+
+    size: Annotated[tuple[Length, Length], vector(2)]
+    """width and height, m, a list of 2; the lower left corner is the origin"""
+
+    @model_validator(mode="after")
+    def _leaves_something(self) -> Self:
+        width, height = getattr(self, self.part)
+        if width >= self.size[0] or height >= self.size[1]:
+            raise validation_error([Mistake((self.part,), "must be smaller than size in both directions")])
+        return self
 
 
-def _check_smaller(name: str, part: tuple[float, float], size: tuple[float, float]) -> None:
-    if part[0] >= size[0] or part[1] >= size[1]:
-        raise validation_error([Mistake((name,), "must be smaller than size in both directions")])
-
-
-class LShape(PlaneShape):
+class LShape(_Cut):
     """An L: a rectangle without a smaller rectangle at its upper right corner."""
 
     normals: ClassVar = {"left": 0, "right": 0, "bottom": 1, "top": 1, "inner_right": 0, "inner_top": 1}
+    part = "cut"
 
     shape: Literal["l_shape"] = "l_shape"
     """sides left, right, bottom, top, and inner_right, inner_top, which meet at the re-entrant corner"""
-    size: Annotated[tuple[Length, Length], vector(2)]
-    """width and height, m, a list of 2; the lower left corner is the origin"""
     cut: Annotated[tuple[Length, Length], vector(2)]
     """width and height of the smaller rectangle, m, a list of 2"""
     mesh_size: Length
     """edge length of the triangles, m"""
-
-    @model_validator(mode="after")
-    def _leaves_an_l(self) -> Self:
-        _check_smaller("cut", self.cut, self.size)
-        return self
 
     def outline(self) -> Outline:
         """The six sides."""
@@ -284,24 +288,18 @@ class LShape(PlaneShape):
         return Outline.polygon(points, ["bottom", "right", "inner_top", "inner_right", "top", "left"], self.mesh_size)
 
 
-class NotchedStrip(PlaneShape):
+class NotchedStrip(_Cut):
     """A rectangle with a V-shaped notch in the middle of its top side."""
 
     normals: ClassVar = {"left": 0, "right": 0, "bottom": 1, "top": 1, "notch": None}
+    part = "notch"
 
     shape: Literal["notched_strip"] = "notched_strip"
     """sides left, right, bottom, top (both pieces), notch (both flanks)"""
-    size: Annotated[tuple[Length, Length], vector(2)]
-    """width and height, m, a list of 2; the lower left corner is the origin"""
     notch: Annotated[tuple[Length, Length], vector(2)]
     """width and depth of the notch, m, a list of 2"""
     mesh_size: Length
     """edge length of the triangles, m"""
-
-    @model_validator(mode="after")
-    def _leaves_a_strip(self) -> Self:
-        _check_smaller("notch", self.notch, self.size)
-        return self
 
     def outline(self) -> Outline:
         """The seven sides, two of which are the notch and two the top."""
