@@ -142,9 +142,9 @@ class _Run:
         scene, last = level.solution.scene, None if self._failures else self.steps[-1]
         degree, dimension = scene.solver.degree or 1, scene.dimension
         if last is not None and math.isfinite(last.error):  # at the best rate of convergence
-            rate, missing = self._quantity.power_of_energy * degree / dimension, last.error / self._accuracy
+            power, missing = (1 if self._quantity.in_energy_norm else 2), last.error / self._accuracy
             with np.errstate(over="ignore"):
-                self._check_affordable(level.dofs * np.maximum(1.0, missing) ** (1.0 / rate), scene)
+                self._check_affordable(level.dofs * np.maximum(1.0, missing) ** (dimension / (power * degree)), scene)
         if self.steps:
             scene = self._scene(scene, self.steps[-1])
         if last is not None and self._mesh_suffices():

@@ -68,11 +68,6 @@ class Quantity(ABC):
         """The estimated relative error on the last level; infinite where none is known yet. Collective."""
 
     @property
-    def power_of_energy(self) -> int:
-        """The power of the error in the energy norm with which its own falls at best."""
-        return 1 if self.in_energy_norm else 2
-
-    @property
     def known_from_one_mesh(self) -> bool:
         """Whether one mesh is enough to estimate the error."""
         return self.estimated

@@ -70,7 +70,7 @@ class ModelPath(LoadPath):
         Raises:
             InputError: there is no such part.
         """
-        return np.array([row.forces[self._known(part)] for row in self.rows])
+        return self._at_rows("forces", part)
 
     def displacement(self, part: str) -> Array:
         """The mean displacement of a part, m; (rows, d).
@@ -81,12 +81,12 @@ class ModelPath(LoadPath):
         Raises:
             InputError: there is no such part.
         """
-        return np.array([row.displacements[self._known(part)] for row in self.rows])
+        return self._at_rows("displacements", part)
 
-    def _known(self, part: str) -> str:
+    def _at_rows(self, what: str, part: str) -> Array:
         if part not in self.parts:
             raise InputError(f"nothing drives or holds {part!r}; there are: {', '.join(self.parts)}")
-        return part
+        return np.array([getattr(row, what)[part] for row in self.rows])
 
     def u(self, row: int) -> fem.Function:
         """The displacement at a row, m, ghosts updated; as :attr:`.ModelSolution.u`. Collective.

@@ -70,9 +70,10 @@ def write_path(folder: Path) -> Path:
         NotWrittenError: the page cannot be written.
     """
     result = reader.read_path(folder)
+    peaks = result.path["peak_forces"]
+    largest = max((abs(f) for found in peaks.values() for f in found["force"]), default=0.0)
     forces = {
-        part: {**found, "force": [unless_noise(f, result.largest_force) for f in found["force"]]}
-        for part, found in result.path["peak_forces"].items()
+        part: {**found, "force": [unless_noise(f, largest) for f in found["force"]]} for part, found in peaks.items()
     }
     return _page("path.html.j2", folder, result.title, result=result, forces=forces)
 

@@ -217,11 +217,6 @@ class PathResult(Finished):
         """Which rows are stable, (rows,)."""
         return self.columns["stable"] == 1.0
 
-    @property
-    def largest_force(self) -> float:
-        """The largest component of a force on any part, N or N/m."""
-        return max((abs(f) for found in self.path["peak_forces"].values() for f in found["force"]), default=0.0)
-
     @cached_property
     def driven(self) -> str | None:
         """The part that is drawn: of those that the factor drives the one whose force goes the longest way.

@@ -83,7 +83,7 @@ def number(value: float, digits: int = 6) -> str:
         return text.replace("-", "−")
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     mantissa = (mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa).replace("-", "−")
-    power = _power(int(exponent))
+    power = "10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return mantissa.replace("1", power) if mantissa in ("1", "−1") else f"{mantissa}·{power}"
 
 
@@ -100,11 +100,6 @@ def unless_noise(value: float, beside: float) -> float:
 def thousands(whole: int) -> str:
     """A whole number, its thousands apart."""
     return f"{whole:,}".replace(",", _NARROW)
-
-
-def _power(exponent: int) -> str:
-    """A power of ten in letters."""
-    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _digits(value: float) -> str:

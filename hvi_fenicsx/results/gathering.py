@@ -64,7 +64,7 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
         u = spaces.values(problem.space, solution.solve_result.u.x.array)
         fields["displacement"] = u[:owned] * problem.scales.displacement
     elif (mode := solution.solvability.direction) is not None:
-        fields["escape_mode"] = problem.bodies.motion(np.asarray(problem.points / problem.scales.length), mode)[:owned]
+        fields["escape_mode"] = problem.bodies.motion(problem.points / problem.scales.length, mode)[:owned]
     if stress is not None:
         fields["von_mises"] = von_mises(stress).astype(np.float32)
     found: dict[str, Any] = {name: joined(comm, values) for name, values in fields.items()}
@@ -233,7 +233,8 @@ def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, 
     within = np.unique(pairs[np.isin(pairs, numbers).all(axis=1)], axis=0)
     edges = by_number[np.searchsorted(numbers[by_number], within)]
     inner = np.unique(edges[:, 1])
-    found = [chain if chain[0] in inner else _oriented(chain, rank) for chain in chains(edges, rank)]
+    ahead = ((c, c[0] in inner or rank[c[0]] <= rank[c[-1]]) for c in chains(edges, rank))
+    found = [chain if kept else chain[::-1] for chain, kept in ahead]
     found += [np.array([alone]) for alone in np.setdiff1d(np.arange(len(points)), edges)]
     found.sort(key=lambda chain: int(np.min(rank[chain])))
     order = np.concatenate(found)
@@ -241,8 +242,3 @@ def along(points: Array, numbers: Integers, pairs: Integers) -> tuple[Integers, 
     first = np.sort(np.unique(order, return_index=True)[1])  # a vertex where two chains touch belongs to the first
     order, s = order[first], s[first]
     return order, s - s[np.argmin(rank[order])]
-
-
-def _oriented(chain: Integers, rank: Integers) -> Integers:
-    """An open chain from the lower of its ends."""
-    return chain if rank[chain[0]] <= rank[chain[-1]] else chain[::-1]

@@ -197,7 +197,7 @@ def _bodies(arrays: SolutionArrays) -> Integers:
     cells = cells_of(arrays)
     first, size = np.repeat(cells[:, 0], cells.shape[1]), len(arrays.points)
     graph = sparse.coo_array((np.ones(cells.size, dtype=np.int8), (first, cells.ravel())), shape=(size, size))
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)
+    return csgraph.connected_components(graph, directed=False)[1]
 
 
 def _boxes(arrays: SolutionArrays, bodies: Integers) -> Array:
@@ -217,7 +217,7 @@ def _in_body(source: SolutionArrays, cells: Integers, points: Array) -> Array:
     own = kept[mesh.geometry.input_global_indices[compat.geometry_dofmap(mesh)]]
     assert source.displacement is not None
     field.x.array.reshape(-1, d)[field.function_space.dofmap.list] = source.displacement[own]
-    return np.asarray(field.eval(at, transfer.containing_cells(mesh, at).astype(np.int32))).reshape(-1, d)
+    return field.eval(at, transfer.containing_cells(mesh, at).astype(np.int32)).reshape(-1, d)
 
 
 def on_part(source: SolutionArrays, part: ContactPart, values: Array, points: Array) -> Array:

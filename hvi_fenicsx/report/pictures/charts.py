@@ -140,7 +140,7 @@ def _search_subject(result: EquilibriaResult, shown: int) -> tuple[str, str, str
 def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None:
     values = np.array(result.energies[: len(rows)]) - result.energies[0]
     unit = unit_for(float(values[-1]), result.unit)
-    values = np.asarray(values / unit.size)
+    values /= unit.size
     kinds = np.array([row["kind"] for row in rows])
     for kind in np.unique(kinds).tolist():
         (mark, face), own = _KINDS.get(kind, _OTHER), np.flatnonzero(kinds == kind)
