@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -138,17 +138,18 @@ class Auto(BranchIteration):
         """
         with self.context.timer("setup"):
             path = follow(self.system, self._interrupted)
-        if path is None or (path.x is None and self._held):
+        if path is None:
             return None
-        if path.x is None:
-            return self._off_path(first, path)
-        for found in self._attempt(self._iteration().solve, path.x):
+        x, reason, borne = path
+        if x is None:
+            return None if self._held else self._off_path(first, reason, borne)
+        for found in self._attempt(self._iteration().solve, x):
             found.counts.add(first.counts)
             if found.converged or found.interrupted:
                 return found
         return None
 
-    def _off_path(self, first: SolveResult, path: PathStart) -> SolveResult:
+    def _off_path(self, first: SolveResult, reason: str, borne: Borne | None) -> SolveResult:
         """An equilibrium from other starts, to which loading leads by a jump if at all; else that its path has none.
 
         Each start gets few steps: what laws hold is found in a few, what slides away takes hundreds. Collective.
@@ -157,10 +158,10 @@ class Auto(BranchIteration):
         counts.add(first.counts)
         found = self._first_of(self._others(2 * self.thresholds.few_steps), counts)
         if found is not None:
-            return replace(found, off_path=path.reason)
+            return replace(found, off_path=reason)
         self._limit.next_start()
-        reason = f"no equilibrium on the loading path: {path.reason}"
-        return replace(first, counts=counts, interrupted=False, reason=reason, borne=path.borne)
+        reason = f"no equilibrium on the loading path: {reason}"
+        return replace(first, counts=counts, interrupted=False, reason=reason, borne=borne)
 
     def _others(self, most: int | None = None) -> Iterator[SolveResult]:
         """Results from other starts, one after the other, each in so many Newton steps at most."""
@@ -215,21 +216,6 @@ class Auto(BranchIteration):
             yield solve(*start)
 
 
-@dataclass(frozen=True, kw_only=True)
-class PathStart:
-    """Where the load path leads.
-
-    Attributes:
-        x: the displacement under the whole load, in equilibrium; None: the path ends before.
-        reason: how it ended.
-        borne: where it ends before, the last state that is borne; None where that is not known.
-    """
-
-    x: PETSc.Vec | None
-    reason: str
-    borne: Borne | None = None
-
-
 def softens(law: Superpotential) -> bool:
     """Whether a law's traction falls other than by jumps, as far as it is known how steeply.
 
@@ -247,14 +233,18 @@ def _are_straight(laws: Sequence[Superpotential]) -> bool:
     return all(law.graph is not None for law in laws)
 
 
-def follow(system: System, interrupted: Callable[[], bool]) -> PathStart | None:
-    """The start, where its path can be followed in short time; None where it cannot, or is lost. Collective.
+def follow(system: System, interrupted: Callable[[], bool]) -> tuple[PETSc.Vec | None, str, Borne | None] | None:
+    """Where the load path leads, if it can be followed in short time; None where it cannot, or is lost. Collective.
 
     A path of other than piecewise linear equations is followed where laws soften and Γc has few unknowns.
 
     Args:
         system: the system; its tangent and what it holds are taken away.
         interrupted: whether to stop (collective); then None.
+
+    Returns:
+        The displacement under the whole load, in equilibrium, None where the path ends before; how it ended; and where
+        it ends before, the last state that is borne, None where that is not known.
     """
     laws = [term.exact for term in system.terms]
     most = system.thresholds.vertex_unknowns if _are_straight(laws) else _most_on_curve(system)
@@ -269,10 +259,8 @@ def follow(system: System, interrupted: Callable[[], bool]) -> PathStart | None:
     start = None
     if found is not None:
         last, x = found.borne, None if found.x is None else condensation.expand(found.x)
-        start = PathStart(x=x, reason=found.reason)
-        if last is not None:
-            borne = Borne(u=condensation.displacement(last.x, last.factor), factor=last.factor)
-            start = replace(start, borne=borne)
+        borne = last and Borne(u=condensation.displacement(last.x, last.factor), factor=last.factor)
+        start = x, found.reason, borne
     condensation.free()
     return start
 
