@@ -189,7 +189,7 @@ class Carrier:
         size = np.divide(np.sum(wanted * shown, axis=1, keepdims=True), squares, out=middle, where=squares > 0.0)
         inside = (self.low < size) & (size < self.high) & (squares > 0.0)
         share = np.divide(1.0, squares, out=np.zeros_like(squares), where=inside)
-        return np.clip(size, self.low, self.high) * self.along, share[:, :, None] * _squares(shown)
+        return np.clip(size, self.low, self.high) * self.along, share[:, :, None] * (shown[:, :, None] * shown[:, None])
 
     def _in_disc(self, wanted: Array) -> tuple[Array, Array]:
         inside = np.einsum("mkd,md->mk", self.axes, wanted) * self.counts
@@ -197,11 +197,6 @@ class Carrier:
         slope = slope * (self.counts[:, :, None] & self.counts[:, None, :])
         turned = np.einsum("mkd,mkl,mle->mde", self.axes, slope, self.axes)
         return np.einsum("mk,mkd->md", found, self.axes), turned
-
-
-def _squares(vectors: Array) -> Array:
-    """Squares v vᵀ of vectors (k, d), (k, d, d)."""
-    return vectors[:, :, None] * vectors[:, None, :]
 
 
 def components(term: LawTerm) -> Iterator[tuple[Integers, Array]]:

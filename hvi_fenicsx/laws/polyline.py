@@ -178,7 +178,7 @@ class PolylineLaw(Superpotential):
         g = self.graph
         inside = np.abs(g.breaks) <= a
         ends = np.array([-a, a])
-        return float(magnitude(np.concatenate([g.left[inside], g.right[inside], self.left(ends), self.right(ends)])))
+        return magnitude(np.concatenate([g.left[inside], g.right[inside], self.left(ends), self.right(ends)]))
 
 
 @dataclass(frozen=True)
