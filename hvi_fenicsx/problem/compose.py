@@ -25,7 +25,7 @@ from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .law_term import Modification, unchanged
 from .problem import Problem
-from .scaling import Placed, PlacedContribution, Scales
+from .scaling import Placed, PlacedContribution
 from .spaces import coefficients_of
 
 
@@ -72,7 +72,7 @@ def compose(domain: Domain, model: Formulation) -> Problem:
     context = DomainForms(domain, facets, scales, effects, model.degree)
     contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
-    return _problem(context, scales, contributions, model, tuple(implausible))
+    return _problem(context, contributions, model, tuple(implausible))
 
 
 def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, formula: SpatialValue) -> float:
@@ -103,32 +103,31 @@ def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) ->
 
 def _problem(
     context: DomainForms,
-    scales: Scales,
     contributions: Sequence[PlacedContribution],
     model: Formulation,
     implausible: tuple[str, ...],
 ) -> Problem:
     """All contributions together. Collective."""
-    components = constraints.prescribed_components(context, scales, contributions)
+    components = constraints.prescribed_components(context, contributions)
     prescribed = constraints.values(context, components)
     fixed = np.concatenate([np.empty(0, np.int32), *(one.dofs for one in components)])
     surfaces, found = _surfaces(context, contributions, fixed, model)
     fixed = np.unique(np.concatenate([fixed, *(one.tied for one in found)])).astype(np.int32)
     gaps = {one.name: one.gap for one in found}
-    bounds = constraints.make_bounds(context, scales, surfaces, contributions, prescribed, gaps)
+    bounds = constraints.make_bounds(context, surfaces, contributions, prescribed, gaps)
     constraints.check_bounds(context, bounds, prescribed, fixed)
-    constraints.check_contradictions(context, scales, bounds)
+    constraints.check_contradictions(context, bounds)
     law_term.check_laws(contributions)
     law_term.check_moved(context.mesh.comm, contributions, surfaces)
-    terms = law_term.make_terms(context, scales, surfaces, contributions, fixed, model.modify)
+    terms = law_term.make_terms(context, surfaces, contributions, fixed, model.modify)
     linear, strains = (_by_name(contributions, kind) for kind in ("linear", "strains"))
     return Problem(
         domain=context.domain,
-        scales=scales,
+        scales=context.scales,
         space=context.space,
         points=coefficients_of(context.space, context.points),
         bulk=elastic_operator.make_bulk(
-            context.space, scales, contributions, strains, context.domain.shared, model.volumetric_ratio
+            context.space, context.scales, contributions, strains, context.domain.shared, model.volumetric_ratio
         ),
         linear={**linear, **strains},
         fixed=fixed,

@@ -21,7 +21,7 @@ from . import contact_surface
 from .contact_surface import Surface
 from .domain_forms import DomainForms
 from .problem import Bounds, BoundsForce, BoundsMove, PrescribedComponent
-from .scaling import DEFAULT, PlacedContribution, Scales
+from .scaling import DEFAULT, PlacedContribution
 from .spaces import contact_rule, edge_share
 
 
@@ -82,7 +82,6 @@ def _stated(context: DomainForms, where: Surface, obstacle: Towards) -> Array:
 
 def make_bounds(
     context: DomainForms,
-    scales: Scales,
     surfaces: Mapping[str, Surface],
     contributions: Sequence[PlacedContribution],
     prescribed: Array,
@@ -92,7 +91,6 @@ def make_bounds(
 
     Args:
         context: spaces, parts and vertices.
-        scales: what one unit is in SI.
         surfaces: by part.
         contributions: of all effects.
         prescribed: the prescribed values at the local scalar dofs, zero at the others.
@@ -109,8 +107,7 @@ def make_bounds(
         if bound.towards is not None and surface.part in gaps:
             raise InputError(f'boundary.{surface.part}.{key}: an obstacle is no body; give gap = 0.0 or "measured"')
     return tuple(
-        _along_normal(_bounds(context, surface, effect, bounds, scales, gaps), prescribed)
-        for surface, effect, bounds in wanted
+        _along_normal(_bounds(context, surface, effect, bounds, gaps), prescribed) for surface, effect, bounds in wanted
     )
 
 
@@ -133,7 +130,6 @@ def _bounds(
     where: Surface,
     effect: Effect,
     bounds: NormalBounds,
-    scales: Scales,
     gaps: Mapping[str, Array],
 ) -> Bounds:
     """The bounds on u·m, m being the normal of the scene, that an effect puts on a part. Collective."""
@@ -141,14 +137,14 @@ def _bounds(
     def value(formula: SpatialValue | None) -> Array:
         if formula is None:
             return np.full(len(where.blocks), np.inf)
-        found = _coefficients(context, where, formula) / scales.displacement
+        found = _coefficients(context, where, formula) / context.scales.displacement
         if not all(agree(context.mesh.comm, bool(np.all(np.isfinite(found))))):
             reason = "the gap is not finite everywhere there; see its formula, or where the obstacle lies"
             raise InputError(f"boundary.{where.part}.{effect.key}: {reason}")
         return found
 
     # lower ≤ -u·n ≤ upper
-    open_by = gaps[where.part] / scales.displacement if bounds.measured else 0.0
+    open_by = gaps[where.part] / context.scales.displacement if bounds.measured else 0.0
     upper = open_by - value(bounds.lower) if bounds.lower else value(None)
     move = None
     if bounds.move is not None:
@@ -162,12 +158,12 @@ def _bounds(
                 f"boundary.{name}: this obstacle's gaps do not change in proportion to the way that a force moves it; "
                 "give it a direction along the force"
             )
-        rate = (-value(stated.lower) - upper) * scales.displacement
+        rate = (-value(stated.lower) - upper) * context.scales.displacement
         if not any(agree(context.mesh.comm, bool(np.any(rate < 0.0)))):
             raise InputError(f"boundary.{name}: the force moves the obstacle away from the body; turn it round")
         size = float(np.linalg.norm(stated.vector))
         direction = np.array(stated.vector) / size
-        force = BoundsForce(name=name, rate=rate, force=size / scales.force, direction=direction)
+        force = BoundsForce(name=name, rate=rate, force=size / context.scales.force, direction=direction)
     return Bounds(where, -value(bounds.upper), upper, move, force)
 
 
@@ -207,19 +203,18 @@ def check_bounds(context: DomainForms, bounds: Sequence[Bounds], prescribed: Arr
     refuse(context.mesh.comm, bad)
 
 
-def check_contradictions(context: DomainForms, scales: Scales, bounds: Sequence[Bounds]) -> None:
+def check_contradictions(context: DomainForms, bounds: Sequence[Bounds]) -> None:
     """Refuse bounds that no displacement satisfies: within a part, or of two parts at a vertex of both. Collective.
 
     Args:
         context: spaces, parts and vertices.
-        scales: what one unit is in SI.
         bounds: the bounds.
 
     Raises:
         InputError: on all ranks alike, with the first such vertex.
     """
     pairs = combinations_with_replacement(bounds, 2)
-    bad = [text for one, other in pairs for text in _contradiction(one, other, scales.displacement)]
+    bad = [text for one, other in pairs for text in _contradiction(one, other, context.scales.displacement)]
     refuse(context.mesh.comm, bad)
 
 
@@ -241,13 +236,12 @@ def _contradiction(one: Bounds, other: Bounds, unit: float) -> list[str]:
 
 
 def prescribed_components(
-    context: DomainForms, scales: Scales, contributions: Sequence[PlacedContribution]
+    context: DomainForms, contributions: Sequence[PlacedContribution]
 ) -> tuple[PrescribedComponent, ...]:
     """The prescribed components, with their conditions. Collective.
 
     Args:
         context: spaces, parts and vertices.
-        scales: what one unit is in SI.
         contributions: of all effects.
 
     Raises:
@@ -260,12 +254,12 @@ def prescribed_components(
             component=stated.component,
             facets=context.part_facets[str(where)],
             value=stated.value,
-            condition=_condition(context, scales, context.part_facets[str(where)], stated),
+            condition=_condition(context, context.part_facets[str(where)], stated),
         )
         for where, effect, contribution in contributions
         for stated in contribution.conditions
     )
-    _check_agreement(context, scales, found)
+    _check_agreement(context, found)
     return found
 
 
@@ -282,19 +276,19 @@ def values(context: DomainForms, prescribed: Sequence[PrescribedComponent]) -> A
     return found
 
 
-def _condition(context: DomainForms, scales: Scales, facets: Entities, condition: Condition) -> fem.DirichletBC:
+def _condition(context: DomainForms, facets: Entities, condition: Condition) -> fem.DirichletBC:
     dim = context.dimension - 1
     component = context.space.sub(condition.component)
     if condition.value.is_number and edge_share(context.space) == 0.0:
-        value = PETSc.ScalarType(condition.value.source / scales.displacement)  # type: ignore[operator]
+        value = PETSc.ScalarType(condition.value.source / context.scales.displacement)  # type: ignore[operator]
         return fem.dirichletbc(value, fem.locate_dofs_topological(component, dim, facets), component)
     collapsed, _ = component.collapse()
     function = fem.Function(collapsed)
-    function.interpolate(lambda x: condition.value.at(x.T) / scales.displacement)
+    function.interpolate(lambda x: condition.value.at(x.T) / context.scales.displacement)
     return fem.dirichletbc(function, fem.locate_dofs_topological((component, collapsed), dim, facets), component)
 
 
-def _check_agreement(context: DomainForms, scales: Scales, found: Sequence[PrescribedComponent]) -> None:
+def _check_agreement(context: DomainForms, found: Sequence[PrescribedComponent]) -> None:
     """Where two parts meet they must prescribe the same: else the order of the tables would decide."""
     prescribed = [(one.part, one.dofs, values(context, [one])[one.dofs]) for one in found]
     size = max((magnitude(v) for _, _, v in prescribed), default=0.0)
@@ -303,14 +297,14 @@ def _check_agreement(context: DomainForms, scales: Scales, found: Sequence[Presc
         shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
         apart = np.abs(these[i] - those[j]) > DEFAULT.same * size
         differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
-        bad += [_disagreement(context, int(dof), (one, other), (float(a), float(b)), scales) for dof, a, b in differing]
+        bad += [_disagreement(context, int(dof), (one, other), (float(a), float(b))) for dof, a, b in differing]
     refuse(context.mesh.comm, bad[:1])
 
 
-def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float], scales: Scales) -> str:
+def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float]) -> str:
     block, component = divmod(dof, context.dimension)
     at = spot(context.points[block][: context.dimension])
-    one, other = (value * scales.displacement for value in pair)
+    one, other = (value * context.scales.displacement for value in pair)
     return (
         f"boundary.{parts[0]} and boundary.{parts[1]} meet at {at} and prescribe displacements along "
         f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'

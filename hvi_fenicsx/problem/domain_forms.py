@@ -39,7 +39,7 @@ class DomainForms:
         degree: int = 1,
     ) -> None:
         self.domain, self.dimension = domain, domain.dimension
-        self.length, self.stress, self.modulus = scales.length, scales.stress, scales.modulus
+        self.scales, self.length, self.stress, self.modulus = scales, scales.length, scales.stress, scales.modulus
         self.space = _space(domain, degree)
         self.mesh = self.space.mesh
         self.trial, self.test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)

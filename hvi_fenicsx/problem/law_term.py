@@ -213,7 +213,6 @@ def check_moved(comm: MPI.Comm, contributions: Sequence[PlacedContribution], sur
 
 def make_terms(
     context: DomainForms,
-    scales: Scales,
     surfaces: Mapping[str, Surface],
     contributions: Sequence[PlacedContribution],
     fixed: Entities,
@@ -223,7 +222,6 @@ def make_terms(
 
     Args:
         context: spaces, parts and vertices.
-        scales: what one unit is in SI.
         surfaces: by part.
         contributions: of all effects.
         fixed: local scalar dofs that are prescribed.
@@ -233,7 +231,7 @@ def make_terms(
         InputError: on all ranks alike: a law that cannot be solved in 3D.
     """
     laws = [(surfaces[w], e.key, law) for w, e, c in contributions if w is not None for law in c.laws]
-    return tuple(_term(context, surface, key, law, modify, scales, fixed) for surface, key, law in laws)
+    return tuple(_term(context, surface, key, law, modify, fixed) for surface, key, law in laws)
 
 
 def _term(
@@ -242,12 +240,13 @@ def _term(
     key: str,
     law: BoundaryLaw,
     modify: Modification,
-    scales: Scales,
     fixed: Entities,
 ) -> LawTerm:
     """A law of an effect (its key) on a part. Collective."""
     length = law.direction.length(where.tangents.shape[1], law.slip)
-    solved, exact = (_scaled(j, scales, f"boundary.{where.part}.{key}", law.slip) for j in (modify(law.law), law.law))
+    solved, exact = (
+        _scaled(j, context.scales, f"boundary.{where.part}.{key}", law.slip) for j in (modify(law.law), law.law)
+    )
     if length is not None and np.any(solved.convex.kinks > 0):
         raise InputError(
             f'boundary.{where.part}: law = "{law.law.name}" jumps upwards at a length > 0 of a vector, which is a '
