@@ -56,7 +56,7 @@ def subdifferential(problem: ScalarProblem, x: Array) -> Subdifferential:
     laws = Subdifferential(
         low=np.where(here, t, np.inf).min(axis=1),
         high=np.where(here, t, -np.inf).max(axis=1),
-        falls=drop.any(axis=1),
+        falls=np.any(drop, axis=1),
         least=np.where(here, arcs.slopes, np.inf).min(axis=1),
         most=np.where(here, arcs.slopes, -np.inf).max(axis=1),
     )

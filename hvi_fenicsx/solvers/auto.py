@@ -259,7 +259,7 @@ def follow(system: System, interrupted: Callable[[], bool]) -> tuple[PETSc.Vec |
     start = None
     if found is not None:
         last, x = found.borne, None if found.x is None else condensation.expand(found.x)
-        borne = last and Borne(u=condensation.displacement(last.x, last.factor), factor=last.factor)
+        borne = None if last is None else Borne(u=condensation.displacement(last.x, last.factor), factor=last.factor)
         start = x, found.reason, borne
     condensation.free()
     return start

@@ -18,7 +18,7 @@ WHOLE = ("curved", "ranks")
 KNOWN = {
     "paths: two arms, pulled apart": "overlaps have another quadrature: two energies after 50 folds differ by 1.1e-9",
     "curved: energies that differ by mode": "a path that was lost after a jump at a fold is lost at this fold",
-    "curved: energies that differ by mode, unloaded, power law": "work differs by 3e-6: steps follow the corrector alone",
+    "curved: energies that differ by mode, unloaded, power law": "work differs by 3e-6: other steps",
     "curved: exponential glue lifted at its end": "bonds load again to where they were after one of twelve jumps",
     "demos: run ball_on_block": "the estimate differs by 8e-4: gaps between vertices are seen by one rule",
     "demos: run peeling_moment": "the forces of a moment alone are what a solve leaves",
