@@ -97,7 +97,7 @@ class SolverRun(ABC):
     def judge(self, x: PETSc.Vec) -> tuple[PETSc.Vec, float]:
         """The candidate for a solution at x, and its residual of the inequality. Collective."""
         self.system.equations.residual(x, self.residual, self.models)
-        return x, self.solver.measure(x, self.residual, self.system.lower, self.system.upper)
+        return x, self.solver.convergence.sizes(x, self.residual, self.system.lower, self.system.upper).worst
 
 
 class SmoothMethod(Method):
@@ -207,7 +207,7 @@ class _TaoRun(SolverRun):
     def _converged(self, tao: PETSc.TAO) -> int | None:
         x, iteration = tao.getSolution(), tao.getIterationNumber()
         _, measure = self.judge(x)
-        self.context.tell("tao", self.context.epsilon, iteration, measure, self.solver.in_contact(x))
+        self.context.tell("tao", self.context.epsilon, iteration, measure, self.solver.convergence.in_contact(x))
         if measure <= self.options.tolerance:
             return TAO_REASON.CONVERGED_USER
         self.stopped = self.solver.interrupted()
@@ -306,7 +306,7 @@ class _SslsRun(SolverRun):
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
         found, measure = self.judge(snes.getSolution())
-        self.context.tell("ssls", self.context.epsilon, iteration, measure, self.solver.in_contact(found))
+        self.context.tell("ssls", self.context.epsilon, iteration, measure, self.solver.convergence.in_contact(found))
         found.destroy()
         if measure <= self.options.tolerance:
             return SNES_REASON.CONVERGED_FNORM_RELATIVE

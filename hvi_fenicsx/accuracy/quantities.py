@@ -41,7 +41,7 @@ class EnergyNorm(Quantity):
 
 
 class ContactField(Observable):
-    """A field on Γc. One mesh is enough to estimate its error, from the defect (:mod:`.contact_errors`).
+    """A field on Γc. One mesh is enough to estimate its error, from the defect.
 
     Where div u is averaged, the defect does not see the pressure; there it is compared from mesh to mesh.
 

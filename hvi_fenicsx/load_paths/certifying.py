@@ -1,7 +1,7 @@
 """Is a state of a path an equilibrium? On Γc for each, for the whole body as often as it costs little.
 
 On Γc: each unknown must be on the graph of its laws and bounds, with the force that the body leaves there; S and f come
-from the factorised body. The certificate of the whole body (:mod:`.certify`) reassembles all forces from the forms;
+from the factorised body. The certificate of the whole body (:mod:`..certify`) reassembles all forces from the forms;
 where bonds remember, what was judged on Γc must be what these forces leave there. So it must at states where loads and
 what moves the body are nothing beside those of the whole programme, as where an obstacle just touches it, or where no
 force acts: there is nothing else by which to measure what is left of forces.

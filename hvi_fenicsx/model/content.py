@@ -66,7 +66,7 @@ class SolverTable(Table):
     """the linear solver; auto chooses by the number of unknowns; PETSc options override it"""
     second_order: bool | None = None
     """if a softening law leaves open whether the solution is a local minimiser, factorise the Hessian; by default up to
-    50,000 unknowns in the plane and 5,000 in space, where that takes less than 5 % of a run"""
+    60,000 unknowns in the plane and 15,000 in space"""
     max_iterations: Annotated[Count, Field(le=10**9)] = 100
     """the largest number of Newton iterations"""
 

@@ -267,9 +267,10 @@ class Follower(LoadHistory):
         self._branch.note(move)
         if move.outcome in (StepEnd.STEP, StepEnd.FACTOR):
             return self._state(Event.STEP)
-        event, events = Event.FOLD, [event for _, event in passages]
+        event = Event.FOLD
         if before * self._branch.trend >= 0:
-            event = next((e for e in (Event.CONTACT, Event.RELEASE) if e in events), Event.KINK)
+            passages.sort(key=lambda passage: (Event.CONTACT, Event.RELEASE, Event.KINK).index(passage[1]))
+            event = passages[0][1] if passages else Event.KINK
         state = self._state(event, passages)
         if move.outcome is not StepEnd.FOLD:
             self._detect_cycle(state)

@@ -101,7 +101,7 @@ class PathState:
         dissipated: lost in bonds with memory.
         released: at a jump, what the body has lost in motion.
         unstable: number of directions in which the energy falls.
-        memory: what the bonds remember, (bonds, 4) as :attr:`.BondTable.memory`; None without memory.
+        memory: what the bonds remember, (bonds, 4) as :attr:`.VertexLaws.memory`; None without memory.
         position: where on its curve the path is.
     """
 

@@ -1,7 +1,7 @@
 """The graphs of all points as chains of segments, where each point is on its own, and what their laws remember.
 
-A point is an unknown with its laws and bounds, or the unknowns of a law on a length (:mod:`.vectors`). Its graph of
-force over displacement is one continuous line, vertical where a law jumps and at a bound (:mod:`..segments`); s runs
+A point is an unknown with its laws and bounds, or the unknowns of a law on a length (:class:`.VectorPoints`). Its graph
+of force over displacement is one continuous line, vertical where a law jumps and at a bound (:mod:`.segments`); s runs
 along it, nondimensional. The coordinate of a point of a length is a vector z of length s: displacement and force have
 its direction. So sticking, sliding, a drop at a fixed length and what is remembered all have smooth equations. An
 opening has a point of its own beside, without a law: what it does where it is not positive.

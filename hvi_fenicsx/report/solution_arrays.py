@@ -55,8 +55,7 @@ class ContactPart:
 
     Attributes:
         name: of its boundary table in the scene.
-        columns: the columns of ``contact.csv`` that the part has, (m,) each, in the order of that table; NaN where the
-            table is empty.
+        columns: the columns of ``contact.csv`` that the part has, (m,) each, by name; NaN where the table is empty.
         vertices: the vertices of the body, (m,).
         facets: segments or triangles by the vertices of the body, (k, d), each row ascending.
         weight: lumped lengths or areas of the vertices, m or m², (m,).

@@ -22,7 +22,7 @@ class Sizes:
     Attributes:
         norm: its Euclidean norm, over the forces there (:class:`.References`).
         traction: the largest nodal traction on Γc, over what is allowed there.
-        net: the largest net force along a rigid motion (:mod:`.rigid_motions`).
+        net: the largest net force along a rigid motion (:mod:`..system.rigid_motions`).
         net_rounding: of that.
     """
 

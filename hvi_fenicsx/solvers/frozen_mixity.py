@@ -1,6 +1,6 @@
 """Laws whose energy of separation depends on the mode: the mixity is frozen, solved, and taken anew until it stands.
 
-With the mixity frozen such a law has a potential (:mod:`..laws.mixity`), which any method solves. The certificate says
+With the mixity frozen such a law has a potential (:mod:`..laws.lengths`), which any method solves. The certificate says
 by how much the mixity of the last state differs from the frozen one.
 """
 

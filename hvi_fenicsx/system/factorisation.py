@@ -1,7 +1,7 @@
 """Factorisations of a system's matrix, in which unknowns are held and slopes are added on Γc.
 
 The volumetric part of a nearly incompressible body joins each vertex to the neighbours of its neighbours. At degree 2
-factors are far smaller with the averaged pressures as further unknowns (:mod:`.saddle_point`), and rounding loses less.
+factors are far smaller with the averaged pressures as further unknowns, and rounding loses less.
 """
 
 from __future__ import annotations

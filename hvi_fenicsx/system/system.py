@@ -1,7 +1,7 @@
 """A problem assembled: PETSc matrix, load, bounds and laws, in the components of its unknowns.
 
 The bulk matrix A is assembled once. Laws and active sets touch only the diagonal blocks of Γc's vertices
-(:mod:`.contact_rows`). What the equations give at some unknowns is in :mod:`.equations`.
+(:class:`.ContactRows`). What the equations give at some unknowns is in :mod:`.equations`.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class Solution:
         epsilon: relative width of the smoothing, None for exact laws.
         timer: wall time by phase.
         uniqueness: what is known about other equilibria; None where nothing was certified, or it was found elsewhere.
-        warnings: sentences about numbers that may be mistakes (:mod:`.plausible_problem`, :mod:`.plausibility`).
+        warnings: sentences about numbers that may be mistakes (:mod:`..certify.plausibility`).
         last_borne: where none was found under the whole load, and problem, displacement and examination are those of
             the last state that is borne.
         obstacle: the one that a force presses, and whether contact bears it; None without one.

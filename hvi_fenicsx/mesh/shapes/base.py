@@ -1,7 +1,7 @@
 """What a domain shape is: all that is known about a shape of a body stands on its class.
 
-A new shape is a new subclass of :class:`DomainShape`, best of :class:`.plane.PlaneShape` or
-:class:`.fixed_mesh.FixedMesh`. It registers itself under the default of its field ``shape``, which is then a value of
+A new shape is a new subclass of :class:`DomainShape`, best of :class:`.built_in.PlaneShape` or
+:class:`.given.FixedMesh`. It registers itself under the default of its field ``shape``, which is then a value of
 ``[domain]`` in scene files. Nothing else is edited. Light: what builds meshes is loaded when a mesh is built.
 """
 
