@@ -1,8 +1,8 @@
 """A system condensed to the unknowns of Γc that carry a bound or a law, as a problem of arrays.
 
 All unknowns of Γc's vertices are kept first (:mod:`..system.interior`): with them a body is held. Those that carry
-nothing are then eliminated as well, as far as the others hold the body: where a rigid motion leaves all bounds and laws as they
-are, one unknown for each such motion stays. Where these are many, the stiffness is not formed
+nothing are then eliminated as well, as far as the others hold the body: where a rigid motion leaves all bounds and laws
+as they are, one unknown for each such motion stays. Where these are many, the stiffness is not formed
 (:mod:`.factorised_stiffness`), and what carries nothing is not kept, as far as the others hold the body.
 """
 
