@@ -145,7 +145,7 @@ def _mend(kind: str, value: Any) -> str:
         try:
             float(value)
         except ValueError:
-            return ""
+            return "; no formula can stand here" if re.search(r"\b[xyz]\b", value) else ""
         return "; write it without quotes"
     return ""
 

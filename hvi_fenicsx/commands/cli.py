@@ -213,7 +213,7 @@ def _equilibria(equilibria: argparse.ArgumentParser) -> None:
 
 def _study(study: argparse.ArgumentParser) -> None:
     text = (
-        "solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, tolerance, "
+        "solve the scene for each VALUE of mesh, epsilon, epsilon_absolute, smoothing, degree, method, tolerance "
         "or linear_solver; several axes: all combinations; none: the program plans the study"
     )
     study.add_argument("--axis", action="append", default=[], metavar="NAME=VALUE,...", help=text)

@@ -80,7 +80,7 @@ def _run(call: Session) -> int:
     rows = list(_all_written(call, bodies, found))
     entry = _entry(found, rows, prepared.problem.scales.energy)
     more = plain({"reason": found.reason, "exit_code": int(code), "equilibria": entry, "command": options.given})
-    record, draw = common(prepared, prepared.system.dofs) | more, not options.no_pictures and not interrupted
+    record, draw = common(prepared, prepared.system.dofs) | more, not options.no_pictures and not call.interrupted()
     on_root(COMM, lambda: _write(call, rows, record, draw=draw))
     say(_lines(prepared, found, rows))
     return int(code)

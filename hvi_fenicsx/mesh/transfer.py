@@ -77,6 +77,9 @@ class ParentCellTransfer(Transfer):
 
     def rows(self, fine: fem.FunctionSpace, coarse: fem.FunctionSpace) -> Rows:
         """The functions of the parent cells, in the bases of the two spaces. Local."""
+        owned, d = fine.dofmap.index_map.size_local, fine.dofmap.index_map_bs
+        if not owned:  # this rank may have no cell either
+            return weighted_rows(np.empty((0, 1), dtype=np.int64), np.empty((0, 1)), d)
         code = self.halves.reshape(len(self.halves), -1) @ 3 ** np.arange(self.halves[:1].size)
         _, first, kind = np.unique(code, return_index=True, return_inverse=True)
         near, far = (space.ufl_element().sub_elements[0] for space in (fine, coarse))
@@ -85,13 +88,12 @@ class ParentCellTransfer(Transfer):
         values = far.tabulate(0, inside.reshape(-1, inside.shape[2]))[0].reshape(*inside.shape[:2], -1)
         weights = np.linalg.solve(near.tabulate(0, places[:, 1:])[0], values)
         weights[np.abs(weights) < ROUNDING] = 0.0
-        owned = fine.dofmap.index_map.size_local
         cell, number = np.empty(owned, dtype=np.int64), np.empty(owned, dtype=np.int64)
         for k, column in enumerate(fine.dofmap.list[: len(self.parents)].T):
             here = np.flatnonzero(column < owned)
             cell[column[here]], number[column[here]] = here, k
         numbers = coarse.dofmap.index_map.local_to_global(coarse.dofmap.list[self.parents[cell]].ravel())
-        return weighted_rows(numbers.reshape(owned, -1), weights[kind[cell], number], fine.dofmap.index_map_bs)
+        return weighted_rows(numbers.reshape(owned, -1), weights[kind[cell], number], d)
 
 
 class DegreeTransfer(Transfer):
@@ -126,7 +128,8 @@ def weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
         d: components.
     """
     n, k = numbers.shape
-    sums = sparse.csr_array((weights.ravel(), numbers.ravel(), np.arange(0, n * k + 1, k, dtype=numbers.dtype)))
+    shape = n, int(numbers.max(initial=-1)) + 1
+    sums = sparse.csr_array((weights.ravel(), numbers.ravel(), np.arange(0, n * k + 1, k, dtype=numbers.dtype)), shape)
     sums.sum_duplicates()
     sums.eliminate_zeros()
     whole = sparse.kron(sums, sparse.identity(d), format="csr")

@@ -92,6 +92,9 @@ class Body:
             comm: the ranks that share the mesh; None: that of a scene file, which each command makes on its ranks.
             **places: its ``pieces`` and ``interfaces`` by name.
         """
+        for key in ("origin", "angle"):
+            if getattr(shape, key) is not None:
+                raise InputError(f"domain.{key}: places one of several bodies, [domain.NAME]; leave it out")
         body = cls.__new__(cls)
         body.__dict__.update(places, shape=shape, comm=comm)
         return body

@@ -172,10 +172,7 @@ def _material(data: Any, info: ValidationInfo) -> Effect:
 def _shape(value: Any, info: ValidationInfo) -> Any:
     if SeveralBodies.named(value):
         return SeveralBodies.model_validate(value, context=info.context)
-    found: DomainShape = choose(value, "shape", DomainShape.registry, info.context)
-    if found.origin or found.angle:
-        raise validation_error([Mistake((), "origin and angle place one of several bodies, [domain.NAME]")])
-    return found
+    return choose(value, "shape", DomainShape.registry, info.context)
 
 
 def _material_keys() -> list[str]:

@@ -94,6 +94,10 @@ class _Source:
 
     def place(self, key: str) -> tuple[int, str]:
         """The line of the nearest place that is known, and what messages name: file and line, or ``--set``; the key."""
+        if any(
+            f"{key}.".startswith(f"boundary{known[9:]}.") for known in self._known if known.startswith("interface.")
+        ):
+            key = f"interface{key[8:]}"  # within the program an interface is a boundary part
         nearest = max((known for known in self._known if f"{key}.".startswith(f"{known}.")), key=len, default="")
         line, start = self._known.get(nearest, (0, f"{self.file}:"))
         return line, f"{start} {key}"
@@ -136,7 +140,9 @@ def _toml(file: Path, text: str) -> dict[str, Any]:
         found = re.search(r"\(at line (\d+), column (\d+)\)$", str(error))
         line, column = found.groups() if found else (str(text.count("\n") + 1), "1")
         content = "".join(text.splitlines()[int(line) - 1 :][:1]).strip()[:60]
-        raise InputError(f"{file}:{line}:{column}: not valid TOML: {reason}: {content}") from None
+        mend = "; texts need quotes" if reason.startswith("Invalid value") else ""
+        shown_line = f": {content}" if content else ""
+        raise InputError(f"{file}:{line}:{column}: not valid TOML: {reason}{mend}{shown_line}") from None
     except (ValueError, RecursionError) as error:
         reason = "is nested too deep" if isinstance(error, RecursionError) else "has a number of too many digits"
         raise InputError(f"{file}: {reason}") from None

@@ -66,7 +66,9 @@ class Point:
 
     def __str__(self) -> str:
         solver = self.scene.solver
-        return f"{self.mesh}, degree {self.degree}, {solver.smoothing or 'exact law'}, {solver.method}"
+        widths = [f"{name} = {width:g}" for name in _WIDTHS if (width := getattr(solver, name)) is not None]
+        law = " ".join([solver.smoothing or "exact law", *widths])
+        return f"{self.mesh}, degree {self.degree}, {law}, {solver.method}"
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,8 @@ def make(scene: Model, axes: Sequence[tuple[str, Sequence[str]]]) -> Plan:
             raise InputError(f"--axis {name}: is given twice; put its values into one list")
         if name in _UNSMOOTHED and not scene.laws():
             raise InputError(f"--axis {name}: the scene has no law that could be smoothed; leave the axis out")
+    if set(_WIDTHS) <= set(names):
+        raise InputError("--axis epsilon_absolute: epsilon is given too; leave one of them out")
     scene = scene.with_solver(degree=scene.solver.degree or 1)
     left_out = list[str]()
     products: list[Values] = [dict(axes)] if axes else [*_default(scene)]
