@@ -150,7 +150,7 @@ class Relaxation:
     def _own_of_lengths(self, low: Array, own: Array, drops: Array) -> Array:
         """Slopes that laws of lengths give to S and still do not fall, (m,)."""
         n = self.problem.size
-        rate = np.maximum(self.problem.arcs.rates(low)[n:], 0.0)
+        rate = np.maximum(self.problem.arcs.rates(np.nextafter(low, np.inf))[n:], 0.0)  # behind a drop at the end
         secant = np.divide(rate, low[n:], out=np.full_like(rate, np.inf), where=low[n:] > 0.0)
         return np.where(self.problem.lengths.opens | (drops[n:] > 0.0), 0.0, np.minimum(own[n:], secant))
 

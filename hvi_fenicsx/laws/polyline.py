@@ -255,8 +255,8 @@ class SampledLaw(PolylineLaw):
 def _sampled(traction: Callable[[Array], Array], ends: Sequence[float], samples: int) -> Array:
     """Points (displacement, traction) of the pieces between 0 and the ends, (k, 2); at a jump there are two."""
     stops = np.append(0.0, np.asarray(ends, dtype=float))
-    if stops.size < 2 or not np.all(np.isfinite(stops)) or np.any(np.diff(stops) <= 0.0):
-        raise InputError(f"ends = {list(ends)!r}: give ascending finite ends > 0")
+    if samples < 1 or stops.size < 2 or not np.all(np.isfinite(stops)) or np.any(np.diff(stops) <= 0.0):
+        raise InputError(f"ends = {list(ends)!r}, samples = {samples}: give ascending finite ends > 0 and samples >= 1")
     x = np.linspace(stops[:-1], stops[1:], samples + 1, axis=1)
     inside = x.copy()  # at the ends of pieces the one-sided limits
     inside[:, 0], inside[:, -1] = np.nextafter(x[:, 0], x[:, -1]), np.nextafter(x[:, -1], x[:, 0])

@@ -32,7 +32,7 @@ class _Group:
         self.points: Integers = np.array([k for k, _ in at])
         self.rows = [law for _, law in at]
         laws, numbers, r = self.rows[0].laws, [law.number for law in self.rows], len(at)
-        self.law, self._signs, self._weights = laws.law, laws.factors[numbers], laws.weights[numbers]
+        self.law, self.signs, self._weights = laws.law, laws.factors[numbers], laws.weights[numbers]
         self.live: Mask = np.zeros(r, dtype=bool)
         self.chords, self.ends, self.inset = np.zeros((r, 3)), np.zeros((r, 2)), np.zeros((r, 2))
 
@@ -55,7 +55,7 @@ class _Group:
         Beyond a piece the law is continued along its tangent.
         """
         rows = np.flatnonzero(self.live)
-        points, signs, weights = self.points[rows], self._signs[rows], self._weights[rows]
+        points, signs, weights = self.points[rows], self.signs[rows], self._weights[rows]
         (low, high), (at, start, chord), (inset, share) = self.ends[rows].T, self.chords[rows].T, self.inset[rows].T
         x = x[points]
         inset = inset + share * (1.0 + np.abs(x))
@@ -115,5 +115,7 @@ class Deviations:
         found = np.full(self._m, np.inf)
         for group in self._groups:
             points = group.points[group.live]
-            np.minimum.at(found, points, share * (group.law.length_scale + np.abs(x[points])))
+            np.minimum.at(
+                found, points, share * (group.law.length_scale / np.abs(group.signs[group.live]) + np.abs(x[points]))
+            )
         return found

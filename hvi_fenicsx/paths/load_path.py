@@ -130,7 +130,8 @@ class LoadPath:
         """What happens after the largest factor."""
         if self.end in (End.LOST, End.INTERRUPTED):
             return f"the path is {self.end} at {self._shown(-1)}" + (f" ({self.reason})" if self.reason else "")
-        if self.peak + 1 in self.jumps:
+        peak = self.rows[self.peak].factor
+        if any(n > self.peak and abs(self.rows[n].factor - peak) <= DEFAULT.none * abs(peak) for n in self.jumps):
             return f"there the body jumps to the next stable state, {self.ending}"
         return self.ending
 

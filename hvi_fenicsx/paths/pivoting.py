@@ -112,7 +112,7 @@ class StraightBranch(StraightEquations):
 
     @override
     def resume(self, position: Position) -> None:
-        self.heading, self.small = position.heading, np.array(position.small)
+        self.heading, self.small, self.trend = position.heading, np.array(position.small), 0
         self._begin(position.driver)
 
     @override
@@ -173,7 +173,7 @@ class StraightBranch(StraightEquations):
         """Which variable reaches its end first, the way to there, and that of the order ε."""
         numbers, slack, small, speed, allowed = self._ends()
         left, rate = aim - self.factor, self.rising
-        if not numbers.size and left * rate <= 0.0:
+        if not numbers.size and not left * rate > 0.0:
             return None
         if left * rate > 0.0:
             until = left / rate

@@ -210,6 +210,9 @@ class _Term:
         if term.is_linear and not opens:  # the energy of a spring on a length is that of springs on its components
             weights, points = (np.repeat(part, components, axis=0) for part in (weights, points))
             unknowns, signs = unknowns.reshape(-1, 1), signs.reshape(-1, 1)
+        mixity = term.mixity
+        if mixity is not None and components == 1 and not opens:  # a slip alone has the energy of the second mode
+            weights, mixity = weights * mixity.energy(np.ones_like(weights)), None
         found = Bonds(
             law=term.law,
             unknowns=unknowns,
@@ -219,7 +222,7 @@ class _Term:
             direction=term.direction,
             points=points,
             opens=opens,
-            mixity=term.mixity,
+            mixity=mixity,
         )
         return [found]
 

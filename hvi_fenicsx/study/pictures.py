@@ -95,6 +95,7 @@ def _dress(axes: Axes, study: Study, quantity: str) -> None:
     axes.grid(which="major", color="#e6e6e6", lw=0.8)
     axes.set_title(f"error in {NORMS[quantity][1]}".replace("_t", "ₜ").replace("_n", "ₙ").replace("-", "−"), loc="left")
     _label(axes.yaxis)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{100 * value:g} %")
     low, own = axes.get_ylim()[0], study.certain[quantity].error
     if own is not None and own > low:
         axes.axhspan(low, own, color=GREY, alpha=0.16, lw=0, zorder=0, label="the reference's own error")
