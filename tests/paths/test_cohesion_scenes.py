@@ -104,3 +104,26 @@ def test_several_ranks_follow_the_path_that_one_follows(mixity: Table, tmp_path:
     for events, values in found[1:]:
         assert events == found[0][0]
         assert np.allclose(values, found[0][1], rtol=0.0, atol=1e-8 * np.abs(found[0][1]).max(axis=0))
+
+
+def slip_alone(tmp_path: Path, peak: float, **mixity: Any) -> npt.NDArray[np.float64]:
+    """The rows of a strip that slides on a roller with glue, by name of the law's mode."""
+    glue = {"law": "graph", "points": [[0.0, 0.0], [1e-4, peak], [1e-3, 0.0]], "beta": 1.0, **mixity}
+    table = {
+        "domain": {"shape": "rectangle", "size": [1.0, 0.2], "cells": [10, 2]},
+        "material": {"model": "plane_strain", "youngs_modulus": 1e10, "poisson_ratio": 0.3},
+        "boundary": {
+            "pull": {"on": "right", "traction": [6e6, 0.0]},
+            "glue": {"on": "bottom", "displacement": ["free", 0.0], "cohesion": glue},
+        },
+        "path": {"to": 1.0},
+    }
+    tmp_path.mkdir()
+    assert hvi("path", written(tmp_path, table), "--out", tmp_path / "out", "--no-pictures").returncode == 0
+    return rows(tmp_path / "out")[1]
+
+
+def test_a_slip_alone_breaks_with_the_energy_of_the_second_mode(tmp_path: Path) -> None:
+    """As the law of three times the tractions."""
+    mixed = slip_alone(tmp_path / "mixed", 1e6, **{**MIXED, "energy_ratio": 3.0})
+    np.testing.assert_allclose(mixed, slip_alone(tmp_path / "plain", 3e6), rtol=1e-9, atol=1e-6)
