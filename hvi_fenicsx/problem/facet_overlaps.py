@@ -124,9 +124,9 @@ def overlaps(first: Facets, second: Facets) -> Overlaps:
     if second.curved:
         outlines = _curved_outlines(first, number[pair], local[pair, :, :-1], of_second)
     pieces, outline = _clipped(outlines)
+    seen = _visible(pieces, outline, number[pair], np.abs(local[pair, :d, -1].mean(axis=1)))
+    pieces, outline = pieces[seen], outline[seen]
     on = pair[outline]
-    seen = _visible(_sizes(pieces), number[on], np.abs(local[on, :d, -1].mean(axis=1)))
-    pieces, outline, on = pieces[seen], outline[seen], on[seen]
     return Overlaps(
         sides=(first, second),
         first=number[on],
@@ -210,12 +210,25 @@ def _cut(ring: Array, sizes: Integers, side: int) -> tuple[Array, Integers]:
     return np.take_along_axis(both, order[:, :, None], axis=1), kept.sum(axis=1)
 
 
-def _visible(sizes: Array, number: Integers, distance: Array) -> Mask:
-    """Which pieces of facets are met before nearer ones fill these, (n,)."""
-    order = np.lexsort([distance, number])
-    before = np.cumsum(sizes[order]) - sizes[order]
-    before -= before[np.searchsorted(number[order], number[order])]
-    return (before + 0.5 * sizes[order] < 1.0)[np.argsort(order)]
+def _visible(pieces: Array, outline: Integers, number: Integers, distance: Array) -> Mask:
+    """Which pieces, of outlines on facets (o,) at distances (o,), do not lie behind nearer ones, (n,)."""
+    kept, sizes, under = np.ones(len(pieces), dtype=bool), _sizes(pieces), number[outline]
+    for crowded in np.flatnonzero(np.bincount(under, weights=sizes, minlength=1) > 1.0 + DEFAULT.uncovered):
+        here, nearer = np.flatnonzero(under == crowded), pieces[:0]
+        several = np.unique(outline[here])
+        for one in several[np.argsort(distance[several], kind="stable")]:
+            own = here[outline[here] == one]
+            kept[own] = _common(pieces[own], nearer) < 0.5 * sizes[own].sum()
+            nearer = np.concatenate([nearer, pieces[own[kept[own]]]])
+    return kept
+
+
+def _common(simplices: Array, others: Array) -> float:
+    """What simplices (n, d, d-1) and others (m, d, d-1), of which none overlap, have in common."""
+    inverse = np.linalg.inv(others[:, 1:] - others[:, :1])
+    local = (simplices[None] - others[:, None, :1]) @ inverse[:, None]
+    pieces, number = _clipped(local.reshape(-1, *simplices.shape[1:]))
+    return float(np.sum(_sizes(pieces) * _sizes(others)[number // len(simplices)]))
 
 
 def _covered(pieces: Array, number: Integers, count: int, near: float) -> Mask:
