@@ -45,7 +45,7 @@ def entry(cache: Path) -> Path:
 
 
 def test_parts_of_a_boundary_share_a_compiled_form_and_keep_their_own_facets(tmp_path: Path) -> None:
-    """70 parts of one facet each along a square's lower side: ∫ v ds is the part's length."""
+    """70 parts of one facet each along a square's lower side: ∫ v ds is the part's length; and two that overlap."""
     square = mesh.create_unit_square(MPI.COMM_SELF, 70, 1)
     facets = mesh.locate_entities_boundary(square, 1, lambda x: np.isclose(x[1], 0.0))
     middles = mesh.compute_midpoints(square, 1, facets)[:, 0]
@@ -57,6 +57,9 @@ def test_parts_of_a_boundary_share_a_compiled_form_and_keep_their_own_facets(tmp
         assert found.sum() == pytest.approx(1 / 70)
         assert np.allclose(x[found != 0], np.array([part, part + 1]) / 70)
     assert len([folder for folder in tmp_path.iterdir() if folder.is_dir()]) == 1
+    both = fem.assemble_vector(cache.compiled(v * ds((8, 5)) + 3.0 * v * ds((5, 31)))).array
+    assert both.sum() == pytest.approx((1 + 4 + 3) / 70)
+    assert both @ x == pytest.approx((8.5 + 4 * 5.5 + 3 * 31.5) / 70**2)
 
 
 def test_what_a_killed_run_left_is_removed(kept: Path, tmp_path: Path) -> None:
