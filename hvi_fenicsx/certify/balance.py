@@ -90,8 +90,8 @@ def net_forces(
         holders=holders,
     )
     closed = [(state.surface, state.contact) for state in states]
-    motions = (Motions.of(problem, body, closed) for body in problem.bodies)
-    return np.array([rigid_balance.along(references, one, acting).beyond_rounding for one in motions])
+    motions, able = (Motions.of(problem, body, closed) for body in problem.bodies), rigid_balance.capable(problem)
+    return np.array([rigid_balance.along(references, one, acting, able).beyond_rounding for one in motions])
 
 
 def _holders(state: ContactState) -> Iterator[Holder]:

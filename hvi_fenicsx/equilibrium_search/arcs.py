@@ -202,7 +202,8 @@ class ArcTable:
         Args:
             x: a point, (n,).
         """
-        rows, k, inside = np.arange(len(x)), self.at(x), self.rates(x)
+        rows, k = np.arange(len(x)), self.at(x)
+        inside = self.tractions[rows, k] + self.slopes[rows, k] * (x - self.anchors[rows, k])
         low = np.where(x <= self.low[:, 0], -INF, inside)
         return low, np.where(x >= self.high[rows, k], self._around_ends[1][rows, k + 1], inside)
 
@@ -210,6 +211,11 @@ class ArcTable:
     def rounding(self) -> Array:
         """The size of a jump of the traction that is rounding, (n,)."""
         return LIMITS.rounding * np.maximum(np.abs(self.before), np.abs(self.after)).max(axis=1)
+
+    @cached_property
+    def offsets(self) -> Array:
+        """The tractions of the arcs, continued to zero, (n, m)."""
+        return self.tractions - self.slopes * self.anchors
 
     def at(self, x: Array) -> Integers:
         """The arc that holds x, of the two at a joint the left one; (n,)."""

@@ -193,7 +193,7 @@ def iterates(programme: Programme) -> Iterator[Iterate]:
     for _ in range(LIMITS.most_steps):
         yield here
         rest = _rest(programme, here)
-        off = max(float(here.shares @ here.reduced) / len(z), *(float(np.abs(r).max()) for r in rest))
+        off = max(float(here.shares @ here.reduced) / len(z), *map(magnitude, rest))
         if off < LIMITS.zero:
             return
         try:

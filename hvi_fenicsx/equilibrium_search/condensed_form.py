@@ -135,8 +135,7 @@ def _argument(bonds: Bonds, far: Array) -> float:
 
 def _far(laws: Sequence[Bonds]) -> float:
     """A displacement beyond all that the laws tell apart."""
-    sizes = [magnitude([b.law.length_scale, *b.law.breaks]) for b in laws]
-    return LIMITS.far * max([1.0, *map(float, sizes)])
+    return LIMITS.far * max([1.0, *(magnitude([b.law.length_scale, *b.law.breaks]) for b in laws)])
 
 
 def _frozen(bonds: Bonds) -> Bonds:

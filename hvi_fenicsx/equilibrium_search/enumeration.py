@@ -137,7 +137,7 @@ class Enumeration:
         """Keep the solution of a cell in which every law is on one arc, or one of them."""
         problem, arcs, rows = self.problem, self.problem.arcs, np.arange(self.problem.size)
         k = np.argmax(arcs.meets(cell.low, cell.high), axis=1)
-        offset = arcs.tractions[rows, k] - arcs.slopes[rows, k] * arcs.anchors[rows, k]
+        offset = arcs.offsets[rows, k]
         held = np.setdiff1d(rows, free)
         right = problem.force[free] - offset[free] - problem.stiffness[np.ix_(free, held)] @ cell.low[held]
         x, low, high = cell.low.copy(), cell.low[free], cell.high[free]

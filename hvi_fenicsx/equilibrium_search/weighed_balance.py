@@ -86,7 +86,7 @@ class Graphs:
             begin=np.where(meets, begin, 0.0),
             end=np.where(meets, end, 0.0),
             meets=meets,
-            offset=arcs.tractions - arcs.slopes * arcs.anchors,
+            offset=arcs.offsets,
             slope=arcs.slopes,
         )
 

@@ -241,11 +241,12 @@ def _places(part: Box) -> Integers:
 
 def _owners(parts: Sequence[Box], rank: int) -> Integers:
     """The rank that owns each vertex of a part, x running fastest, (n,): the first of those that have it."""
-    places = _places(parts[rank])
+    places, (lower, upper) = _places(parts[rank]), parts[rank]
     owner = np.full(len(places), rank)
     for other in reversed(range(rank)):
         begin, end = parts[other]
-        owner[np.all((places >= begin) & (places <= end), axis=1) & np.all(end > begin)] = other
+        if np.all((begin <= upper) & (end >= lower) & (end > begin)):
+            owner[np.all((places >= begin) & (places <= end), axis=1)] = other
     return owner
 
 

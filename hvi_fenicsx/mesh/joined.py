@@ -264,7 +264,7 @@ def common_mesh(
 
 def _from_local(comm: MPI.Comm, parts: Sequence[PlacedBody], numbers: Sequence[Integers]) -> dmesh.Mesh:
     """The mesh of local cells and vertices, of these first those that the rank owns. Collective."""
-    sizes = [len(part.points) for part in parts]
+    sizes = [len(found) for found in numbers]
     owned = np.concatenate([np.arange(n) < part.owned for n, part in zip(sizes, parts, strict=True)])
     order, place = np.argsort(~owned, kind="stable"), np.empty(len(owned), dtype=np.int32)
     place[order] = np.arange(len(order), dtype=np.int32)

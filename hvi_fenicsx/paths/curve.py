@@ -152,9 +152,8 @@ class CurvedBranch(Events):
     @override
     def watch_folds(self) -> None:
         self.trend = int(np.sign(self.rising)) or self.trend
-        with suppress(
-            Refused, np.linalg.LinAlgError
-        ):  # points pass their ends a little before or after them: that leaves rounding
+        # points pass their ends a little before or after them: that leaves rounding
+        with suppress(Refused, np.linalg.LinAlgError):
             y = np.append(self.correct(self.here.y, self.plane(0.0))[:-1], self.here.y[-1])
             self.here = self._at_place(y, self.here.tangent, self.points.values(y[:-1]))
 

@@ -84,17 +84,12 @@ class OverdampedMotion:
     def _extent(self) -> float:
         return magnitude(self._points.values(self.z).lengths)
 
-    def _left(self) -> Array:
-        """What is left of the forces, (n,)."""
-        values = self._points.values(self.z)
-        return self._load - self._problem.elastic @ values.x - values.force
-
     def _at_rest(self) -> bool:
         """Whether hardly any force is left, and the body would not leave by itself what is left of it."""
         values = self._points.values(self.z)
-        acting = (self._load, self._problem.elastic @ values.x, values.force)
-        size = max(magnitude(force) for force in acting)
-        rests = magnitude(self._left()) <= 1e-9 * size
+        elastic = self._problem.elastic @ values.x
+        size = max(magnitude(force) for force in (self._load, elastic, values.force))
+        rests = magnitude(self._load - elastic - values.force) <= 1e-9 * size
         self._points.elastic = self._problem.elastic  # without what holds back
         return rests and self._points.unstable_directions(values) == 0
 
@@ -122,7 +117,8 @@ class OverdampedMotion:
 
     def _stepped(self) -> _Went:
         """One step in time, up to the first drop, or to where the body is out of reach."""
-        points, left, values = self._points, self._left(), self._points.values(self.z)
+        points, values = self._points, self._points.values(self.z)
+        left = self._load - self._problem.elastic @ values.x - values.force
         points.elastic = self._held_back()
         if points.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
             return _Went.NOWHERE

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -62,7 +63,7 @@ class Resistance:
         if self.directions.shape[1] > 1 and any(f.plus != f.minus for f in (self.growth, self.peak)):
             raise InputError("a law of a length needs the same growth and peak on both sides")
 
-    @property
+    @cached_property
     def slips(self) -> Array:
         """What the law acts on, of each basis motion, (m, r, motions)."""
         return np.einsum("mrd,mnd->mrn", self.directions, self.fields)

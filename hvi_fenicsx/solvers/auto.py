@@ -96,9 +96,8 @@ class Auto(BranchIteration):
     def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> SolveResult:
         most, follows = self._most_without_path(), False
         if start is None and branches is None and self.system.terms and self.options.start == "unbroken":
-            follows = (
-                not self._held or most is not None
-            )  # loading decides which equilibrium is meant, or if there is one
+            # loading decides which equilibrium is meant, or if there is one
+            follows = not self._held or most is not None
         self._limit.next_start(most if follows else None)
         first = super().solve(start, branches)
         cut = self._limit.cut

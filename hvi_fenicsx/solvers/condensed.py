@@ -152,6 +152,7 @@ class _Complementarity:
 
     def __init__(self, system: System, models: Sequence[VertexModel]) -> None:
         self._system, self._models, self._residual = system, models, system.load.duplicate()
+        self._last: tuple[Array, PETSc.Vec] | None = None
         system.jacobian.set_rates([np.zeros_like(k) for k in system.jacobian.rates])
         rows = system.jacobian.rows
         self.kept = np.setdiff1d(rows.dofs, system.problem.fixed)
@@ -161,10 +162,12 @@ class _Complementarity:
         self._bounds = system.lower.array_r[self.kept], system.upper.array_r[self.kept]
 
     def expand(self, x: Array) -> PETSc.Vec:
-        """The displacement of the whole body in equilibrium with these contact displacements."""
-        found = self._system.load.duplicate()
-        found.array[:] = self._interior.expand(x, self._system.load.array_r)
-        return found
+        """The displacement of the whole body in equilibrium with these contact displacements; the last one is kept."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            found = self._system.load.duplicate()
+            found.array[:] = self._interior.expand(x, self._system.load.array_r)
+            self._last = x.copy(), found
+        return self._last[1]
 
     def force(self, x: Array) -> Array:
         """F, (n,): the residual on Γc of a body that is in equilibrium inside."""

@@ -74,6 +74,7 @@ class ConvergenceTest:
         self._blocks = rows // system.problem.dimension
         self._near = self._thresholds.near * system.references.at(self._blocks)
         self._loads = NodalForces.of(system.pushing)
+        self._able = rigid_motions.capable(system.problem)
         self._masks: list[Mask] | None = None
         self._motions: list[Motions] = []
 
@@ -115,7 +116,7 @@ class ConvergenceTest:
         columns = [values.reshape(-1, d) for values in (residual[at] - left[at], least, most)]
         holders = [Holder(contact, axes[:, k], *(c[:, k] for c in columns)) for k in range(d)]
         forces = ActingForces(left=acting, loads=self._loads, carried=[NodalForces(contact, laws)], holders=holders)
-        nets = [rigid_motions.along(system.references, y, forces) for y in self._motions]
+        nets = [rigid_motions.along(system.references, y, forces, self._able) for y in self._motions]
         return np.array([net.relative for net in nets]).T
 
     def _find_motions(self, x: PETSc.Vec) -> None:

@@ -11,7 +11,6 @@ import gc
 import json
 import statistics
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -117,18 +116,13 @@ class Measurement:
             StudyInterruptedError: it was asked to stop; finished points are kept.
         """
         plan, comm = self.plan, self.comm
-        into = (
-            nullcontext()
-            if target is None
-            else ResultFolder(comm, target, force=force or resume, inputs=inputs, kind="study")
-        )
-        with into as folder:
-            if folder is not None:
-                on_root(comm, lambda: self.resume(folder.announce(JOURNAL), anew=force))
+        if target is None:
+            self.run()
+            return on_root(comm, lambda: evaluate(plan, self.known, comm.size)), []
+        with ResultFolder(comm, target, force=force or resume, inputs=inputs, kind="study") as folder:
+            on_root(comm, lambda: self.resume(folder.announce(JOURNAL), anew=force))
             self.run()
             study = on_root(comm, lambda: evaluate(plan, self.known, comm.size))
-            if folder is None:
-                return study, []
             warnings = on_root(comm, lambda: _fill(folder.work, study))
             folder.commit(plan.own.scene, keep=[JOURNAL])
             return study, [*warnings, *folder.kept]

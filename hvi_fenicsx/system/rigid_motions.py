@@ -254,8 +254,12 @@ class NetForces:
         return float(np.max(found, initial=0.0))
 
 
-def _capable(problem: Problem) -> list[NodalForces]:
-    """Forces of the laws' own size along each of their directions."""
+def capable(problem: Problem) -> list[NodalForces]:
+    """Forces of the laws' own size along each of their directions.
+
+    Args:
+        problem: the problem.
+    """
     found = []
     for term in problem.terms:
         size = term.weights[:, None] * term.exact.traction_scale
@@ -263,21 +267,20 @@ def _capable(problem: Problem) -> list[NodalForces]:
     return found
 
 
-def along(references: References, motions: Motions, acting: ActingForces) -> NetForces:
+def along(references: References, motions: Motions, acting: ActingForces, able: Sequence[NodalForces]) -> NetForces:
     """The net forces of one body. Collective.
 
     Args:
         references: of the problem.
         motions: of the body.
         acting: what acts on all bodies.
+        able: what the laws could give (:func:`capable`).
     """
     carried = [*acting.carried, *(holder.forces for holder in acting.holders)]
     spare = np.zeros((2, len(motions.fields)))
     for holder in acting.holders:
         spare += holder.spare(motions)
-    loads, carry, could = (
-        _works(motions, forces) for forces in ([acting.loads], carried, _capable(references.problem))
-    )
+    loads, carry, could = (_works(motions, forces) for forces in ([acting.loads], carried, able))
     left = np.tensordot(motions.fields, acting.left)
     sums = np.array([left, loads[0], carry[1], could[1], loads[2] + carry[2], motions.squares, *spare])
     references.problem.comm.Allreduce(MPI.IN_PLACE, sums)

@@ -53,7 +53,7 @@ def path_chart(result: PathResult) -> Figure:
     fig = figure(5.8)
     titled(fig, result.title, _path_subject(result), *_path_verdict(result))
     axes = fig.add_subplot()
-    x, y = (u / units[0].size), (load / units[1].size)
+    x, y = u / units[0].size, load / units[1].size
     _stretches(axes, result, x, y)
     _marks(axes, result, x, y, units)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=0)

@@ -124,7 +124,7 @@ def _worth_seeing(part: ContactPart) -> ContactPart:
 
 def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     """A curve, with what the laws say of it."""
-    s, values = (part["s"] / length.size), (field.values / field.unit.size)
+    s, values = part["s"] / length.size, field.values / field.unit.size
     axes.plot(s, values, color=field.colour, marker="o" if len(s) <= MARKED else "", ms=3.6)
     if field.kind == "slip" and part.drops.size:
         look: dict[str, Any] = {"color": INK, "ls": (0, (4, 3)), "lw": 1.4, "zorder": 4}

@@ -16,7 +16,7 @@ from matplotlib.tri import Triangulation
 from typing_extensions import override
 
 from ...geometry import chains
-from ...typing import Array, Integers
+from ...typing import Array, Integers, magnitude
 from ..body_mesh import BodyMesh
 from ..solution_arrays import NOTHING
 from ..units import quantity
@@ -142,7 +142,7 @@ class PlaneCanvas(Canvas):
             self._line(lifted, f"lifted, up to {gap}", color=ORANGE, lw=4.5, marker="o", ms=2.5, zorder=5.5)
         kinds = (1, VERMILION, "contact pressure"), (-1, PURPLE, "contact tension")
         for sign, colour, words in kinds:
-            values = np.maximum(sign * np.nan_to_num(part.pressure[rows]), 0.0) / (float(np.abs(stress).max()) or 1.0)
+            values = np.maximum(sign * np.nan_to_num(part.pressure[rows]), 0.0) / (magnitude(stress) or 1.0)
             if values.max() > NOTHING:
                 self._profile(base, outward, values, shape.body.size, colour)
                 most = quantity(float((sign * stress).max()), "Pa")

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from typing_extensions import override
 
-from ...typing import Array, Integers
+from ...typing import Array, Integers, magnitude
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..units import quantity, unit_for
@@ -109,7 +109,7 @@ class SpaceCanvas(Canvas):
         if not parts:
             return
         values = np.nan_to_num(np.concatenate([geometry.part.pressure for geometry in parts]))
-        colours, low, high = pressure_scale(float(values.min(initial=0.0)), float(np.abs(values).max(initial=0.0)))
+        colours, low, high = pressure_scale(float(values.min(initial=0.0)), magnitude(values))
         for geometry in parts:
             self._skin(
                 shape.body.points, shape.points + self.nearer, geometry.facets, scalars=geometry.pressure, cmap=colours,
