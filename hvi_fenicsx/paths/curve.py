@@ -61,9 +61,18 @@ class CurvedBranch(Events):
     def _goes_on_for_ever(self, aim: float) -> bool:
         """Whether nothing ends the curve."""
         distances, _ = self._ends()
-        if np.isfinite(min(float(np.min(distances, initial=np.inf)), self._until(aim))):
-            return False
-        return not self.points.bent or magnitude(self.here.values.s) > self._far
+        nearest = min(float(np.min(distances, initial=np.inf)), self._until(aim))
+        if not self.points.bent:
+            return not np.isfinite(nearest)
+        slides_on = self.rising == 0.0 and nearest > self._far and self._is_straight()
+        return slides_on or bool(np.isinf(nearest) and magnitude(self.here.values.s) > self._far)
+
+    def _is_straight(self) -> bool:
+        """Whether the equations stay satisfied far along the tangent: a body slides on, and no force changes."""
+        y = self.here.y + self._far * self.here.tangent
+        load = (self.points.stiffness @ self.here.values.x + self.here.values.force) / self.points.forces
+        allowed = DEFAULT.none * (1.0 + magnitude(load)) + 4.0 * np.finfo(float).eps * self._far
+        return magnitude(self.residual(y, self.points.values(y[:-1]))) <= allowed
 
     def _ends(self) -> tuple[Array, Array]:
         """Along the tangent, the ways of all points to the ends of their segments, and these ends, (m,) each."""

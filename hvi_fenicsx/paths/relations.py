@@ -133,7 +133,7 @@ class ContactPoints(PointStatuses):
         """
         size = 1.0 + np.abs(values.s)
         steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
-        steep[np.abs(rates) <= DEFAULT.undecided * fastest] = 1.0
+        steep[np.abs(rates) * steep <= DEFAULT.reached * fastest] = 1.0
         return np.maximum(DEFAULT.reached / steep, DEFAULT.digits) * size
 
     def turning_back(self, values: Values, rates: Array) -> Mask:
