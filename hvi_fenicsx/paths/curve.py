@@ -247,7 +247,7 @@ class CurvedBranch(Events):
         if way >= 1e-7 and turns:
             raise Refused
         self.length = self._next
-        return move
+        return self._with_between(move) if self.points.vectors.have_modes else move
 
 
 def branch_from(

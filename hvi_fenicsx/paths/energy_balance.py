@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -68,7 +69,7 @@ class EnergyBalance:
         self._numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
         self._laws = [[law for law in points.vertices if law.group == n] for n in self._numbers]
         self._at: list[Integers] = [points.point_of[[law.unknowns[0] for law in laws]] for laws in self._laws]
-        self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
+        self._potential, self._lost = not points.vectors.have_modes, dissipated
         self.stored = self.at(values, factor)
 
     def at(self, values: Values, factor: float) -> Stored:
@@ -111,14 +112,21 @@ class EnergyBalance:
         self.stored = after
 
     def _driven(self, branch: CurvedBranch, arc: CurveStep) -> float:
-        """∫ f1ᵀx dλ along a step, both as cubic polynomials of the arc length."""
-        rate, length = self._problem.force_rate, float(np.linalg.norm(arc.after.y - arc.before.y))
-        places = arc.before, arc.after
-        (x0, x1), (l0, l1) = ([float(rate @ p.values.x) for p in places], [branch.unit * p.y[-1] for p in places])
-        dx0, dx1 = (length * float(rate @ displacement_rate(self._points, p)) for p in places)
-        dl0, dl1 = (length * branch.unit * p.tangent[-1] for p in places)
-        ends = (dx0 - dx1) * (l1 - l0) - (dl0 - dl1) * (x1 - x0)
-        return float(0.5 * (x0 + x1) * (l1 - l0) + ends / 10.0 + (dx1 * dl0 - dx0 * dl1) / 60.0)
+        """∫ f1ᵀx dλ along a step, both as cubic polynomials of the way along its first tangent between its points."""
+        rate, first, unit = self._problem.force_rate, arc.before.tangent, branch.unit
+        done = 0.0
+        for places in pairwise((arc.before, *arc.between, arc.after)):
+            way = float(first @ (places[1].y - places[0].y))
+            (x0, x1), (l0, l1) = [float(rate @ p.values.x) for p in places], [unit * p.y[-1] for p in places]
+            slopes = [way / float(first @ p.tangent) for p in places]
+            moved = [float(rate @ displacement_rate(self._points, p)) for p in places]
+            (dx0, dx1), (dl0, dl1) = (
+                np.multiply(slopes, moved),
+                [s * unit * p.tangent[-1] for s, p in zip(slopes, places, strict=True)],
+            )
+            ends = (dx0 - dx1) * (l1 - l0) - (dl0 - dl1) * (x1 - x0)
+            done += 0.5 * (x0 + x1) * (l1 - l0) + ends / 10.0 + (dx1 * dl0 - dx0 * dl1) / 60.0
+        return float(done)
 
     def leap(self, values: Values, factor: float) -> float:
         """To another state at the same factor; returns the energy that is released.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import toms748
@@ -28,10 +28,12 @@ class CurveStep(Move):
     Attributes:
         before: where it began.
         after: where it ended.
+        between: points on the way, where the work of the step is asked for.
     """
 
     before: CurvePoint
     after: CurvePoint
+    between: tuple[CurvePoint, ...] = ()
 
     @property
     def size(self) -> float:
@@ -158,6 +160,24 @@ class Events(CurveEquations):
         root = toms748(rate_at, 0.0, whole, xtol=1e-13 * whole, rtol=1e-13, k=1)
         rate_at(root)
         return self._moved(outcome, point, known[root].y)
+
+    def _with_between(self, move: CurveStep) -> CurveStep:
+        """The step with so many points between that it is a cubic polynomial from each to the next."""
+        whole = float(self.here.tangent @ (move.after.y - self.here.y))
+        known = {0.0: move.before, whole: move.after}
+        if whole > DEFAULT.standing:
+            self._divide(known, 0.0, whole)
+        return replace(move, between=tuple(known[way] for way in sorted(known)[1:-1]))
+
+    def _divide(self, known: dict[float, CurvePoint], low: float, high: float) -> None:
+        """Halve a part of a step until cubic polynomials meet its middle."""
+        middle, ends = 0.5 * (low + high), [known[way] for way in (low, high)]
+        (y0, y1), (t0, t1) = [e.y for e in ends], [e.tangent / (self.here.tangent @ e.tangent) for e in ends]
+        known[middle] = self._at(middle, known)
+        off = magnitude(0.5 * (y0 + y1) + 0.125 * (high - low) * (t0 - t1) - known[middle].y)
+        if off > DEFAULT.slow * magnitude(y1 - y0) and high - low > DEFAULT.small * max(known):
+            self._divide(known, low, middle)
+            self._divide(known, middle, high)
 
     def _turned(self, after: CurvePoint) -> tuple[StepEnd, int | None] | None:
         largest = magnitude(after.tangent)
