@@ -215,7 +215,8 @@ class Model(Content):
 
     def _content(self) -> tuple[Any, ...]:
         body = self.domain, self.parts, self.body.interfaces
-        return body, self.effects, self.title, self.solver, self.path, self.plugins
+        effects = sorted(self.effects, key=lambda effect: (effect.place.value, effect.name, effect.key))
+        return body, effects, self.title, self.solver, self.path, self.plugins
 
     def __repr__(self) -> str:
         names = (f"{type(effect).__name__} on {in_words(effect.where)}" for effect in self.effects)

@@ -19,7 +19,7 @@ NAMES = {"left": 1, "joint_of_a": 2, "joint_of_b": 3, "right": 4}
 def body(joint_of_b: int) -> hvi.Body:
     """Two unit squares that lie on each other at x = 1 and share no vertex; the facets of b's side have this tag."""
     domain = ufl.Mesh(element("Lagrange", "triangle", 1, shape=(2,)))
-    mesh = dolfinx.mesh.create_mesh(MPI.COMM_SELF, CELLS, POINTS, domain)
+    mesh = dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells=CELLS, x=POINTS, e=domain)
     mesh.topology.create_connectivity(1, 2)
     mesh.topology.create_connectivity(2, 1)
     where = {0.0: 1, 2.0: 4}
