@@ -7,6 +7,7 @@ function, and a preconditioner that works at full size.
 from __future__ import annotations
 
 import copy
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -14,6 +15,8 @@ from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.optimize import brentq
+from typing_extensions import override
 
 from ..compat import NOT_A_NUMBER
 from ..runtime.cost import Timer
@@ -22,7 +25,7 @@ from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.multigrid import Levels
 from ..system.petsc_options import default_options, prefix, raise_python_error
 from ..system.system import System
-from ..typing import Entities
+from ..typing import Array, Entities, Mask
 from .convergence import ConvergenceTest, Counts, Outcome, Sizes
 
 StepReport = Callable[[int, float, int], None]
@@ -38,10 +41,8 @@ _WORDS = {
 """What PETSc's reasons mean, for users."""
 FULL_STEPS = "basic"
 """PETSc's name of the line search that shortens no step."""
-EXACT = "cp"
-"""PETSc's name of the one that looks for where the slope of the energy along a step is zero."""
-ENERGY = "bt"
-"""PETSc's name of the one that backtracks by the energy."""
+EXACT = "exact"
+"""Our own, to where the slope of the energy along a step is zero."""
 Bounds = tuple[PETSc.Vec, PETSc.Vec]
 """Lower and upper ones."""
 
@@ -52,17 +53,15 @@ class Attempt:
 
     Attributes:
         models: what takes the place of the laws, by term.
-        line_search: PETSc's name; ``bt`` uses the energy.
+        line_search: :data:`FULL_STEPS` or :data:`EXACT`.
         start: where to begin instead; None for where it would.
         steady: whether the start's active set is expected to be the final one; the first linear solve is then exact.
-        foundation: as in :meth:`.Equations.tangents`; the residual has none, so the solution is the same.
     """
 
     models: Sequence[VertexModel]
     line_search: str = FULL_STEPS
     start: PETSc.Vec | None = None
     steady: bool = False
-    foundation: float = 0.0
 
 
 class ActiveSetSolver:
@@ -172,7 +171,7 @@ class ActiveSetSolver:
             if found.converged or found.interrupted:
                 break
             # an energy that has fallen is kept; else the next attempt begins where this one began
-            if attempt.line_search == ENERGY and np.isfinite(found.measure):
+            if attempt.line_search == EXACT and np.isfinite(found.measure):
                 x.copy(begin)
         best.copy(x)
         return replace(outcome, interrupted=found.interrupted)
@@ -189,12 +188,13 @@ class ActiveSetSolver:
         """
         with self.timer("solve"):
             self.system.evaluate_by_cells(x)
-            found, left = _SnesRun(self, attempt, tolerance, bounds).into(x, most), np.inf
+            run = _ProjectedRun if attempt.line_search == EXACT else _SnesRun
+            found, left = run(self, attempt, tolerance, bounds).into(x, most), np.inf
             while not found.interrupted and found.measure <= self.system.thresholds.coarse_tolerance:
                 found, sizes = self._measured(found, x, attempt.models, tolerance, bounds)
                 if found.converged or found.measure > 0.5 * left:
                     return self.convergence.accept_rounding(found, sizes, x, tolerance)
-                left, again = found.measure, _SnesRun(self, attempt, tolerance, bounds).into(x, most)
+                left, again = found.measure, run(self, attempt, tolerance, bounds).into(x, most)
                 found = replace(again, newton=found.newton + again.newton, linear=found.linear + again.linear)
             return found
 
@@ -222,75 +222,32 @@ class ActiveSetSolver:
         return replace(found, converged=sizes.worst <= tolerance, measure=sizes.worst), sizes
 
 
-class _SnesRun:
-    """One SNES solve: its convergence test, and the context of its matrix and of its linear solver.
-
-    J's inactive part is not copied; its equations are solved at full size (:class:`.HeldPreconditioner`).
-    """
+class _Run(ABC):
+    """One solve: when it ends, and how."""
 
     def __init__(self, owner: ActiveSetSolver, attempt: Attempt, tolerance: float, bounds: Bounds) -> None:
         self._owner, self._attempt, self._tolerance, self._bounds = owner, attempt, tolerance, bounds
         self._system, self._thresholds = owner.system, owner.system.thresholds
         self._last = self._least = float("inf")
         self._useless, self._stood, self._stopped, self._reason = 0, False, False, ""
-        self._active: Entities | None = None
 
+    @abstractmethod
     def into(self, x: PETSc.Vec, most: int) -> Outcome:
-        """Run SNES from and into x. Collective."""
-        self._snes = snes = self._configured(most)
-        try:
-            snes.solve(None, x)
-        except PETSc.Error as error:
-            raise_python_error(error)
-            self._last, self._reason = np.inf, f"PETSc error {error.ierr}"
-        finally:
-            steps, linear = snes.getIterationNumber(), snes.getLinearSolveIterations()
-            name = _REASON.get(int(snes.getConvergedReason()), "")
-            snes.destroy()
-        left = self._last if np.isfinite(self._last) else np.inf
-        reason = self._reason or (f"{_WORDS[name]} ({name})" if name in _WORDS else name)
-        return Outcome(left <= self._tolerance, steps, linear, left, reason, self._stopped)
+        """Run from and into x, so many steps at most. Collective."""
 
-    def _configured(self, most: int) -> PETSc.SNES:
-        system, attempt = self._system, self._attempt
-        matrix = self._python_matrix(system.jacobian.matrix.getSizes())
-        snes = PETSc.SNES().create(system.comm)
-        snes.setType("vinewtonrsls")
-        snes.setFunction(lambda _, x, f: system.equations.residual(x, f, attempt.models), system.load.duplicate())
-        snes.setJacobian(self._set_tangent, matrix)
-        snes.setVariableBounds(*self._bounds)
-        snes.setObjective(lambda _, x: system.equations.energy_from_base(x, attempt.models))
-        snes.setConvergenceTest(self._test)
-        snes.setTolerances(max_it=most)
-        near = self._thresholds.near * float(np.min(system.references.scale))
-        search = {"snes_linesearch_type": attempt.line_search, "snes_linesearch_max_it": 40}
-        ksp = snes.getKSP()
-        with default_options({**search, "snes_vi_zero_tolerance": near}):
-            snes.setOptionsPrefix(prefix())
-            ksp.setOptionsPrefix(f"{prefix()}inactive_")  # the user's -ksp_type is for the one at full size
-            snes.setFromOptions()
-        ksp.getPC().setType(PETSc.PC.Type.NONE)
-        ksp.setType(PETSc.KSP.Type.PYTHON)
-        ksp.setPythonContext(self)
-        return snes
+    def _outcome(self, steps: int, linear: int, reason: int) -> Outcome:
+        left, name = self._last if np.isfinite(self._last) else np.inf, _REASON.get(reason, "")
+        words = self._reason or (f"{_WORDS[name]} ({name})" if name in _WORDS else name)
+        return Outcome(left <= self._tolerance, steps, linear, left, words, self._stopped)
 
-    def _python_matrix(self, sizes: Any) -> PETSc.Mat:
-        matrix = PETSc.Mat().createPython(sizes, self, comm=self._system.comm)
-        matrix.setUp()
-        return matrix
-
-    def _set_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
-        rates = self._system.equations.tangents(x, self._attempt.models, self._attempt.foundation)
-        self._system.jacobian.set_rates(rates)
-
-    def _test(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
-        """PETSc's convergence test: the residual of the inequality, and whether to give up."""
-        x, owner, reasons = snes.getSolution(), self._owner, PETSc.SNES.ConvergedReason
-        before, self._last = self._last, owner.convergence.sizes(x, snes.getFunction()[0], *self._bounds).worst
+    def _ends(self, iteration: int, x: PETSc.Vec, residual: PETSc.Vec) -> int:
+        """Why to end, by the residual of the inequality or since it is in vain; 0: to go on. Collective."""
+        owner, reasons = self._owner, PETSc.SNES.ConvergedReason
+        before, self._last = self._last, owner.convergence.sizes(x, residual, *self._bounds).worst
         if owner.progress:
             owner.progress(iteration, self._last, owner.convergence.in_contact(x))
         moved = self._system.equations.from_base(x).norm(PETSc.NormType.INFINITY)
-        if moved > self._thresholds.runaway:
+        if moved > self._thresholds.runaway and self._attempt.line_search != EXACT:
             self._reason = f"a displacement of more than {self._thresholds.runaway:.0e} times p0 L / E0"
         elif self._last <= self._tolerance:
             return reasons.CONVERGED_FNORM_RELATIVE
@@ -315,6 +272,61 @@ class _SnesRun:
         self._stood = abs(left - before) < small * before
         counts = self._attempt.line_search == FULL_STEPS or left < small
         return (stood and self._stood) or (counts and self._useless >= self._thresholds.few_steps)
+
+
+class _SnesRun(_Run):
+    """By PETSc's SNES: its convergence test, and the context of its matrix and of its linear solver.
+
+    J's inactive part is not copied; its equations are solved at full size (:class:`.HeldPreconditioner`).
+    """
+
+    _active: Entities | None = None
+
+    @override
+    def into(self, x: PETSc.Vec, most: int) -> Outcome:
+        self._snes = snes = self._configured(most)
+        try:
+            snes.solve(None, x)
+        except PETSc.Error as error:
+            raise_python_error(error)
+            self._last, self._reason = np.inf, f"PETSc error {error.ierr}"
+        finally:
+            counts = snes.getIterationNumber(), snes.getLinearSolveIterations(), int(snes.getConvergedReason())
+            snes.destroy()
+        return self._outcome(*counts)
+
+    def _configured(self, most: int) -> PETSc.SNES:
+        system, attempt = self._system, self._attempt
+        matrix = self._python_matrix(system.jacobian.matrix.getSizes())
+        snes = PETSc.SNES().create(system.comm)
+        snes.setType("vinewtonrsls")
+        snes.setFunction(lambda _, x, f: system.equations.residual(x, f, attempt.models), system.load.duplicate())
+        snes.setJacobian(self._set_tangent, matrix)
+        snes.setVariableBounds(*self._bounds)
+        snes.setObjective(lambda _, x: system.equations.energy_from_base(x, attempt.models))
+        snes.setConvergenceTest(self._test)
+        snes.setTolerances(max_it=most)
+        near = self._thresholds.near * float(np.min(system.references.scale))
+        ksp = snes.getKSP()
+        with default_options({"snes_linesearch_type": FULL_STEPS, "snes_vi_zero_tolerance": near}):
+            snes.setOptionsPrefix(prefix())
+            ksp.setOptionsPrefix(f"{prefix()}inactive_")  # the user's -ksp_type is for the one at full size
+            snes.setFromOptions()
+        ksp.getPC().setType(PETSc.PC.Type.NONE)
+        ksp.setType(PETSc.KSP.Type.PYTHON)
+        ksp.setPythonContext(self)
+        return snes
+
+    def _python_matrix(self, sizes: Any) -> PETSc.Mat:
+        matrix = PETSc.Mat().createPython(sizes, self, comm=self._system.comm)
+        matrix.setUp()
+        return matrix
+
+    def _set_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
+        self._system.jacobian.set_rates(self._system.equations.tangents(x, self._attempt.models))
+
+    def _test(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
+        return self._ends(iteration, snes.getSolution(), snes.getFunction()[0])
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Multiply y = J x; a line search that fails needs it to test for a minimum of the residual's norm."""
@@ -346,3 +358,77 @@ class _SnesRun:
         self._active = found
         self._owner.held.prepare(found)
         return bool(self._system.comm.allreduce(moved))
+
+
+class _ProjectedRun(_Run):
+    """By projected Newton steps (Bertsekas 1982), where a step as a whole leads off, and a shorter one nowhere.
+
+    Unknowns at a bound that the residual pushes against are held. The path is projected onto the bounds, and is
+    followed to where the slope of the energy is zero: beside large loads in balance energies are rounding, not so their
+    slopes. Bodies share no force, so each has a length of its own.
+    """
+
+    _linear = 0
+
+    @override
+    def into(self, x: PETSc.Vec, most: int) -> Outcome:
+        self._residual, reasons = self._system.load.duplicate(), PETSc.SNES.ConvergedReason
+        self._move(x, x.array_r, 0.0)
+        for steps in range(most + 1):
+            self._system.equations.residual(x, self._residual, self._attempt.models)
+            reason = self._ends(steps, x, self._residual)
+            if reason or steps == most:
+                break
+            if not self._step(x):
+                reason = reasons.DIVERGED_LINE_SEARCH
+                break
+        return self._outcome(steps, self._linear, reason or reasons.DIVERGED_MAX_IT)
+
+    def _step(self, x: PETSc.Vec) -> bool:
+        """One step from and into x, whose residual is known; whether there was any. Collective."""
+        step, problem = self._newton_step(x), self._system.problem
+        labels = np.repeat(problem.bodies.labels[: x.local_size // problem.dimension], problem.dimension)
+        lengths = []
+        for body in problem.bodies if np.isfinite(step.norm()) else ():
+            direction = np.where(labels == body.index, step.array_r, 0.0)
+            lengths.append(self._length(x, direction))
+            self._move(x, direction, lengths[-1])
+        return any(lengths)
+
+    def _newton_step(self, x: PETSc.Vec) -> PETSc.Vec:
+        system, held, step = self._system, self._owner.held, x.duplicate()
+        system.jacobian.set_rates(system.equations.tangents(x, self._attempt.models, self._thresholds.foundation))
+        right, (lower, upper) = -self._residual, (v.array_r for v in self._bounds)
+        fixed = np.flatnonzero(self._at_bounds(x, right.array_r) | (lower >= upper)).astype(np.int32)
+        right.array[fixed] = 0.0
+        step.set(0.0)
+        held.prepare(fixed)
+        self._linear += held.solve(right, step, self._thresholds.coarse_tolerance)[0]
+        step.array[fixed] = 0.0
+        return step
+
+    def _length(self, x: PETSc.Vec, direction: Array) -> float:
+        """How far to where the slope of the energy along a projected direction is zero; 0: it rises. Collective."""
+
+        def slope(length: float) -> float:
+            there = x.copy()
+            self._move(there, direction, length)
+            self._system.equations.residual(there, self._residual, self._attempt.models)
+            works = self._residual.array_r * np.where(self._at_bounds(there, direction), 0.0, direction)
+            return float(self._system.comm.allreduce(np.sum(works)))
+
+        if slope(0.0) >= 0.0:
+            return 0.0
+        far = 1.0
+        while (falls := slope(far) < 0.0) and far < self._thresholds.runaway**2:
+            far *= 2.0
+        return far if falls else float(brentq(slope, 0.0, far, rtol=self._thresholds.coarse_tolerance))
+
+    def _at_bounds(self, x: PETSc.Vec, direction: Array) -> Mask:
+        """Which unknowns do not go in a direction, since they are at a bound."""
+        u, (lower, upper) = x.array_r, (v.array_r for v in self._bounds)
+        return ((u <= lower) & (direction < 0.0)) | ((u >= upper) & (direction > 0.0))
+
+    def _move(self, x: PETSc.Vec, direction: Array, length: float) -> None:
+        """Along a direction, projected onto the bounds."""
+        x.array[:] = np.clip(x.array_r + length * direction, *(v.array_r for v in self._bounds))

@@ -2,10 +2,10 @@
 
 Loading decides which equilibrium is meant, or that there is none (:func:`follow`). Where its path is not
 followed, or ends before the whole load, few other starts are tried. Each buys cases that nothing else solves (the hard
-cases, docs/hard-cases.md): bodies at rest on their supports, where they roll or tip on the way; the pieces of the
-slips at rest, and every bond broken, where the iteration slides off in the metastable state; and, where laws push,
-Newton's method through narrowing smoothings, which finds equilibria that are no minimum of the energy
-(:mod:`.continuation`). Where an equilibrium may not exist, the search ends after a number of Newton steps.
+cases, docs/hard-cases.md): the pieces of the slips at rest, and every bond broken, where the iteration slides off in
+the metastable state; and, where laws push, Newton's method through narrowing smoothings, which finds equilibria that
+are no minimum of the energy (:mod:`.continuation`). Where an equilibrium may not exist, the search ends after a number
+of Newton steps.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from . import continuation
 from .branch import BranchIteration
 from .convergence import Counts
 from .method import Borne, SolveContext, SolveResult
-from .resting_start import at_rest, resting_start
+from .resting_start import resting_start
 
 
 class _StepLimit:
@@ -94,15 +94,12 @@ class Auto(BranchIteration):
         return replace(found, interrupted=False, reason=reason)
 
     def _search(self, start: PETSc.Vec | None, branches: PETSc.Vec | None) -> SolveResult:
-        most, follows = self._most_without_path(), False
-        if start is None and branches is None and self.system.terms and self.options.start == "unbroken":
-            # loading decides which equilibrium is meant, or if there is one
-            follows = not self._held or most is not None
-        self._limit.next_start(most if follows else None)
+        follows = start is None and branches is None and self.options.start == "unbroken"
+        self._limit.next_start(self._most_without_path() if follows else None)
         first = super().solve(start, branches)
         cut = self._limit.cut
         self._limit.next_start()
-        if first.converged or (first.interrupted and not cut) or not self.system.terms:
+        if first.converged or (first.interrupted and not cut):
             return first
         along = self._along_path(first) if follows else None
         if along is not None:
@@ -164,8 +161,6 @@ class Auto(BranchIteration):
 
     def _others(self, most: int | None = None) -> Iterator[SolveResult]:
         """Results from other starts, one after the other, each in so many Newton steps at most."""
-        if most is None:
-            yield from self._from_rest()
         yield from self._on_other_pieces(most)
         self._limit.next_start()
         yield from self._from_exact()
@@ -191,19 +186,6 @@ class Auto(BranchIteration):
             if found.converged:
                 yield from self._attempt(self._iteration().solve, self.system.unknowns(found.u))
 
-    def _from_rest(self) -> Iterator[SolveResult]:
-        """From bodies at rest on their supports, since closed contact is no start where bodies roll.
-
-        The bonds are as they are at rest, then unbroken.
-        """
-        rested = at_rest(self.solver, self._laws)
-        if rested is None:
-            return
-        unbroken = rested[0].duplicate()
-        unbroken.set(0.0)
-        for bonds in (rested[0], unbroken):
-            yield from self._attempt(self._iteration().solve, rested[0], bonds)
-
     def _iteration(self) -> BranchIteration:
         """A branch iteration in the same context, on the same laws."""
         return BranchIteration(self.context, self._laws, self._epsilon, check_bounded=True)
@@ -213,6 +195,31 @@ class Auto(BranchIteration):
         """The result of one attempt; none where the method breaks down."""
         with suppress(SolverError):
             yield solve(*start)
+
+
+class ConvexProgramme(Auto):
+    """The quadratic programme on one system, one convex step, else the load path; call :meth:`solve` once."""
+
+    name = "convex"
+    description = "one convex quadratic programme by SNES VI (reduced space)"
+    in_scenes = False
+
+    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> SolveResult:
+        """The minimiser, or what was reached. Collective.
+
+        Args:
+            start: where to begin; by default with contact closed.
+            branches: as of :meth:`.BranchIteration.solve`.
+        """
+        found = super().solve(start)
+        found.counts.branch = 0  # it is not iterated
+        return found
+
+    def _others(self, most: int | None = None) -> Iterator[SolveResult]:
+        return iter(())
+
+    def _tolerances(self) -> list[float]:
+        return [self.options.tolerance]
 
 
 def softens(law: Superpotential) -> bool:

@@ -1,8 +1,7 @@
 """One convex step of the branch iteration: the inequality that remains when G is linearised at ξ ∈ ∂G.
 
 The kinks of H stay in the step: each vertex is kept in a cell between two kinks, and changes its cell until no kink is
-overloaded. Where a step fails, other line searches and a secant stiffness are tried, and it is asked whether the step
-has a minimiser at all.
+overloaded. Where a step fails, it is asked whether it has a minimiser at all, and another line search is tried.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from ..system.equations import Cells, VertexModel
 from ..system.system import System
 from ..typing import Array
 from . import kink_bounds
-from .active_set import ENERGY, EXACT, Attempt
+from .active_set import EXACT, Attempt
 from .convergence import Counts, Outcome
 from .method import SolveContext
 from .resting_start import at_rest
@@ -232,9 +231,7 @@ class ConvexStep:
         if is_quadratic(self._system) and (rested := at_rest(self._solver, self._laws)) is not None:
             self._counts.linear += rested[1]
             yield Attempt(models=models, start=rested[0])
-        yield Attempt(models=models, line_search=EXACT, foundation=self._thresholds.foundation)
-        secants = [replace(m, secant_from=m.law.length_scale) for m in models]
-        yield Attempt(models=secants, line_search=ENERGY, foundation=self._thresholds.foundation)
+        yield Attempt(models=models, line_search=EXACT)
         yield Attempt(models=models)
 
 

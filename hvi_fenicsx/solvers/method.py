@@ -177,8 +177,6 @@ class Method(ABC):
         if "name" not in cls.__dict__:
             return
         cls.label = cls.__dict__.get("label", cls.name)
-        if not cls.in_scenes:
-            return
         if cls.__module__.rpartition(".")[0] != __package__:
             load_all()  # all names of the program are known then
         enter(Method.registry, cls, cls.name, "method")
@@ -262,7 +260,7 @@ class SolveResult:
 def available() -> tuple[str, ...]:
     """Names of all methods that a scene may name, the user's own among them, ``auto`` first."""
     load_all()
-    return ("auto", *sorted(name for name in Method.registry if name != "auto"))
+    return ("auto", *sorted(name for name, kind in Method.registry.items() if kind.in_scenes and name != "auto"))
 
 
 def find(name: str) -> type[Method]:
@@ -271,10 +269,9 @@ def find(name: str) -> type[Method]:
     Raises:
         InputError: there is none; the message has the allowed names.
     """
-    load_all()
-    if name in Method.registry:
-        return Method.registry[name]
     known = available()
+    if name in known:
+        return Method.registry[name]
     raise InputError(f"solver.method: unknown method {name!r}{hint(name, known)}; allowed: {', '.join(known)}")
 
 

@@ -13,10 +13,9 @@ from petsc4py import PETSc
 
 from ..system.equations import VertexModel
 from ..system.system import System
-from .branch import BranchIteration
 from .convergence import Counts, Outcome
 from .convex_step import is_quadratic
-from .method import Method, SolveResult, SolverTable, find
+from .method import Method, SolveResult, SolverTable, find, load_all
 
 
 class LinearSolve(Method):
@@ -49,28 +48,6 @@ class LinearSolve(Method):
         return self.solver.judged(step, x, models, self.options.tolerance, bounds)
 
 
-class ConvexProgramme(BranchIteration):
-    """The quadratic programme on one system, one convex step; call :meth:`solve` once."""
-
-    name = "convex"
-    description = "one convex quadratic programme by SNES VI (reduced space)"
-    in_scenes = False
-
-    def solve(self, start: PETSc.Vec | None = None, branches: PETSc.Vec | None = None) -> SolveResult:
-        """The minimiser, or what was reached. Collective.
-
-        Args:
-            start: where to begin; by default with contact closed.
-            branches: as of :meth:`.BranchIteration.solve`.
-        """
-        found = super().solve(start)
-        self.counts.branch = 0  # it is not iterated
-        return found
-
-    def _tolerances(self) -> list[float]:
-        return [self.options.tolerance]
-
-
 def choose(options: SolverTable, system: System) -> type[Method]:
     """The method that solves a system: the one that is named, or the simplest that the effects allow.
 
@@ -82,5 +59,6 @@ def choose(options: SolverTable, system: System) -> type[Method]:
         InputError: there is no such method.
     """
     if options.method == "auto" and is_quadratic(system):
-        return ConvexProgramme if system.bounds else LinearSolve
+        load_all()
+        return Method.registry["convex" if system.bounds else "linear"]
     return find(options.method)
