@@ -65,13 +65,14 @@ class CurvedBranch(Events):
         if not self.points.bent:
             return not np.isfinite(nearest)
         slides_on = self.rising == 0.0 and nearest > self._far and self._is_straight()
-        return slides_on or bool(np.isinf(nearest) and magnitude(self.here.values.s) > self._far)
+        return slides_on or (nearest == np.inf and magnitude(self.here.values.s) > self._far)
 
     def _is_straight(self) -> bool:
         """Whether the equations stay satisfied far along the tangent: a body slides on, and no force changes."""
         y = self.here.y + self._far * self.here.tangent
-        load = (self.points.stiffness @ self.here.values.x + self.here.values.force) / self.points.forces
-        allowed = DEFAULT.none * (1.0 + magnitude(load)) + 4.0 * np.finfo(float).eps * self._far
+        values = self.here.values
+        load = (self.points.stiffness @ values.x + values.force) / self.points.forces
+        allowed = DEFAULT.none * (1.0 + magnitude(load)) + DEFAULT.digits * self._far
         return magnitude(self.residual(y, self.points.values(y[:-1]))) <= allowed
 
     def _ends(self) -> tuple[Array, Array]:

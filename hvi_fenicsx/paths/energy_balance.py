@@ -119,11 +119,8 @@ class EnergyBalance:
             way = float(first @ (places[1].y - places[0].y))
             (x0, x1), (l0, l1) = [float(rate @ p.values.x) for p in places], [unit * p.y[-1] for p in places]
             slopes = [way / float(first @ p.tangent) for p in places]
-            moved = [float(rate @ displacement_rate(self._points, p)) for p in places]
-            (dx0, dx1), (dl0, dl1) = (
-                np.multiply(slopes, moved),
-                [s * unit * p.tangent[-1] for s, p in zip(slopes, places, strict=True)],
-            )
+            dx0, dx1 = np.multiply(slopes, [float(rate @ displacement_rate(self._points, p)) for p in places])
+            dl0, dl1 = np.multiply(slopes, [unit * p.tangent[-1] for p in places])
             ends = (dx0 - dx1) * (l1 - l0) - (dl0 - dl1) * (x1 - x0)
             done += 0.5 * (x0 + x1) * (l1 - l0) + ends / 10.0 + (dx1 * dl0 - dx0 * dl1) / 60.0
         return float(done)

@@ -1,7 +1,7 @@
 """One smooth, bound-constrained solve by PETSc's reduced-space active-set Newton method (SNES VI, ``vinewtonrsls``).
 
-To PETSc's own method (solver-notes.md) it adds a convergence test on the residual of the inequality, an energy as merit
-function, and a preconditioner that works at full size.
+To PETSc's own method it adds a convergence test on the residual of the inequality, and a preconditioner that works at
+full size; beside it stand projected Newton steps with a line search.
 """
 
 from __future__ import annotations
@@ -39,10 +39,6 @@ _WORDS = {
     _REASON[NOT_A_NUMBER]: "the residual is no number",
 }
 """What PETSc's reasons mean, for users."""
-FULL_STEPS = "basic"
-"""PETSc's name of the line search that shortens no step."""
-EXACT = "exact"
-"""Our own, to where the slope of the energy along a step is zero."""
 Bounds = tuple[PETSc.Vec, PETSc.Vec]
 """Lower and upper ones."""
 
@@ -53,13 +49,13 @@ class Attempt:
 
     Attributes:
         models: what takes the place of the laws, by term.
-        line_search: :data:`FULL_STEPS` or :data:`EXACT`.
+        exact: whether by projected steps with an exact line search; else by PETSc's full steps.
         start: where to begin instead; None for where it would.
         steady: whether the start's active set is expected to be the final one; the first linear solve is then exact.
     """
 
     models: Sequence[VertexModel]
-    line_search: str = FULL_STEPS
+    exact: bool = False
     start: PETSc.Vec | None = None
     steady: bool = False
 
@@ -171,7 +167,7 @@ class ActiveSetSolver:
             if found.converged or found.interrupted:
                 break
             # an energy that has fallen is kept; else the next attempt begins where this one began
-            if attempt.line_search == EXACT and np.isfinite(found.measure):
+            if attempt.exact and np.isfinite(found.measure):
                 x.copy(begin)
         best.copy(x)
         return replace(outcome, interrupted=found.interrupted)
@@ -188,7 +184,7 @@ class ActiveSetSolver:
         """
         with self.timer("solve"):
             self.system.evaluate_by_cells(x)
-            run = _ProjectedRun if attempt.line_search == EXACT else _SnesRun
+            run = _ProjectedRun if attempt.exact else _SnesRun
             found, left = run(self, attempt, tolerance, bounds).into(x, most), np.inf
             while not found.interrupted and found.measure <= self.system.thresholds.coarse_tolerance:
                 found, sizes = self._measured(found, x, attempt.models, tolerance, bounds)
@@ -229,15 +225,17 @@ class _Run(ABC):
         self._owner, self._attempt, self._tolerance, self._bounds = owner, attempt, tolerance, bounds
         self._system, self._thresholds = owner.system, owner.system.thresholds
         self._last = self._least = float("inf")
-        self._useless, self._stood, self._stopped, self._reason = 0, False, False, ""
+        self._useless, self._stood, self._stopped, self._far, self._reason = 0, False, False, False, ""
 
     @abstractmethod
     def into(self, x: PETSc.Vec, most: int) -> Outcome:
         """Run from and into x, so many steps at most. Collective."""
 
     def _outcome(self, steps: int, linear: int, reason: int) -> Outcome:
-        left, name = self._last if np.isfinite(self._last) else np.inf, _REASON.get(reason, "")
+        left, name = max(self._last, float(self._far)) if np.isfinite(self._last) else np.inf, _REASON.get(reason, "")
         words = self._reason or (f"{_WORDS[name]} ({name})" if name in _WORDS else name)
+        if self._far:
+            words = f"a displacement of more than {self._thresholds.runaway:.0e} times p0 L / E0"
         return Outcome(left <= self._tolerance, steps, linear, left, words, self._stopped)
 
     def _ends(self, iteration: int, x: PETSc.Vec, residual: PETSc.Vec) -> int:
@@ -246,16 +244,14 @@ class _Run(ABC):
         before, self._last = self._last, owner.convergence.sizes(x, residual, *self._bounds).worst
         if owner.progress:
             owner.progress(iteration, self._last, owner.convergence.in_contact(x))
-        moved = self._system.equations.from_base(x).norm(PETSc.NormType.INFINITY)
-        if moved > self._thresholds.runaway and self._attempt.line_search != EXACT:
-            self._reason = f"a displacement of more than {self._thresholds.runaway:.0e} times p0 L / E0"
-        elif self._last <= self._tolerance:
+        self._far = x.norm(PETSc.NormType.INFINITY) > self._thresholds.runaway
+        if self._last <= self._tolerance and not self._far:
             return reasons.CONVERGED_FNORM_RELATIVE
         self._stopped = owner.interrupted()
         if self._stopped:
-            self._reason = self._reason or "interrupted"
+            self._reason = "interrupted"
             return reasons.DIVERGED_FUNCTION_COUNT
-        if self._reason or not np.isfinite(self._last):
+        if (self._far and not self._attempt.exact) or not np.isfinite(self._last):
             return NOT_A_NUMBER
         return reasons.DIVERGED_DTOL if self._gives_up(before) else reasons.CONVERGED_ITERATING
 
@@ -270,7 +266,7 @@ class _Run(ABC):
         if left < 0.5 * self._least:
             self._least, self._useless = left, 0
         self._stood = abs(left - before) < small * before
-        counts = self._attempt.line_search == FULL_STEPS or left < small
+        counts = not self._attempt.exact or left < small
         return (stood and self._stood) or (counts and self._useless >= self._thresholds.few_steps)
 
 
@@ -303,12 +299,11 @@ class _SnesRun(_Run):
         snes.setFunction(lambda _, x, f: system.equations.residual(x, f, attempt.models), system.load.duplicate())
         snes.setJacobian(self._set_tangent, matrix)
         snes.setVariableBounds(*self._bounds)
-        snes.setObjective(lambda _, x: system.equations.energy_from_base(x, attempt.models))
         snes.setConvergenceTest(self._test)
         snes.setTolerances(max_it=most)
         near = self._thresholds.near * float(np.min(system.references.scale))
         ksp = snes.getKSP()
-        with default_options({"snes_linesearch_type": FULL_STEPS, "snes_vi_zero_tolerance": near}):
+        with default_options({"snes_linesearch_type": "basic", "snes_vi_zero_tolerance": near}):
             snes.setOptionsPrefix(prefix())
             ksp.setOptionsPrefix(f"{prefix()}inactive_")  # the user's -ksp_type is for the one at full size
             snes.setFromOptions()
@@ -329,7 +324,7 @@ class _SnesRun(_Run):
         return self._ends(iteration, snes.getSolution(), snes.getFunction()[0])
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Multiply y = J x; a line search that fails needs it to test for a minimum of the residual's norm."""
+        """Multiply y = J x; PETSc asks where a residual is no number."""
         self._system.jacobian.matrix.mult(x, y)
 
     multTranspose = mult
@@ -377,19 +372,17 @@ class _ProjectedRun(_Run):
         for steps in range(most + 1):
             self._system.equations.residual(x, self._residual, self._attempt.models)
             reason = self._ends(steps, x, self._residual)
-            if reason or steps == most:
+            if reason or steps == most or not self._step(x):
                 break
-            if not self._step(x):
-                reason = reasons.DIVERGED_LINE_SEARCH
-                break
-        return self._outcome(steps, self._linear, reason or reasons.DIVERGED_MAX_IT)
+        left = reasons.DIVERGED_MAX_IT if steps == most else reasons.DIVERGED_LINE_SEARCH
+        return self._outcome(steps, self._linear, reason or left)
 
     def _step(self, x: PETSc.Vec) -> bool:
         """One step from and into x, whose residual is known; whether there was any. Collective."""
         step, problem = self._newton_step(x), self._system.problem
         labels = np.repeat(problem.bodies.labels[: x.local_size // problem.dimension], problem.dimension)
         lengths = []
-        for body in problem.bodies if np.isfinite(step.norm()) else ():
+        for body in problem.bodies:
             direction = np.where(labels == body.index, step.array_r, 0.0)
             lengths.append(self._length(x, direction))
             self._move(x, direction, lengths[-1])
@@ -414,10 +407,10 @@ class _ProjectedRun(_Run):
             there = x.copy()
             self._move(there, direction, length)
             self._system.equations.residual(there, self._residual, self._attempt.models)
-            works = self._residual.array_r * np.where(self._at_bounds(there, direction), 0.0, direction)
-            return float(self._system.comm.allreduce(np.sum(works)))
+            free = ~self._at_bounds(there, direction)
+            return float(self._system.comm.allreduce(self._residual.array_r[free] @ direction[free]))
 
-        if slope(0.0) >= 0.0:
+        if not slope(0.0) < 0.0:  # nor is it no number
             return 0.0
         far = 1.0
         while (falls := slope(far) < 0.0) and far < self._thresholds.runaway**2:

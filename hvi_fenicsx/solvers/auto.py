@@ -30,7 +30,6 @@ from ..runtime.mpi import on_root_asking
 from ..system.system import System
 from . import continuation
 from .branch import BranchIteration
-from .convergence import Counts
 from .method import Borne, SolveContext, SolveResult
 from .resting_start import resting_start
 
@@ -101,23 +100,20 @@ class Auto(BranchIteration):
         self._limit.next_start()
         if first.converged or (first.interrupted and not cut):
             return first
-        along = self._along_path(first) if follows else None
-        if along is not None:
+        if follows and (along := self._along_path(first)) is not None:
             return along
         if cut:
             first = BranchIteration(self.context, self._laws, self._epsilon).solve()
         if first.converged or first.interrupted:
             return first
-        counts = Counts()
-        counts.add(first.counts)
-        return self._first_of(self._others(), counts) or first
+        return self._first_of(self._others(), first) or first
 
-    def _first_of(self, others: Iterator[SolveResult], counts: Counts) -> SolveResult | None:
-        """The first result that converged or was interrupted; to the counts the iterations of all are added."""
+    def _first_of(self, others: Iterator[SolveResult], first: SolveResult) -> SolveResult | None:
+        """The first result that converged or was interrupted; to the counts of the first the iterations of all add."""
         for found in others:
-            counts.add(found.counts)
+            first.counts.add(found.counts)
             if found.converged or (found.interrupted and not self._limit.cut):
-                return replace(found, counts=counts)
+                return replace(found, counts=first.counts)
         return None
 
     def _most_without_path(self) -> int | None:
@@ -150,14 +146,12 @@ class Auto(BranchIteration):
 
         Each start gets few steps: what laws hold is found in a few, what slides away takes hundreds. Collective.
         """
-        counts = Counts()
-        counts.add(first.counts)
-        found = self._first_of(self._others(2 * self.thresholds.few_steps), counts)
+        found = self._first_of(self._others(2 * self.thresholds.few_steps), first)
         if found is not None:
             return replace(found, off_path=reason)
         self._limit.next_start()
         reason = f"no equilibrium on the loading path: {reason}"
-        return replace(first, counts=counts, interrupted=False, reason=reason, borne=borne)
+        return replace(first, interrupted=False, reason=reason, borne=borne)
 
     def _others(self, most: int | None = None) -> Iterator[SolveResult]:
         """Results from other starts, one after the other, each in so many Newton steps at most."""

@@ -23,7 +23,7 @@ from ..system.equations import Cells, VertexModel
 from ..system.system import System
 from ..typing import Array
 from . import kink_bounds
-from .active_set import EXACT, Attempt
+from .active_set import Attempt
 from .convergence import Counts, Outcome
 from .method import SolveContext
 from .resting_start import at_rest
@@ -231,7 +231,7 @@ class ConvexStep:
         if is_quadratic(self._system) and (rested := at_rest(self._solver, self._laws)) is not None:
             self._counts.linear += rested[1]
             yield Attempt(models=models, start=rested[0])
-        yield Attempt(models=models, line_search=EXACT)
+        yield Attempt(models=models, exact=True)
         yield Attempt(models=models)
 
 

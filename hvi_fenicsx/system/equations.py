@@ -123,22 +123,13 @@ class Equations:
             x: the unknowns u.
             models: what takes the place of the laws j, by term.
         """
-        return self.base.energy + self.energy_from_base(x, models)
-
-    def energy_from_base(self, x: PETSc.Vec, models: Sequence[VertexModel]) -> float:
-        """The same less what elasticity and loads make of it at the base: small changes keep their digits. Collective.
-
-        Args:
-            x: the unknowns u.
-            models: what takes the place of the laws j, by term.
-        """
         u, local = x.array_r, 0.0
         for term, model in zip(self._terms, models, strict=True):
             local += float(np.sum(term.energy_weights * model.value(term.argument(u))))
-        return self._elastic_change(x) + float(self._comm.allreduce(local))
+        return self.base.energy + self._elastic_change(x) + float(self._comm.allreduce(local))
 
     def _elastic_change(self, x: PETSc.Vec) -> float:
-        """½ a(u, u) - <g, u> less its value at the base. Collective."""
+        """½ a(u, u) - <g, u> less its value at the base: small changes keep their digits. Collective."""
         change = self.from_base(x)
         self._jacobian.elastic_product(change, self._work)
         self._work.array[:] = 0.5 * self._work.array_r + self.base.residual
