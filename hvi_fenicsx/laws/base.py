@@ -77,7 +77,7 @@ class ConvexPart(ABC):
     def second(self, x: Array) -> Array:
         """Second derivative off the kinks; the larger one-sided one where the derivative's slope breaks."""
 
-    @property
+    @cached_property
     def jumps(self) -> Array:
         """Heights (k,) of the jumps of the derivative at the kinks, all positive."""
         return self.right(self.kinks) - self.left(self.kinks)

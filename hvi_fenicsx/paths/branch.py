@@ -12,6 +12,7 @@ from ..typing import Array
 from .relations import ContactPoints, Values
 from .segments import Segment, SegmentKind
 from .state import Event, Position
+from .thresholds import DEFAULT
 
 
 class StepEnd(Enum):
@@ -66,8 +67,11 @@ class Branch(ABC):
         points: where all points are; changed.
         trend: the sign of the factor's rate where it last did not stand; 0 before that.
         unstable: number of directions in which the energy falls at constant loads.
+        divides: whether its steps have points between, for the work along them.
+        shortest: step on a curve.
     """
 
+    divides, shortest = False, DEFAULT.standing
     points: ContactPoints
     trend: int
     unstable: int

@@ -126,7 +126,6 @@ class VectorPoints:
         pairs: the numbers among the N of each two unknowns of one point, and of each with itself.
         openings: numbers among the N of the openings, (q,).
         counts: which of the N count, (N,).
-        have_modes: whether energies of some depend on the mode.
     """
 
     def __init__(
@@ -141,7 +140,6 @@ class VectorPoints:
         self.counts: Mask = np.ones(len(self.flat), dtype=bool)
         self._slips = np.ones(len(self.flat))
         self._slips[self.openings] = 0.0
-        self.have_modes = any(mixities)
         criteria = [c for number, c in enumerate(mixities) if c is not None and c not in mixities[:number]]
         self._criteria = [(c, np.array([p for p, own in enumerate(mixities) if own == c])) for c in criteria]
 

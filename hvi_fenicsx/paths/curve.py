@@ -46,7 +46,7 @@ class CurvedBranch(Events):
     def advance(self, aim: float) -> CurveStep:
         if self._goes_on_for_ever(aim):
             return CurveStep(outcome=StepEnd.AWAY, before=self.here, after=self.here)
-        while self.length > DEFAULT.standing:
+        while self.length > self.shortest:
             try:
                 move = self._tried(aim)
             except (Refused, np.linalg.LinAlgError):
@@ -248,7 +248,7 @@ class CurvedBranch(Events):
         if way >= 1e-7 and turns:
             raise Refused
         self.length = self._next
-        return self._with_between(move) if self.points.vectors.have_modes else move
+        return self._with_between(move) if self.divides else move
 
 
 def branch_from(

@@ -69,7 +69,7 @@ class EnergyBalance:
         self._numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
         self._laws = [[law for law in points.vertices if law.group == n] for n in self._numbers]
         self._at: list[Integers] = [points.point_of[[law.unknowns[0] for law in laws]] for laws in self._laws]
-        self._potential, self._lost = not points.vectors.have_modes, dissipated
+        self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
         self.stored = self.at(values, factor)
 
     def at(self, values: Values, factor: float) -> Stored:

@@ -123,6 +123,7 @@ class OverdampedMotion:
         if points.unstable_directions(values):  # what holds back is less than what pushes on: the energy would rise
             return _Went.NOWHERE
         branch = branch_from(points, points.elastic @ values.x + values.force, left, self.z, 0.0)
+        branch.shortest = DEFAULT.small
         branch.set_out(1.0)
         went = self._followed(branch)
         self.z = branch.z.copy()

@@ -221,11 +221,13 @@ class ActiveSetSolver:
 class _Run(ABC):
     """One solve: when it ends, and how."""
 
+    _last = _least = np.inf
+    _stood = _stopped = _far = False
+    _useless, _reason = 0, ""
+
     def __init__(self, owner: ActiveSetSolver, attempt: Attempt, tolerance: float, bounds: Bounds) -> None:
         self._owner, self._attempt, self._tolerance, self._bounds = owner, attempt, tolerance, bounds
         self._system, self._thresholds = owner.system, owner.system.thresholds
-        self._last = self._least = float("inf")
-        self._useless, self._stood, self._stopped, self._far, self._reason = 0, False, False, False, ""
 
     @abstractmethod
     def into(self, x: PETSc.Vec, most: int) -> Outcome:
