@@ -301,7 +301,7 @@ class _SnesRun(_Run):
         snes.setFunction(lambda _, x, f: system.equations.residual(x, f, attempt.models), system.load.duplicate())
         snes.setJacobian(self._set_tangent, matrix)
         snes.setVariableBounds(*self._bounds)
-        snes.setConvergenceTest(self._test)
+        snes.setConvergenceTest(lambda s, i, _: self._ends(i, s.getSolution(), s.getFunction()[0]))
         snes.setTolerances(max_it=most)
         near = self._thresholds.near * float(np.min(system.references.scale))
         ksp = snes.getKSP()
@@ -321,9 +321,6 @@ class _SnesRun(_Run):
 
     def _set_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, j: PETSc.Mat, p: PETSc.Mat) -> None:
         self._system.jacobian.set_rates(self._system.equations.tangents(x, self._attempt.models))
-
-    def _test(self, snes: PETSc.SNES, iteration: int, norms: Any) -> int:
-        return self._ends(iteration, snes.getSolution(), snes.getFunction()[0])
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Multiply y = J x; PETSc asks where a residual is no number."""
