@@ -162,8 +162,9 @@ class ActiveSetSolver:
             found = self.solve(x, attempt, tolerance, bounds, most)
             counts.add_outcome(found)
             if found.measure < outcome.measure or found.converged:
-                outcome = found
                 x.copy(best)
+            if found.measure <= outcome.measure or found.converged:
+                outcome = found
             if found.converged or found.interrupted:
                 break
             # an energy that has fallen is kept; else the next attempt begins where this one began
@@ -234,7 +235,7 @@ class _Run(ABC):
         """Run from and into x, so many steps at most. Collective."""
 
     def _outcome(self, steps: int, linear: int, reason: int) -> Outcome:
-        left, name = max(self._last, float(self._far)) if np.isfinite(self._last) else np.inf, _REASON.get(reason, "")
+        left, name = np.inf if self._far or np.isnan(self._last) else self._last, _REASON.get(reason, "")
         words = self._reason or (f"{_WORDS[name]} ({name})" if name in _WORDS else name)
         if self._far:
             words = f"a displacement of more than {self._thresholds.runaway:.0e} times p0 L / E0"
@@ -246,7 +247,7 @@ class _Run(ABC):
         before, self._last = self._last, owner.convergence.sizes(x, residual, *self._bounds).worst
         if owner.progress:
             owner.progress(iteration, self._last, owner.convergence.in_contact(x))
-        self._far = x.norm(PETSc.NormType.INFINITY) > self._thresholds.runaway
+        self._far = self._system.equations.from_base(x).norm(PETSc.NormType.INFINITY) > self._thresholds.runaway
         if self._last <= self._tolerance and not self._far:
             return reasons.CONVERGED_FNORM_RELATIVE
         self._stopped = owner.interrupted()
@@ -380,12 +381,13 @@ class _ProjectedRun(_Run):
         """One step from and into x, whose residual is known; whether there was any. Collective."""
         step, problem = self._newton_step(x), self._system.problem
         labels = np.repeat(problem.bodies.labels[: x.local_size // problem.dimension], problem.dimension)
-        lengths = []
+        moved = 0.0
         for body in problem.bodies:
             direction = np.where(labels == body.index, step.array_r, 0.0)
-            lengths.append(self._length(x, direction))
-            self._move(x, direction, lengths[-1])
-        return any(lengths)
+            length = self._length(x, direction)
+            self._move(x, direction, length)
+            moved += length
+        return moved > 0.0
 
     def _newton_step(self, x: PETSc.Vec) -> PETSc.Vec:
         system, held, step = self._system, self._owner.held, x.duplicate()
@@ -414,7 +416,7 @@ class _ProjectedRun(_Run):
         far = 1.0
         while (falls := slope(far) < 0.0) and far < self._thresholds.runaway**2:
             far *= 2.0
-        return far if falls else float(brentq(slope, 0.0, far, rtol=self._thresholds.coarse_tolerance))
+        return far if falls else brentq(slope, 0.0, far, rtol=self._thresholds.coarse_tolerance)
 
     def _at_bounds(self, x: PETSc.Vec, direction: Array) -> Mask:
         """Which unknowns do not go in a direction, since they are at a bound."""
