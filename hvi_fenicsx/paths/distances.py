@@ -81,8 +81,9 @@ class Distances:
 
 def _interval(laws: VertexLaws, x: Array, near: Array) -> tuple[Array, Array]:
     """The least and the greatest forces at coordinates, but for their rounding, (r,) each."""
-    ends = laws.traction(x - near, "left"), laws.traction(x + near, "right")
-    return laws.weights * np.minimum(*ends), laws.weights * np.maximum(*ends)
+    # at a peak the law gives less at both ends
+    found = [laws.traction(x + way, side) for way in (-near, 0.0, near) for side in ("left", "right")]
+    return laws.weights * np.min(found, axis=0), laws.weights * np.max(found, axis=0)
 
 
 def _off(bonds: Bonds, laws: VertexLaws, u: Array, force: Array, lower: Array, near: Array) -> Array:

@@ -66,10 +66,10 @@ class EnergyBalance:
     ) -> None:
         self._problem, self._points, self.work = problem, points, work
         remember = {law.group for law in points.vertices if law.laws.memory is not None}
-        self._numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity is not None})
+        self._numbers = sorted(remember | {n for n, bonds in enumerate(problem.bonds) if bonds.mixity})
         self._laws = [[law for law in points.vertices if law.group == n] for n in self._numbers]
         self._at: list[Integers] = [points.point_of[[law.unknowns[0] for law in laws]] for laws in self._laws]
-        self._potential, self._lost = all(b.mixity is None for b in problem.bonds), dissipated
+        self._potential, self._lost = not any(b.mixity for b in problem.bonds), dissipated
         self.stored = self.at(values, factor)
 
     def at(self, values: Values, factor: float) -> Stored:

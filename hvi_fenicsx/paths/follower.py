@@ -167,7 +167,7 @@ class Follower(LoadHistory):
     def _follow_from(self, z: Array, factor: float, inverse: CellInverse | None = None) -> None:
         problem = self._problem
         self._branch = branch_from(self._points, problem.force, problem.force_rate, z, factor, inverse)
-        self._branch.divides = any(bonds.mixity is not None for bonds in problem.bonds)
+        self._branch.divides = any(bonds.mixity for bonds in problem.bonds)
 
     def _restore(self, state: PathState) -> None:
         """Go on after a state."""

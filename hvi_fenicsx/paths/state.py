@@ -141,7 +141,7 @@ class PathOptions:
     follow: Follow = Follow.STABLE
     remember: Collection[int] = ()
     most_events: int = 1_000_000
-    borne: tuple[float, float] = (-float("inf"), float("inf"))
+    borne: tuple[float, float] = (-np.inf, np.inf)
     held: tuple[float, float] = (0.0, 0.0)
     stops: Sequence[float] = ()
 

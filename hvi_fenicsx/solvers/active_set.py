@@ -130,7 +130,7 @@ class ActiveSetSolver:
         finite = np.isfinite(step.norm())
         if finite:
             x.axpy(-1.0, step)
-        return Outcome(reason > 0 and finite, 1, iterations, float("nan"), f"KSP reason {reason}")
+        return Outcome(reason > 0 and finite, 1, iterations, np.nan, f"KSP reason {reason}")
 
     def first_success(
         self,
@@ -152,7 +152,7 @@ class ActiveSetSolver:
             most: Newton steps of each at most.
         """
         begin, best = x.copy(), x.copy()
-        outcome = found = Outcome(False, 0, 0, float("inf"), "not started")
+        outcome = found = Outcome(False, 0, 0, np.inf, "not started")
         for attempt in attempts:
             if isinstance(attempt, str):
                 outcome = replace(outcome, reason=attempt)
@@ -161,9 +161,10 @@ class ActiveSetSolver:
             x.copy(begin)
             found = self.solve(x, attempt, tolerance, bounds, most)
             counts.add_outcome(found)
-            if found.measure < outcome.measure or found.converged:
+            better = found.measure < outcome.measure or found.converged
+            if better:
                 x.copy(best)
-            if found.measure <= outcome.measure or found.converged:
+            if better or outcome.measure == np.inf:
                 outcome = found
             if found.converged or found.interrupted:
                 break

@@ -32,7 +32,7 @@ class LinearSolve(Method):
             start: not used; one linear solve needs none.
         """
         x, models, counts = self.system.undisplaced(), [VertexModel(term.law) for term in self.system.terms], Counts()
-        outcome, left, falls = Outcome(False, 0, 0, float("inf"), "not started"), float("inf"), True
+        outcome, left, falls = Outcome(False, 0, 0, np.inf, "not started"), np.inf, True
         while falls and not outcome.converged:
             outcome = self._step(x, models, left)
             counts.linear += outcome.linear
