@@ -171,7 +171,7 @@ class Events(CurveEquations):
 
     def _divide(self, known: dict[float, CurvePoint], low: float, high: float) -> None:
         """Halve a part of a step until cubic polynomials meet its middle."""
-        middle, ends = 0.5 * (low + high), [known[way] for way in (low, high)]
+        middle, ends = 0.5 * (low + high), [known[low], known[high]]
         (y0, y1), (t0, t1) = [e.y for e in ends], [e.tangent / (self.here.tangent @ e.tangent) for e in ends]
         known[middle] = self._at(middle, known)
         off = magnitude(0.5 * (y0 + y1) + 0.125 * (high - low) * (t0 - t1) - known[middle].y)
