@@ -121,12 +121,7 @@ class ActiveSetSolver:
         """
         self.system.jacobian.set_rates(self.system.equations.tangents(x, models))
         self.system.equations.residual(x, self._residual, models)
-        self._residual.array[held] = 0.0
-        self.held.prepare(held)
-        step = x.duplicate()
-        step.set(0.0)
-        iterations, reason = self.held.solve(self._residual, step, rtol)
-        step.array[held] = 0.0  # multigrid leaves rounding there, and a vertex must stay exactly on its bound
+        step, iterations, reason = self.held.solve_with(held, self._residual, rtol)
         finite = np.isfinite(step.norm())
         if finite:
             x.axpy(-1.0, step)
@@ -380,27 +375,19 @@ class _ProjectedRun(_Run):
 
     def _step(self, x: PETSc.Vec) -> bool:
         """One step from and into x, whose residual is known; whether there was any. Collective."""
-        step, problem = self._newton_step(x), self._system.problem
-        labels = np.repeat(problem.bodies.labels[: x.local_size // problem.dimension], problem.dimension)
-        moved = 0.0
+        system, problem, limits = self._system, self._system.problem, self._thresholds
+        system.jacobian.set_rates(system.equations.tangents(x, self._attempt.models, limits.foundation))
+        right, (lower, upper) = -self._residual, (v.array_r for v in self._bounds)
+        fixed = np.flatnonzero(self._at_bounds(x, right.array_r) | (lower >= upper)).astype(np.int32)
+        step, linear, _ = self._owner.held.solve_with(fixed, right, limits.coarse_tolerance)
+        self._linear += linear
+        labels, moved = np.repeat(problem.bodies.labels[: x.local_size // problem.dimension], problem.dimension), 0.0
         for body in problem.bodies:
             direction = np.where(labels == body.index, step.array_r, 0.0)
             length = self._length(x, direction)
             self._move(x, direction, length)
             moved += length
         return moved > 0.0
-
-    def _newton_step(self, x: PETSc.Vec) -> PETSc.Vec:
-        system, held, step = self._system, self._owner.held, x.duplicate()
-        system.jacobian.set_rates(system.equations.tangents(x, self._attempt.models, self._thresholds.foundation))
-        right, (lower, upper) = -self._residual, (v.array_r for v in self._bounds)
-        fixed = np.flatnonzero(self._at_bounds(x, right.array_r) | (lower >= upper)).astype(np.int32)
-        right.array[fixed] = 0.0
-        step.set(0.0)
-        held.prepare(fixed)
-        self._linear += held.solve(right, step, self._thresholds.coarse_tolerance)[0]
-        step.array[fixed] = 0.0
-        return step
 
     def _length(self, x: PETSc.Vec, direction: Array) -> float:
         """How far to where the slope of the energy along a projected direction is zero; 0: it rises. Collective."""

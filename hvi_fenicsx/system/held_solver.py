@@ -136,6 +136,22 @@ class HeldPreconditioner:
                 thing.free()
         self._preconditioner = self._form = self._held = None
 
+    def solve_with(self, held: Entities, load: PETSc.Vec, rtol: float) -> tuple[PETSc.Vec, int, int]:
+        """The solution in which some unknowns are zero, iterations, and PETSc's reason for the end. Collective.
+
+        Args:
+            held: these unknowns (local, owned).
+            load: the right-hand side; changed there.
+            rtol: relative tolerance of the residual's norm.
+        """
+        self.prepare(held)
+        load.array[held] = 0.0
+        x = load.duplicate()
+        x.set(0.0)
+        iterations, reason = self.solve(load, x, rtol)
+        x.array[held] = 0.0  # multigrid leaves rounding there, and a vertex must stay exactly on its bound
+        return x, iterations, reason
+
     def solve_reduced(self, inactive: PETSc.IS, load: PETSc.Vec, x: PETSc.Vec, rtol: float) -> tuple[int, int]:
         """As :meth:`solve`, on the dofs that are not held. Collective.
 
