@@ -136,9 +136,11 @@ def test_a_concave_kink_is_no_minimum_and_a_bound_makes_it_one() -> None:
     assert examine(check, Floor(problem)).minimiser is True
 
 
-def test_a_peak_where_one_body_ties_is_no_contradiction_whatever_the_others_are(tmp_path: Path) -> None:
-    _, answer, verdict = attack(20261203, 994, tmp_path, 30.0)
-    assert answer.state == "escapes"
+@pytest.mark.parametrize(("number", "state"), [(994, "escapes"), (384, "metastable")])
+def test_what_was_contradicted_by_its_faults_agrees(number: int, state: str, tmp_path: Path) -> None:
+    """A peak at which one body ties (994); an uneven floor at a corner of another part and a guide (384)."""
+    _, answer, verdict = attack(20261203, number, tmp_path, 30.0)
+    assert answer.state == state
     assert verdict.word == "agrees"
 
 
@@ -165,6 +167,30 @@ def test_at_a_corner_the_uneven_part_is_turned_whatever_the_order() -> None:
     table["boundary"] = dict(parts[:1]) | {"wall": {"on": "left", "displacement": [0.0, "free"]}}
     (bound,) = [b for b in assemble(table, uneven).bounds if b.vertex == corner]
     assert bound.normal == pytest.approx(np.array([2e-3, -1.0]) / np.hypot(2e-3, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("prescribed", "kept"),
+    [(["free"] * 3, "yz"), (["free", 0.0, "free"], "yz"), (["free", "free", 0.0], "z"), ([0.0] * 3, "xyz")],
+)
+def test_contact_is_exact_in_prescribed_components_only(prescribed: list[Any], kept: str) -> None:
+    """At a corner in space with a prescribed side and a second part an uneven floor is turned towards both."""
+    mesh = block([1.0, 1.0, 1.0], [1, 1, 1])
+    corner = int(np.flatnonzero((mesh.points == [0.0, 1.0, 0.0]).all(axis=1))[0])
+    points = mesh.points.copy()
+    points[corner, 2] = -0.01
+    table = scene()
+    table["material"] = STEEL | {"model": "three_dimensional"}
+    table["boundary"] = {
+        "floor": {"on": "bottom", "contact": {"gap": 1e-6}},
+        "side": {"on": "left", "contact": {"gap": 1e-6}},
+        "back": {"on": "back", "displacement": prescribed},
+    }
+    found = [b for b in assemble(table, replace(mesh, points=points)).bounds if b.vertex == corner]
+    (floor,) = [b for b in found if b.normal[2] < -0.9]
+    normal = np.array([0.01, -0.01, -1.0]) / np.sqrt(1.0002)
+    row = normal * [axis in kept for axis in "xyz"]
+    assert floor.normal / floor.upper == pytest.approx(row / 1e-6)
 
 
 def test_the_search_finds_what_exists_and_nothing_else() -> None:

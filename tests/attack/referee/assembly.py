@@ -218,9 +218,12 @@ def _bounds(mesh: Mesh, s: _Surface, fixed: Integers) -> list[Bound]:
         upper = formula(contact["gap"], points)
     else:
         lower, upper = -formula(contact["upper"], points), -formula(contact["lower"], points)
-    held = np.isin(s.vertices * mesh.dimension, fixed - fixed % mesh.dimension)
-    normals = np.where(held[:, None], n, s.turned)  # where a component is prescribed contact stays exact
-    return [Bound(int(v), normals[i], lower[i], upper[i]) for i, v in enumerate(s.vertices)]
+    d = mesh.dimension
+    held = np.isin(s.vertices[:, None] * d + np.arange(d), fixed)
+    along = np.sum(n * s.turned, axis=1, keepdims=True) * s.turned
+    seen = np.where(held, n, along)  # contact acts along the turned normal, and stays exact in prescribed components
+    size = np.linalg.norm(seen, axis=1)
+    return [Bound(int(v), seen[i] / size[i], lower[i] / size[i], upper[i] / size[i]) for i, v in enumerate(s.vertices)]
 
 
 def _laws(s: _Surface, solver: Table) -> list[LawPoint]:
