@@ -79,20 +79,23 @@ class Jump:
         return found
 
     def _along(self) -> Landing | None:
-        """The next state at the same factor along the curve, if one unstable direction leads there."""
-        branch, points, rate, released = self._branch, self._points, self._problem.force_rate, 0.0
-        most = DEFAULT.waits * (2 + len(points))
+        """The next state along the curve that bears more than these loads, if one unstable direction leads there."""
+        branch, rate, found, released = self._branch, self._problem.force_rate, None, 0.0
+        beyond = self._factor + self._heading * DEFAULT.slow * abs(self._factor)
         with suppress(Refused, np.linalg.LinAlgError):
-            before = branch.factor, branch.values.x
-            for move in advancing(branch, self._factor, most):
+            for _ in range(DEFAULT.waits * (2 + len(self._points))):
+                before, x = branch.factor, branch.values.x
+                move = next(advancing(branch, beyond if found else self._factor, 1))
                 branch.note(move)
-                after = branch.factor, branch.values.x
-                released += (self._factor - 0.5 * (before[0] + after[0])) * float(rate @ (after[1] - before[1]))
-                before = after
-                if move.outcome is StepEnd.FACTOR and released > 0.0:
-                    return self._landed("along the curve", branch.z.copy(), branch.inverse())
-                over = self._heading * (branch.factor - self._factor) > DEFAULT.none * abs(self._factor)
-                if move.outcome in (StepEnd.FACTOR, StepEnd.AWAY, StepEnd.STUCK) or branch.unstable > 1 or over:
+                released += (self._factor - 0.5 * (before + branch.factor)) * float(rate @ (branch.values.x - x))
+                rises, there = self._heading * branch.rising > 0.0, move.outcome is StepEnd.FACTOR
+                if found and there:
+                    return found
+                if rises and there and released > 0.0:
+                    found = self._landed("along the curve", branch.z.copy(), branch.inverse())
+                found = found if rises else None
+                lost = move.outcome in (StepEnd.AWAY, StepEnd.STUCK) or branch.unstable > 1
+                if lost or self._heading * (branch.factor - beyond) > 0.0:
                     break
         return None
 
