@@ -72,11 +72,18 @@ class Jump:
 
     def landing(self) -> Landing | None:
         """Where it leads; None where this was not found, with the points where they were."""
-        found = self._along() or self._in_motion()
+        found = (None if self._several_lead() else self._along()) or self._in_motion()
         if found is None or found.z is None:
             found = self._moved("by descent", np.inf, 1.0) or found
         self._points.restore(self._kept if found is None or found.kept is None else found.kept)
         return found
+
+    def _several_lead(self) -> bool:
+        """Whether several points that move are at ends of their segments: then the curve takes them in any order."""
+        ends, speeds = np.stack([self._points.low, self._points.high]), np.abs(self._directions)
+        sizes = np.max(np.where(np.isfinite(ends), np.abs(ends), 0.0), axis=0, initial=0.0)
+        there = np.min(np.abs(ends - self._branch.values.s), axis=0) <= DEFAULT.none * sizes
+        return bool(np.count_nonzero(there & (speeds > DEFAULT.slow * magnitude(speeds))) > 1)
 
     def _along(self) -> Landing | None:
         """The next state along the curve that bears more than these loads, if one unstable direction leads there."""
