@@ -61,4 +61,4 @@ def test_of_two_bonds_in_a_row_either_may_break(remember: tuple[int, ...]) -> No
     assert jump.event is Event.BRANCHING
     assert jump.factor == pytest.approx(2.0 + 1.0 / k)
     assert sorted(jump.x) == pytest.approx([0.0, 2.0 + 1.0 / k], abs=1e-9)
-    assert jump.released == pytest.approx(1.0 + 0.5 / k - 0.75)
+    assert jump.released == pytest.approx(1.0 + 0.5 / k - 0.75, rel=1e-5)  # pushed off, the other bond softens by 1e-6
