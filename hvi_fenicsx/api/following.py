@@ -137,7 +137,7 @@ class ModelPath(LoadPath):
         """
         require_path("folder", folder)
         comm = self.run.prepared.system.comm
-        with ResultFolder(comm, Path(folder), force=force) as target:
+        with ResultFolder(comm, Path(folder), force=force, kind="path") as target:
             path_files.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)
             target.commit(self.run.prepared.scene)
 

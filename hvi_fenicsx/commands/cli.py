@@ -37,7 +37,6 @@ _FOLDER = "PRTE_MCA_prte_local_tmpdir_base"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit code by the contract. Collective under mpirun."""
     log.prepare()
-    processes.ensure_home()
     words = _with_petsc_joined(sys.argv[1:] if arguments is None else arguments)
     try:
         processes.raise_on_stop()
@@ -81,6 +80,7 @@ def _with_petsc_joined(words: Sequence[str]) -> list[str]:
 
 
 def _dispatch(options: argparse.Namespace, words: Sequence[str]) -> int:
+    processes.ensure_places()
     if options.command == "version":
         return _version()
     if processes.is_under_mpirun():
@@ -251,18 +251,14 @@ def run_under_mpirun(ranks: int, words: Sequence[str]) -> int:
         words: the command line, which may have its ``--np``.
 
     Raises:
-        InputError: there is no mpirun, or no room for its files.
+        InputError: there is no mpirun.
     """
     mpirun = shutil.which("mpirun")
     if mpirun is None:
         raise InputError("--np: there is no mpirun on the PATH; install Open MPI or MPICH, or leave --np out")
     # `-m mpi4py` ends all ranks when one fails.
     command = [mpirun, "-n", str(ranks), *processes.PYTHON, "-m", "mpi4py", "-m", "hvi_fenicsx", *words]
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True)
-    except OSError as error:
-        raise InputError(f"--np: no temporary folder can be made ({error}); set TMPDIR to one with room") from None
-    with folder as name:
+    with tempfile.TemporaryDirectory(prefix="hvi-np-", ignore_cleanup_errors=True) as name:
         return _code(command, Path(name))
 
 

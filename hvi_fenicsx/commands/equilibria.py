@@ -5,16 +5,16 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
 from .. import console, results
 from ..equilibrium_search.bodies import Equilibria
-from ..equilibrium_search.search import Found, Saved, counted, falls_passed
+from ..equilibrium_search.search import OTHER, Found, Saved, counted, falls_passed
 from ..equilibrium_search.stationarity import StationaryPoint
-from ..errors import ExitCode, NotWrittenError
+from ..errors import ExitCode, InputError, NotWrittenError
 from ..model import dump_scene
 from ..report import page
 from ..report.page import draw as draw_pictures
@@ -23,6 +23,7 @@ from ..results.summary import common
 from ..results.whole import made, write_record, write_whole
 from ..runtime import writing
 from ..runtime.mpi import largest, on_root, time_over
+from ..runtime.writing import understood
 from ..workflow import Preparation, Solution, prepare
 from . import session
 from .session import COMM, LOG, Record, Session, say, tell_moving
@@ -49,28 +50,33 @@ def execute(options: argparse.Namespace) -> int:
     """
 
     def done(record: Record) -> bool:
-        return bool(record.get("equilibria", {}).get("proven"))
+        known = record["equilibria"]
+        if known["proven"] and not (known["complete"] or options.lowest):
+            raise InputError(OTHER)
+        return bool(known["proven"])
 
-    return session.execute(options, _run, suffix="-equilibria", done=done)
+    return session.execute(options, _run, kind="search", done=done)
 
 
 def _run(call: Session) -> int:
     """Search, write and tell; the exit code. Collective."""
     options, kept = call.options, _StateFile(call)
-    saved = next(iter(on_root(COMM, lambda: call.journal(JOURNAL))), None)
+    saved = next(iter(call.begin_journal(JOURNAL)), None)
     prepared = prepare(call.scene, COMM, call.timer)
     say(console.heading(prepared, COMM.size))
     bodies, late = Equilibria(prepared, interrupted=call.interrupted), time_over(COMM, options.limit)
-    found = bodies.find(
-        lowest=options.lowest,
-        gap=options.gap,
-        stop=lambda: call.interrupted() or late(),
-        report=tell_moving,
-        saved=saved,
-        keep=kept.keep,
-    )
+    with understood(call.folder.target / JOURNAL) if saved else nullcontext():
+        found = bodies.find(
+            lowest=options.lowest,
+            gap=options.gap,
+            stop=lambda: call.interrupted() or late(),
+            report=tell_moving,
+            saved=saved,
+            keep=kept.keep,
+        )
     if found.left:
-        on_root(COMM, lambda: kept.write(call.folder.work, found.left))
+        call.folder.unfinished = True
+        on_root(COMM, lambda: call.folder.journal.replace(found.left))
     interrupted, code = call.interrupted(), ExitCode.NOT_CONVERGED
     if prepared.solvability.state == "escapes":
         code = ExitCode.NO_SOLUTION
@@ -90,8 +96,7 @@ class _StateFile:
     """Keeps what is left of a search in the folder of the result: a kill loses little."""
 
     def __init__(self, call: Session) -> None:
-        self._call, self._identity = call, on_root(COMM, lambda: call.identity)
-        self._next = time.monotonic() + KEPT_EVERY
+        self._folder, self._next = call.folder, time.monotonic() + KEPT_EVERY
 
     def keep(self, state: Callable[[], Saved]) -> None:
         """Write what is left, if it is time.
@@ -103,15 +108,11 @@ class _StateFile:
         if COMM.rank or began < self._next:
             return
         try:
-            self.write(self._call.folder.announce(JOURNAL).parent, state())
+            self._folder.journal.replace(state())
             self._next = time.monotonic() + KEPT_EVERY * max(1.0, time.monotonic() - began)
         except NotWrittenError as error:
             self._next = np.inf
             LOG.info("%s; a kill would lose the search", error)
-
-    def write(self, folder: Path, state: Saved) -> None:
-        """Write what is left into a folder. Rank 0 only."""
-        writing.write_journal(folder / JOURNAL, self._identity, [state])
 
 
 def _all_written(call: Session, bodies: Equilibria, found: Found) -> Iterator[Row]:

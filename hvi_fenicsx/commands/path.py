@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import nullcontext
 
 from .. import console
 from ..load_paths import path_files
 from ..load_paths.following import PathRun
 from ..model import Model, PathTable
 from ..paths.state import End
-from ..runtime import writing
 from ..runtime.mpi import on_root
-from ..runtime.writing import Journal
+from ..runtime.writing import Record, understood
 from ..workflow import prepare
 from . import session
-from .session import COMM, LOG, Record, Session, say, tell_moving
+from .session import COMM, LOG, Session, say, tell_moving
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -25,43 +25,34 @@ def execute(options: argparse.Namespace) -> int:
     """
 
     def done(record: Record) -> bool:
-        return record.get("path") is not None and record["path"]["end"] != End.INTERRUPTED
+        return End(record["path"]["end"]) is not End.INTERRUPTED
 
     def changed(scene: Model) -> Model:
         return scene.changed(path=scene.path or PathTable())
 
-    return session.execute(options, _run, suffix="-path", done=done, changed=changed)
+    return session.execute(options, _run, kind="path", done=done, changed=changed)
 
 
 def _run(call: Session) -> int:
     """Follow, write and tell; the exit code. Collective."""
     assert call.scene.path is not None
-    known, opened = on_root(COMM, lambda: call.journal(path_files.JOURNAL)), list[Journal]()
+    known = call.begin_journal(path_files.JOURNAL)
     prepared = prepare(call.scene, COMM, call.timer)
     say(console.heading(prepared, COMM.size))
     run = PathRun(prepared, call.scene.path, call.interrupted)
     say(console.path_wanted(call.scene.path, run.scaled))
-    if known:
-        say([f"{len(known)} rows are there already; on from factor {known[-1]['factor']:.6g}"])
 
-    def keep(record: writing.Record) -> None:
-        on_root(COMM, lambda: _journal(call, opened).append(record))
+    def keep(record: Record) -> None:
+        on_root(COMM, lambda: call.folder.journal.append(record))
         place = f" on {record['place']['part']}" if record["place"] else ""
         kind = ", unstable" if record["unstable"] else ""
         tell_moving(f"row {len(run.states) - 1}, factor {record['factor']:.6g}{kind}: {record['event']}{place}")
 
-    path = run.follow(known, keep, call.interrupted)
-    on_root(COMM, lambda: [*map(Journal.close, opened)])
+    with understood(call.folder.target / path_files.JOURNAL) if known else nullcontext():
+        if known:
+            say([f"{len(known)} rows are there already; on from factor {known[-1]['factor']:.6g}"])
+        path = run.follow(known, keep, call.interrupted)
+    on_root(COMM, lambda: call.folder.journal.close())
     say(console.path_outcome(path))
     draw = not call.options.no_pictures
     return int(path_files.write(call.folder, run, path, call.given, LOG.info, draw=draw)["exit_code"])
-
-
-def _journal(call: Session, opened: list[Journal]) -> Journal:
-    """The journal in the folder of the result, opened with the first state. Rank 0 only."""
-    if not opened:
-        file = call.folder.announce(path_files.JOURNAL)
-        if not call.options.resume:
-            file.unlink(missing_ok=True)
-        opened.append(Journal(file, call.identity))
-    return opened[0]

@@ -32,13 +32,11 @@ def execute(options: argparse.Namespace) -> int:
 
     def done(record: Record) -> bool:
         goal = _goal(options)
-        if any(record.get(other) is not None for other in ("path", "equilibria")):
-            return False
         accuracy = record["accuracy"]
         same = accuracy is None if goal is None else goal.as_dict().items() <= (accuracy or {}).items()
         return same and record["exit_code"] in (ExitCode.CERTIFIED, ExitCode.NO_SOLUTION)
 
-    return session.execute(options, _run, suffix="", done=done)
+    return session.execute(options, _run, done=done)
 
 
 def _goal(options: argparse.Namespace) -> Goal | None:

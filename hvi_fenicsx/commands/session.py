@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mpi4py import MPI
 
 from .. import console, results
+from ..errors import ExitCode
 from ..model import Model, dump_scene, read_scene
 from ..report.page import NAME as PAGE
 from ..results.output_folder import inputs_of, read_finished
-from ..runtime import log, writing
+from ..runtime import log
 from ..runtime.cost import Timer
-from ..runtime.manifest import __version__
+from ..runtime.manifest import MARKS, Kind, __version__
 from ..runtime.mpi import on_root, stop_on_signals
+from ..runtime.writing import Record, understood
 from ..system import petsc_options
 
 COMM = MPI.COMM_WORLD
 LOG = log.logger("commands")
-Record = dict[str, Any]
-"""A summary."""
 
 
 @dataclass(frozen=True)
@@ -52,23 +49,21 @@ class Session:
         """The command line and PETSc's options, for ``summary.json``."""
         return {"command": self.options.given, "petsc": self.options.petsc}
 
-    @property
-    def identity(self) -> str:
-        """What an unfinished result depends on; on other ranks the unknowns have another order. Rank 0 only."""
-        target = self.folder.target
-        parts = [__version__, COMM.size, dump_scene(self.scene, target), sorted(inputs_of(self.scene, target).items())]
-        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+    def begin_journal(self, name: str) -> list[Record]:
+        """What an unfinished result has left in a journal, if this call shall go on from it. Collective.
 
-    def journal(self, name: str) -> list[writing.Record]:
-        """What an unfinished result has left in a journal, if this call shall go on from it. Rank 0 only."""
-        return writing.read_journal(self.folder.target / name, self.identity) if self.options.resume else []
+        It is of a scene; on other ranks the unknowns have another order, and other files make another problem.
+        """
+        target = self.folder.target
+        others = f"{__version__} {COMM.size} {inputs_of(self.scene, target)}"
+        return on_root(COMM, lambda: self.folder.begin_journal(name, [dump_scene(self.scene, target), others]))
 
 
 def execute(
     options: argparse.Namespace,
     work: Callable[[Session], int],
     *,
-    suffix: str,
+    kind: Kind = "result",
     done: Callable[[Record], bool],
     changed: Callable[[Model], Model] = lambda scene: scene,
 ) -> int:
@@ -77,7 +72,7 @@ def execute(
     Args:
         options: the words of the command line.
         work: writes all files but ``run.log``, and gives the exit code (collective).
-        suffix: what the default folder has behind the name of the scene.
+        kind: of what it writes.
         done: whether a summary is of what is asked for, and finished. Rank 0 only.
         changed: what the command makes of the scene.
 
@@ -87,17 +82,18 @@ def execute(
     timer = Timer()
     petsc_options.insert(options.petsc)
     scene = changed(on_root(COMM, lambda: read_scene(options.scene, options.overrides)))
-    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / f"{options.scene.stem}{suffix}"))
-    if options.resume and (code := on_root(COMM, lambda: _finished(target, scene, done))) is not None:
+    name = options.scene.stem + (f"-{options.command}" if kind != "result" else "")
+    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / name))
+    resume = options.resume and not options.force
+    if resume and (code := on_root(COMM, lambda: _finished(target, scene, kind, done))) is not None:
         return code
-    goes_on = options.force or options.resume
-    with results.ResultFolder(COMM, target, force=goes_on, inputs=[options.scene]) as folder:
-        interrupted, run_logs = stop_on_signals(COMM), list[log.RunLog]()
-        on_root(COMM, lambda: run_logs.append(log.RunLog(folder.work / "run.log")))
+    ways = {"force": options.force, "resume": resume, "inputs": [options.scene, *scene.files()]}
+    with results.ResultFolder(COMM, target, kind=kind, **ways) as folder:
+        interrupted, run_log = stop_on_signals(COMM), log.RunLog(folder.work / "run.log")
         with display():
-            with log.handled(*run_logs):
+            with log.handled(run_log):
                 code = work(Session(options, scene, folder, timer, interrupted))
-            on_root(COMM, lambda: run_logs[0].finish())
+            on_root(COMM, run_log.finish)
             folder.commit(scene)
             say(console.warnings([*folder.kept, *petsc_options.unread(options.petsc)]))
             first = on_root(COMM, lambda: f"; open {PAGE} there" if (target / PAGE).is_file() else "")
@@ -105,15 +101,17 @@ def execute(
     return int(code)
 
 
-def _finished(target: Path, scene: Model, done: Callable[[Record], bool]) -> int | None:
+def _finished(target: Path, scene: Model, kind: Kind, done: Callable[[Record], bool]) -> int | None:
     """The exit code of a finished result of the same scene, which is told; None where there is none. Rank 0 only."""
-    record, fault = read_finished(target, scene)
-    if fault is not None:
-        log.say(f"{target}: {fault}; the scene is run again")
-    if record is None or not done(record):
-        return None
-    log.say(f"{target}: finished already ({record['reason']})")
-    return int(record["exit_code"])
+    with understood(target / MARKS["result"]):
+        record, fault = read_finished(target, scene, kind)
+        if fault is not None:
+            log.say(f"{target}: {fault}; the scene is run again")
+        if record is None or not done(record):
+            return None
+        code = ExitCode(record["exit_code"])
+        log.say(f"{target}: finished already ({record['reason']})")
+        return code
 
 
 def display() -> AbstractContextManager[None]:

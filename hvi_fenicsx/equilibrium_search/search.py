@@ -24,6 +24,8 @@ Keep = Callable[[Callable[[], Saved]], None]
 Refined = Callable[[float, Array], ScalarProblem]
 """A problem with polylines nearer to curved laws: by the difference of the energies and where it counts, (n,)."""
 NO_POINT = "no equilibrium, proven"
+OTHER = "--resume: the search there was for something else: give or leave --lowest as then, or --force"
+"""What is told of a search that cannot be gone on with."""
 STOPPED = "stopped before a first bound of the energy was known"
 """What is told where there was no time for more."""
 
@@ -161,9 +163,7 @@ def find(task: Task) -> Found:
         reason = "the only equilibrium: there is no contact and no law"
         return Found.only(np.empty(0), task.problem.constant, reason)
     if task.saved is not None and bool(task.saved["lowest"]) != task.lowest:
-        raise InputError(
-            "--resume: the search there was for something else: give or leave --lowest as then, or --force"
-        )
+        raise InputError(OTHER)
     if task.lowest:
         return lowest(task)
     return _of_lengths(task) if len(task.problem.lengths) else _all(task)

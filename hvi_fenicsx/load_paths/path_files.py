@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,9 @@ def write(
         frames = ((float(row), path.rows[row].factor, run.displacement(row)) for row in shown)
         vtk_fields.write_series(work / "displacement.pvd", run.prepared.problem, frames)
         rows = list(_contact_rows(run))
+        if run.interrupted():
+            path = replace(path, end=End.INTERRUPTED, reason=path.reason or "its files were being written")
+        folder.unfinished = path.end == End.INTERRUPTED
         outcome = {"converged": path.converged, "reason": path.headline, "exit_code": int(path.exit_code)}
         outcome |= {"method": "path", "path": plain(path.summary())}
         record = {**summary(unsolved(run.prepared)), **outcome, **given}
@@ -90,8 +94,8 @@ def write(
 
 
 def _contact_rows(run: PathRun) -> Iterator[tuple[Any, ...]]:
-    """The rows of ``path_contact.csv``: the states at the factors that were asked for. On rank 0; collective."""
-    for factor in run.wanted.contact_at:
+    """The rows of ``path_contact.csv``: at the factors that were asked for, until a signal. On rank 0; collective."""
+    for factor in takewhile(lambda _: not run.interrupted(), run.wanted.contact_at):
         for row, problem, u in run.crossings(factor):
             found = certificate.examine(problem, u, run.prepared.scene.solver.tolerance)
             parts = contact_parts(problem, found.states)
@@ -101,13 +105,10 @@ def _contact_rows(run: PathRun) -> Iterator[tuple[Any, ...]]:
 def _write_on_root(
     folder: ResultFolder, run: PathRun, path: LoadPath, record: dict[str, Any], rows: Sequence[tuple[Any, ...]]
 ) -> None:
-    """Tables, scene, summary, and the states of a path that was interrupted. Rank 0 only."""
+    """Tables, scene and summary. Rank 0 only."""
     work = folder.work
     whole.write_path(work / "path.csv", path)
     if rows:
         whole.write_table(work / "path_contact.csv", ("row", "factor", *whole.CONTACT), rows)
     writing.text(work / "scene.toml", dump_scene(run.prepared.scene, folder.target))
     write_record(work, record)
-    if path.end == End.INTERRUPTED and (folder.target / JOURNAL).exists():
-        with writing.told(work / JOURNAL):
-            shutil.copyfile(folder.target / JOURNAL, work / JOURNAL)

@@ -104,19 +104,24 @@ def labels(domain: Domain) -> tuple[Integers, int]:
     first = facets.array[facets.offsets[:-1]]
     twice = np.flatnonzero(np.diff(facets.offsets) == 2)
     pairs = np.column_stack([first[twice], facets.array[facets.offsets[twice] + 1]])
-    count, local = _joined(pairs, cells.size_local + cells.num_ghosts)
+    count, local = connected(pairs, cells.size_local + cells.num_ghosts)
     counts = agree(comm, count)
     local = local + sum(counts[: comm.rank])
     mine = local[first]
     theirs = of_owners(mesh.topology.index_map(d - 1), mine)
     apart = mine != theirs
     shared = np.unique(np.column_stack([mine[apart], theirs[apart]]), axis=0)
-    whole, merged = _joined(np.vstack(agree(comm, shared)), sum(counts))
+    whole, merged = connected(np.vstack(agree(comm, shared)), sum(counts))
     return merged[local], whole
 
 
-def _joined(pairs: Integers, size: int) -> tuple[int, Integers]:
-    """How many pieces so many nodes with these connections (k, 2) have, and the piece of each node."""
+def connected(pairs: Integers, size: int) -> tuple[int, Integers]:
+    """How many pieces a graph has, and the piece of each of its nodes.
+
+    Args:
+        pairs: nodes that are connected, (k, 2).
+        size: number of nodes.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -270,12 +270,14 @@ def load(path: Path) -> SolutionArrays:
     """
     try:
         with np.load(path) as stored:
+            if any(member.compress_type for member in stored.zip.infolist()):  # then nothing is larger than the file
+                raise ValueError("compressed")
             return _of_members({key: stored[key] for key in stored.files})
     except FileNotFoundError:
         raise ResultError(
             f"{path}: there is no such file; results of earlier versions do not have it: run the scene again"
         ) from None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, ValueError, KeyError, TypeError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultError(f"{path}: damaged ({error})") from None
 
 

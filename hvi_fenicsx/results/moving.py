@@ -20,8 +20,6 @@ from ..runtime import manifest
 from ..runtime.manifest import MARKS
 
 _PROGRAM = "hvi_fenicsx"
-_LONGEST = 1000
-"""Bytes of a lock's file that are read."""
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 """What flock ends with where the file system has none."""
 
@@ -49,7 +47,7 @@ class FolderLock:
                 self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
                 exclusive = self._lock()
             said = self._said()
-            if said and not said.startswith(_PROGRAM):
+            if os.fstat(self._file).st_nlink > 1 or (said and not said.startswith(_PROGRAM)):
                 words = f"{self._path} marks a folder that is being written, and holds something else"
                 raise InputError(f"--out {target}: {words}; move it away, or choose another folder")
             self.was_left = bool(said) and exclusive
@@ -80,7 +78,7 @@ class FolderLock:
         return True
 
     def _said(self) -> str:
-        return os.pread(self._file, _LONGEST, 0).decode("utf-8", "backslashreplace")
+        return os.pread(self._file, 1000, 0).decode("utf-8", "backslashreplace")
 
     def release(self, *, keep: bool = False) -> None:
         """Let the folder go; at once or a second time.
@@ -119,19 +117,21 @@ def move_in(work: Path, target: Path) -> tuple[str, ...]:
     assert new is not None
     owned = old.owned if old else frozenset()
     mark = MARKS[new.kind]
-    for name in [*([mark] if mark in owned and (work / mark).exists() else []), *sorted(owned - new.owned)]:
-        if not is_folder(target / name):
-            (target / name).unlink(missing_ok=True)
-    for name in sorted(name for name in owned if name not in new.owned or (work / name).exists()):
+    coming = {name for name in new.files if os.path.lexists(work / name)}
+    for name in [*(owned & coming & {mark}), *(owned - new.owned)]:
+        _remove(target / name)
+    for name in owned & coming:
         if is_folder(target / name):
-            _remove_owned(target / name)
-    there = [name for name in sorted(new.files) if name != mark and (work / name).exists()]
-    kept = [_move(work / name, target / name, name in owned) for name in there]
-    kept.append(_move(_copied(work / manifest.NAME), target / manifest.NAME, manifest.NAME in owned))
-    if (work / mark).exists():
-        kept.append(_move(work / mark, target / mark, mark in owned))
+            _remove(target / name)
+    kept = list[str]()
+    for name in [*sorted(coming - {mark}), manifest.NAME, *(coming & {mark})]:
+        if name == manifest.NAME:
+            manifest.write(target, new, work)
+            continue
+        kept += make_room(target / name, owned=name in owned)
+        os.replace(work / name, target / name)
     discard(work)
-    return tuple(filter(None, kept))
+    return tuple(kept)
 
 
 def discard(work: Path) -> None:
@@ -145,37 +145,32 @@ def discard(work: Path) -> None:
     shutil.rmtree(work, ignore_errors=True)
 
 
-def _copied(file: Path) -> Path:
-    """A copy beside a file, on the disk."""
-    copy = file.with_name(f".{file.name}.copy")
-    with copy.open("wb") as stream:
-        stream.write(file.read_bytes())
-        stream.flush()
-        os.fsync(stream.fileno())
-    return copy
-
-
-def _remove_owned(folder: Path) -> None:
-    """Remove a result within a result; files of others in it stay, and it with them."""
-    found = manifest.read(folder)
+def _remove(path: Path) -> None:
+    """Remove a file, or a result within a result; files of others in that stay, and it with them."""
+    if not is_folder(path):
+        path.unlink(missing_ok=True)
+        return
+    found = manifest.read(path)
     for name in sorted(found.owned if found else (), key=lambda name: name == manifest.NAME):
-        (folder / name).unlink(missing_ok=True)
+        with contextlib.suppress(IsADirectoryError):
+            (path / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # it is not empty
-        folder.rmdir()
+        path.rmdir()
 
 
-def _move(source: Path, goal: Path, owned: bool) -> str | None:
-    """Move a file; another's that has its name gets a new one."""
-    aside = None
-    if os.path.lexists(goal) and (not owned or is_folder(goal)):
-        aside = next(free for n in itertools.count(1) if not os.path.lexists(free := _aside(goal, n)))
-        os.rename(goal, aside)
-    os.replace(source, goal)
-    return f"{goal.name} was there, and not of this program; it is {aside.name} now" if aside else None
+def make_room(goal: Path, *, owned: bool) -> tuple[str, ...]:
+    """Give what is of others a new name; what became of it, in words.
 
-
-def _aside(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.name}.kept" + (f"-{number}" if number > 1 else ""))
+    Args:
+        goal: the name that a file of the program's is to have.
+        owned: whether one that is there is the program's.
+    """
+    if not os.path.lexists(goal) or (owned and not is_folder(goal)):
+        return ()
+    names = (goal.with_name(f"{goal.name}.kept" + f"-{n}" * (n > 1)) for n in itertools.count(1))
+    aside = next(free for free in names if not os.path.lexists(free))
+    os.rename(goal, aside)
+    return (f"{goal.name} was there, and not of this program; it is {aside.name} now",)
 
 
 def is_folder(path: Path) -> bool:

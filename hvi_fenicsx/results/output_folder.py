@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -25,15 +27,11 @@ from ..runtime import manifest, processes, writing
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.mpi import on_root
 from ..runtime.processes import SIGNALS
-from .moving import FolderLock, discard, is_folder, move_in
+from ..runtime.writing import Journal, Record
+from .moving import FolderLock, discard, is_folder, make_room, move_in
 
-_WAYS = {
-    "result": "--force (force=True in Python) replaces it",
-    "study": "--resume keeps its finished points, --force begins anew",
-}
-"""What a user may do with a folder that is there, by its kind."""
-_UNFINISHED = "--resume goes on with it, --force begins anew"
-"""And with one that a killed process has left."""
+_WAYS = "--resume goes on with what is unfinished, --force (force=True in Python) replaces it, --out DIR writes beside"
+"""What a user may do with a folder that is there."""
 
 
 def resolved(target: Path) -> Path:
@@ -42,11 +40,8 @@ def resolved(target: Path) -> Path:
     Raises:
         InputError: the links go round in a circle.
     """
-    try:
-        found = target.resolve()
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"--out {target}: {error}; choose another folder") from None
-    if found.is_symlink():  # Python 3.13 and later hand a circle back
+    found = Path(os.path.realpath(target))
+    if found.is_symlink():  # it hands a circle back
         raise InputError(f"--out {target}: its symbolic links go round in a circle; choose another folder")
     return found
 
@@ -57,11 +52,14 @@ class ResultFolder:
     Args:
         comm: the ranks that write.
         target: where the result goes; a symbolic link stands for what it points to.
-        force: whether a result that is there already is replaced, or gone on with.
+        force: whether a result that is there already is replaced.
+        resume: whether one of its kind is gone on with.
         inputs: files that must not be replaced.
         kind: what goes into it.
 
     Attributes:
+        journal: grows in the target while the result is made; on rank 0, after :meth:`begin_journal`.
+        unfinished: whether it stays.
         target: where the result goes, without symbolic links; the same on all ranks, as all attributes.
         work: the hidden folder that the files are to be written into.
         kept: what became of files of others that had the name of one of the result's, in words.
@@ -77,16 +75,17 @@ class ResultFolder:
         target: Path,
         *,
         force: bool = False,
+        resume: bool = False,
         inputs: Iterable[Path] = (),
         kind: Kind = "result",
     ) -> None:
         self.comm, self.kind, self.kept = comm, kind, tuple[str, ...]()
-        self._staged, self._left = False, False
-        self._announced, self._made = list[str](), list[Path]()
+        self._force, self._resume, self._staged, self._left, self.unfinished = force, resume, False, False, False
+        self._journal, self._made = "", list[Path]()
         self._lock: FolderLock | None = None
-        self.target, self.work = on_root(comm, lambda: self._opened(resolved(target), inputs, force=force))
+        self.target, self.work = on_root(comm, lambda: self._opened(resolved(target), inputs))
 
-    def _opened(self, target: Path, inputs: Iterable[Path], *, force: bool) -> tuple[Path, Path]:
+    def _opened(self, target: Path, inputs: Iterable[Path]) -> tuple[Path, Path]:
         """Lock the folder and make the hidden one. Rank 0 only."""
         around = target if os.path.ismount(target) else target.parent
         self.target, self.work = target, around / f".{target.name}.hvi-new"
@@ -96,7 +95,7 @@ class ResultFolder:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 self._lock = FolderLock(target)
                 self._recover(was_left=self._lock.was_left)
-                self._check(inputs, force=force)
+                self._check(inputs)
                 self.work.mkdir()
                 self._staged = True
         except BaseException:
@@ -113,12 +112,8 @@ class ResultFolder:
             else:
                 shutil.rmtree(self.work)
             self._left = False
-        # A manifest that was not written whole goes: with an older one, or in a new folder alone.
-        half = writing.half_of(self.target / manifest.NAME)
-        if half.exists() and (manifest.read(self.target) is not None or [*self.target.iterdir()] == [half]):
-            half.unlink()
 
-    def _check(self, inputs: Iterable[Path], *, force: bool) -> None:
+    def _check(self, inputs: Iterable[Path]) -> None:
         """Refuse a folder that may not be written, or whose files may not be replaced."""
         if not self.target.exists():
             return
@@ -132,12 +127,11 @@ class ResultFolder:
                 text = f"holds other files, and no {manifest.NAME} of this program; choose a new or empty folder"
                 raise self._refused(text)
             return
-        if found.kind != self.kind:
+        if found.kind != self.kind and not (self._force and MARKS[found.kind] == MARKS[self.kind]):
             raise self._refused(f"holds a {found.kind}, and this is a {self.kind}; choose a new or empty folder")
-        if not force:
+        if not (self._force or self._resume):
             finished = (self.target / MARKS[self.kind]).exists()
-            state = f"already holds a {self.kind}" if finished else f"holds an unfinished {self.kind}"
-            raise self._refused(f"{state}; {_WAYS[self.kind] if finished else _UNFINISHED}, --out DIR writes beside")
+            raise self._refused(f"{'already holds a' if finished else 'holds an unfinished'} {self.kind}; {_WAYS}")
         owned = {self.target / name for name in found.owned}
         for file in inputs:
             if Path(os.path.realpath(file)) in owned:
@@ -157,55 +151,62 @@ class ResultFolder:
         if isinstance(error, NotWrittenError):
             raise self._in_words(error) from None
 
-    def announce(self, name: str) -> Path:
-        """A file in the target itself that grows while the result is made, listed at once. Rank 0 only.
+    def begin_journal(self, name: str, identity: Sequence[str]) -> list[Record]:
+        """What a journal in the target has, if it is gone on with. Rank 0 only.
 
         Args:
             name: of the file.
+            identity: what the computation is of, and by what.
 
         Raises:
-            InputError: it cannot be listed.
+            InputError: what is there cannot be gone on with.
         """
+        self._journal, file = name, self.target / name
+        self.journal = Journal(file, identity, self.work, anew=not self._resume, begin=self._announce)
+        return self.journal.records
+
+    def _announce(self) -> None:
+        """List the journal in the target."""
         with self.told():
             if not self.target.exists():
                 self.target.mkdir()
                 self._made.insert(0, self.target)
-            if manifest.read(self.target) is None:
-                manifest.write(self.target, Manifest(kind=self.kind, files={}))
-            manifest.add(self.target, [name], changing=True)
-        self._announced.append(name)
-        return self.target / name
+            name, known = self._journal, manifest.read(self.target) or Manifest(kind=self.kind, files={})
+            self.kept += make_room(self.target / name, owned=name in known.files)
+            files = {**known.files, name: None}
+            manifest.write(self.target, replace(known, kind=self.kind, files=files), self.work)
 
-    def commit(self, scene: Model, keep: Iterable[str] = ()) -> None:
+    def commit(self, scene: Model) -> None:
         """Make the written files the result, all at once, in the place of those that were written before. Collective.
 
         Args:
             scene: what was solved.
-            keep: the announced files that stay.
 
         Raises:
             InputError: the files cannot be written or moved, on all ranks alike.
         """
         self.comm.barrier()
-        self.kept = on_root(self.comm, lambda: self._moved_in(inputs_of(scene, self.target), keep))
+        self.kept = on_root(self.comm, lambda: self._moved_in(inputs_of(scene, self.target)))
 
-    def _moved_in(self, inputs: Mapping[str, str], keep: Iterable[str] = ()) -> tuple[str, ...]:
+    def _moved_in(self, inputs: Mapping[str, str]) -> tuple[str, ...]:
         """Move the files in; what became of files of others, in words. Rank 0 only."""
         with self.told():
-            files = {**manifest.listed(self.work), **dict.fromkeys(keep)}
+            there = manifest.read(self.target)
+            stay = {self._journal} & set(there.files if there and self.unfinished else ())
+            files = {**manifest.listed(self.work), **dict.fromkeys(stay)}
             manifest.write(self.work, Manifest(kind=self.kind, files=files, inputs=inputs))
         try:
             with processes.held(SIGNALS):
                 kept = move_in(self.work, self.target)
                 self._staged = False
-        except OSError as error:
+        except (OSError, NotWrittenError) as error:
             self._left = True
             raise self._refused(
-                f"{error.strerror or error}; the whole {self.kind} is in {self.work}, the next run into this folder "
-                "moves it there"
+                f"{getattr(error, 'strerror', error)}; the whole {self.kind} is in {self.work}, the next run into this "
+                "folder moves it there"
             ) from None
         self.discard()
-        return kept
+        return (*self.kept, *kept)
 
     def discard(self) -> None:
         """Let the folder go; remove what was not moved in, and the empty folders that were made. Not collective."""
@@ -241,7 +242,7 @@ class ResultFolder:
         file = self.target / error.file.relative_to(around)
         name = f"{file.relative_to(self.target)} " if file != self.target else ""
         words = f"--out {self.target}: {name}could not be written: {error.reason}"
-        if any((self.target / name).exists() for name in self._announced):
+        if self._journal and (self.target / self._journal).exists():
             words += "; what is finished is kept, --resume goes on from there"
         return NotWrittenError(file, error.reason, words)
 
@@ -263,26 +264,31 @@ def inputs_of(scene: Model, folder: Path) -> dict[str, str]:
 _READ = ("scene.toml", MARKS["result"])
 
 
-def read_finished(target: Path, scene: Model) -> tuple[dict[str, Any] | None, str | None]:
+def read_finished(target: Path, scene: Model, kind: Kind) -> tuple[dict[str, Any] | None, str | None]:
     """The result of a scene in a folder, if one is there, whole and of the same mesh files and plugins.
 
     Args:
         target: the folder, without symbolic links.
         scene: the scene.
+        kind: of what is asked for.
 
     Returns:
         What ``summary.json`` says, None where there is no such result; why one that is there cannot be kept.
+
+    Raises:
+        InputError: it is of another scene, and no single run, which is soon run again.
     """
     found = manifest.read(target)
-    if found is None or found.kind != "result":
+    if found is None or found.kind != kind or MARKS["result"] not in found.files:
         return None, None
-    damaged = found.damaged(target)
-    if damaged is None:
-        damaged = next((name for name in _READ if not found.files.get(name)), None)  # listed without what was in it
-    if damaged is not None:
+    of = found.files.get("scene.toml")
+    if of and of != hashlib.sha256(dump_scene(scene, target).encode()).hexdigest():
+        if kind != "result":
+            raise InputError(f"--out {target}: holds another scene; {_WAYS}")
+        return None, None
+    unknown = next((name for name in _READ if not found.files.get(name)), None)  # listed without what was in it
+    if damaged := found.damaged(target) or unknown:
         return None, f"{damaged} is not as it was written"
-    if (target / "scene.toml").read_text(encoding="utf-8") != dump_scene(scene, target):
-        return None, None
     if found.inputs != inputs_of(scene, target):
         return None, "a file that the scene reads has changed"
-    return json.loads((target / MARKS["result"]).read_text(encoding="utf-8")), None
+    return json.loads(writing.content(target / MARKS["result"])), None

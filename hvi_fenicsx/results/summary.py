@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..problem import effect_summary
-from ..problem.problem import Problem
 from ..runtime import cost, manifest
 from ..runtime.mpi import agree, largest
 from ..workflow import Preparation, Solution
@@ -18,7 +17,8 @@ from ..workflow import Preparation, Solution
 def summary(solution: Solution) -> dict[str, Any]:
     """All of ``summary.json``; null for infinite or absent. Collective; the same on all ranks."""
     problem, solved, examination = solution.problem, solution.solve_result, solution.examination
-    wanted = solution.scene.solver
+    wanted, forces, borne = solution.scene.solver, solution.forces, solution.last_borne
+    counts = ("newton", "linear", "branch")
     return plain(
         {
             **common(solution, solution.dofs),
@@ -28,20 +28,26 @@ def summary(solution: Solution) -> dict[str, Any]:
             "method": solved.method if solved else None,
             "smoothing": wanted.smoothing,
             "epsilon": solution.epsilon,
-            "iterations": _iterations(solution),
+            "iterations": {key: int(getattr(solved.counts, key)) for key in counts} | {"levels": solved.levels}
+            if solved
+            else None,
             "energy": examination.energy * problem.scales.energy if examination else None,
             "contact": _contact(solution),
             "mode_mixity": _mode_mixity(solution),
-            "resultants": _resultants(solution),
+            "resultants": None
+            if forces is None
+            else {name: force * problem.scales.force for name, force in forces.resultants(problem.comm).items()},
             "certificate": asdict(solution.certificate) if solution.certificate else None,
-            "last_borne": _last_borne(solution),
+            "last_borne": {"factor": borne.factor, "certificate": asdict(examination.certificate)}
+            if borne and examination
+            else None,
             "obstacle": solution.obstacle.summary() if solution.obstacle else None,
             "uniqueness": asdict(solution.uniqueness) if solution.uniqueness else None,
             "estimate": _estimate(solution),
             "accuracy": None,
             "warnings": list(solution.warnings),
             "effects": [asdict(summary) for summary in effect_summary.summaries(problem)],
-            "scales": _scales(problem),
+            "scales": {key: getattr(problem.scales, key) for key in ("length", "stress", "displacement", "energy")},
         }
     )
 
@@ -63,21 +69,6 @@ def common(of: Solution | Preparation, dofs: int) -> dict[str, Any]:
         "peak_memory_mb": cost.peak_memory(comm),
         "versions": manifest.versions(),
     }
-
-
-def _last_borne(solution: Solution) -> dict[str, Any] | None:
-    """The factor of the loads under which the state that is written is in equilibrium, and its certificate."""
-    if solution.last_borne is None or solution.examination is None:
-        return None
-    return {"factor": solution.last_borne.factor, "certificate": asdict(solution.examination.certificate)}
-
-
-def _iterations(solution: Solution) -> dict[str, int] | None:
-    if solution.solve_result is None:
-        return None
-    counts = solution.solve_result.counts
-    found = {key: int(getattr(counts, key)) for key in ("newton", "linear", "branch")}
-    return found | {"levels": solution.solve_result.levels}
 
 
 def _estimate(solution: Solution) -> dict[str, float | bool] | None:
@@ -104,7 +95,7 @@ def _contact(solution: Solution) -> dict[str, Any] | None:
         "max_gap": largest(comm, float(np.max(gaps, initial=0.0))),
         "max_penetration": largest(comm, float(np.max(0.0 - gaps, initial=0.0))),
         "penetration_between_nodes": None if (dip := examination.between_nodes) is None else dip * scales.displacement,
-        "resultant": [float(f) * scales.force for f in resultant],
+        "resultant": resultant * scales.force,
     }
 
 
@@ -120,24 +111,12 @@ def _mode_mixity(solution: Solution) -> dict[str, float] | None:
     return found or None
 
 
-def _resultants(solution: Solution) -> dict[str, list[float]] | None:
-    """The forces on the body by place, N/m or N; null where nothing was solved. Collective."""
-    if solution.forces is None:
-        return None
-    found = solution.forces.resultants(solution.problem.comm)
-    return {name: [float(f) * solution.problem.scales.force for f in force] for name, force in found.items()}
-
-
-def _scales(problem: Problem) -> dict[str, float]:
-    return {key: getattr(problem.scales, key) for key in ("length", "stress", "displacement", "energy")}
-
-
 def plain(value: Any) -> Any:
     """What JSON can say: no infinities, no NumPy."""
     if isinstance(value, dict):
         return {k: plain(v) for k, v in value.items()}
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
     if isinstance(value, list | tuple):
         return [plain(v) for v in value]
-    if isinstance(value, np.generic):
-        value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -64,7 +64,8 @@ def write(path: Path, comm: MPI.Comm, entries: Iterable[Entry]) -> None:
     Raises:
         NotWrittenError: a file cannot be written, on all ranks alike.
     """
-    if not _is_there(path, comm):
+    if not all(agree(comm, find_spec("vtkmodules") is not None)):
+        _LOG.warning("%s is not written: VTK is missing; install python3-vtk9 (Debian) or vtk (pip, conda)", path.name)
         return
     listed = []
     for time, block, ending, grid in entries:
@@ -72,14 +73,6 @@ def write(path: Path, comm: MPI.Comm, entries: Iterable[Entry]) -> None:
         _write_parallel(file, comm, grid)
         listed.append((time, block, file.name))
     on_root(comm, lambda: _write_collection(path, listed))
-
-
-def _is_there(path: Path, comm: MPI.Comm) -> bool:
-    """Whether all ranks have VTK; otherwise a warning says what is not written. Collective."""
-    if all(agree(comm, find_spec("vtkmodules") is not None)):
-        return True
-    _LOG.warning("%s is not written: VTK is missing; install python3-vtk9 (Debian) or vtk (pip, conda)", path.name)
-    return False
 
 
 def _write_parallel(path: Path, comm: MPI.Comm, grid: Grid) -> None:

@@ -118,7 +118,7 @@ def _write_fields(folder: Path, solution: Solution, sigma: Array | None) -> None
     on_root(problem.comm, lambda: write_table(folder / "boundary.csv", BOUNDARY, rows))
 
 
-def write_record(folder: Path, record: dict[str, Any]) -> None:
+def write_record(folder: Path, record: Mapping[str, Any]) -> None:
     """Write ``summary.json``. Rank 0 only.
 
     Args:

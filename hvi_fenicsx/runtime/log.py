@@ -110,49 +110,29 @@ def newton_step(step: NewtonStep) -> None:
     logger("solvers").debug("%s", step, extra={"moving": True})
 
 
-class RunLog(logging.FileHandler):
-    """``run.log``: each record with the seconds since the start of the run.
-
-    A disk that is full must not end one rank alone: the first error is kept and raised when the log is finished.
+class RunLog(logging.Handler):
+    """``run.log``: each record with the seconds since the start of the run; written when the run ends.
 
     Args:
         path: the file.
     """
 
     def __init__(self, path: Path) -> None:
-        with writing.told(path):
-            super().__init__(path, mode="w", encoding="utf-8")
-        self._error: OSError | None = None
+        super().__init__()
+        self._path, self._lines = path, list[str]()
         self.addFilter(_is_not_told_by_commands)
 
-    def format(self, record: logging.LogRecord) -> str:
-        """The line of a record."""
-        return f"{record.relativeCreated / 1000:9.3f} s  {printable(record.getMessage())}"
-
-    def handleError(self, record: logging.LogRecord) -> None:
-        """Keep the error that is being handled."""
-        error = sys.exc_info()[1]
-        if not isinstance(error, OSError):
-            raise
-        self._error = self._error or error
-
-    def close(self) -> None:
-        """Close the file; an error is kept."""
-        try:
-            super().close()
-        except OSError as error:
-            self._error = self._error or error
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep the line of a record."""
+        self._lines.append(f"{record.relativeCreated / 1000:9.3f} s  {printable(record.getMessage())}\n")
 
     def finish(self) -> None:
-        """Close the file.
+        """Write the file.
 
         Raises:
-            NotWrittenError: a record could not be written.
+            NotWrittenError: it could not be written.
         """
-        self.close()
-        with writing.told(Path(self.baseFilename)):
-            if self._error is not None:
-                raise self._error
+        writing.text(self._path, "".join(self._lines))
 
 
 class WarningDisplay(logging.Handler):

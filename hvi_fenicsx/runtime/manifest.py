@@ -15,14 +15,14 @@ import platform
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from . import writing
 
 NAME = "manifest.json"
-Kind = Literal["result", "study"]
-MARKS: Mapping[Kind, str] = {"result": "summary.json", "study": "study.json"}
+Kind = Literal["result", "path", "search", "study"]
+MARKS: Mapping[Kind, str] = {**dict.fromkeys(get_args(Kind), "summary.json"), "study": "study.json"}
 """The file by which others know that the folder is finished: the first to go and the last to come."""
 _PROGRAM, _FORMAT = "hvi_fenicsx", 1
 
@@ -58,7 +58,7 @@ class Manifest:
 def read(folder: Path) -> Manifest | None:
     """The manifest of a folder; None where there is none, or one that this program did not write."""
     try:
-        found = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        found = json.loads(writing.content(folder / NAME))
         if found["program"] != _PROGRAM or found["format"] != _FORMAT or found["kind"] not in get_args(Kind):
             return None
         files = {_inside(name): known for name, known in dict(found["files"]).items()}
@@ -68,25 +68,25 @@ def read(folder: Path) -> Manifest | None:
 
 
 def _inside(name: str) -> str:
-    """A name that stays within its folder."""
-    path = PurePosixPath(name)
-    if path.is_absolute() or ".." in path.parts or not path.parts or "\0" in name:
+    """A name of something in its folder itself, not in one of that, which may be a link."""
+    if name in ("", ".", "..") or "/" in name or "\0" in name or len(name.encode()) > 255:
         raise ValueError(name)
     return name
 
 
-def write(folder: Path, manifest: Manifest) -> None:
+def write(folder: Path, manifest: Manifest, within: Path | None = None) -> None:
     """Write a manifest into its folder, whole or not at all, also if the power fails.
 
     Args:
         folder: where to.
         manifest: what it says.
+        within: where it is until it is whole; by default in the folder.
 
     Raises:
         NotWrittenError: it cannot be written.
     """
     data: dict[str, Any] = {"program": _PROGRAM, "format": _FORMAT, "version": __version__, **vars(manifest)}
-    with writing.whole(folder / NAME) as aside, aside.open("w", encoding="utf-8") as file:
+    with writing.whole(folder / NAME, within) as aside, aside.open("w", encoding="utf-8") as file:
         file.write(json.dumps(data, indent=1) + "\n")
         file.flush()
         os.fsync(file.fileno())
@@ -98,13 +98,12 @@ def listed(folder: Path) -> dict[str, str | None]:
     return {name: digest(folder / name) for name in names}
 
 
-def add(folder: Path, names: Iterable[str], *, changing: bool = False) -> None:
+def add(folder: Path, names: Iterable[str]) -> None:
     """Add files to the manifest of a folder; nothing where it has none.
 
     Args:
         folder: the folder.
         names: the files.
-        changing: whether they still change, or are yet to come.
 
     Raises:
         NotWrittenError: the manifest cannot be written.
@@ -112,15 +111,14 @@ def add(folder: Path, names: Iterable[str], *, changing: bool = False) -> None:
     known = read(folder)
     if known is None:
         return
-    files = {**known.files, **{name: None if changing else digest(folder / name) for name in names}}
-    if files != known.files:
-        write(folder, replace(known, files=files))
+    files = {**known.files, **{name: digest(folder / name) for name in names}}
+    write(folder, replace(known, files=files))
 
 
 def digest(file: Path) -> str | None:
     """The SHA-256 of a file's content; None where there is no such file."""
     try:
-        with file.open("rb") as stream:
+        with writing.opened(file) as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError:
         return None
@@ -141,13 +139,14 @@ def versions() -> dict[str, str]:
     """Versions by name; "absent" for what is not installed."""
     from ..compat import VERSION, petsc_version
 
-    found = {
+    return {
         "hvi_fenicsx": with_revision(),
         "python": platform.python_version(),
         "dolfinx": VERSION,
         "petsc": petsc_version(),
+        **{name: _version(name) for name in _MODULES},
+        "platform": sys.platform,
     }
-    return {**found, **{name: _version(name) for name in _MODULES}, "platform": sys.platform}
 
 
 def with_revision(root: Path = _ROOT) -> str:

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 
-from ..errors import Interrupted
+from ..errors import InputError, Interrupted
 
 PYTHON = (sys.executable, "-P")
 """Python as our children run it: the current folder is not on its path."""
@@ -85,8 +85,16 @@ def environment() -> dict[str, str]:
     return {**kept, "PYTHONPATH": os.pathsep.join(filter(None, paths))}  # an empty one would be the current folder
 
 
-def ensure_home() -> None:
-    """Set HOME where it is missing: Open MPI does not start without it."""
+def ensure_places() -> None:
+    """Set HOME where it is missing, and TMPDIR to a folder that can be written: Open MPI does not start without them.
+
+    Raises:
+        InputError: there is no such folder.
+    """
+    try:
+        os.environ["TMPDIR"] = tempfile.gettempdir()  # absolute
+    except OSError as error:
+        raise InputError(f"{error.strerror}; set TMPDIR to a folder with room") from None
     if not os.environ.get("HOME"):
         os.environ.pop("HOME", None)
         home = os.path.expanduser("~")  # by the table of users, which may lack this one

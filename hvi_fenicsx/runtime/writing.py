@@ -1,4 +1,7 @@
-"""Files that are written whole or not at all, journals, and what is said of a file that cannot be written.
+"""Files of folders that others may have filled: written whole or not at all, read only where that is safe; journals.
+
+A file is written new, beside its place or in a folder of the program's own, and renamed: no link is followed. One is
+read if it is a file, and small beside the memory; what it holds may still be of any form.
 
 A journal holds what a long computation has so far, so that a run that was killed goes on from there: a path adds each
 of its states, a search replaces its last one. A record is a line of JSON behind its checksum, arrays as base64; what a
@@ -12,15 +15,19 @@ import contextlib
 import errno
 import json
 import os
+import stat
 import sys
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from io import BufferedReader
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from ..errors import NotWrittenError
+from ..errors import HviError, InputError, NotWrittenError
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_LARGEST = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 16
+"""Bytes of a file that are read at once."""
 _MARK = "not written: "
 """How the line of a child process begins."""
 
@@ -53,27 +60,20 @@ def told(file: Path) -> Iterator[None]:
         raise not_written(file, error.errno) from None
 
 
-def half_of(file: Path) -> Path:
-    """The name under which a file is written until it is whole; a killed process leaves that.
-
-    Args:
-        file: that is to be there in the end.
-    """
-    return file.with_name(f".{file.name}.part")
-
-
 @contextlib.contextmanager
-def whole(file: Path) -> Iterator[Path]:
-    """A name beside a file to write to; renamed to the file when all went well, else removed.
+def whole(file: Path, within: Path | None = None) -> Iterator[Path]:
+    """A name at which nothing is, to write to; renamed to the file when all went well, else removed.
 
     Args:
         file: that is to be there in the end.
+        within: the folder where it is written, on the same disk; by default its own.
 
     Raises:
         NotWrittenError: it could not be written.
     """
-    aside = half_of(file)
+    aside = (within or file.parent) / f".{file.name}.part"
     with told(file):
+        aside.unlink(missing_ok=True)
         try:
             yield aside
             os.replace(aside, file)
@@ -94,6 +94,56 @@ def text(file: Path, content: str) -> None:
     """
     with whole(file) as aside:
         aside.write_text(content, encoding="utf-8")
+
+
+def opened(file: Path) -> BufferedReader:
+    """A file to be read, which is no device and no pipe.
+
+    Args:
+        file: which one.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    stream = open(file, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))  # noqa: SIM115
+    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        stream.close()
+        raise OSError(errno.EINVAL, "is no file", str(file))
+    return stream
+
+
+def content(file: Path) -> bytes:
+    """All that is in a file.
+
+    Args:
+        file: which one.
+
+    Raises:
+        OSError: it cannot be read, or is larger than the memory allows.
+    """
+    with opened(file) as stream:
+        if os.fstat(stream.fileno()).st_size > _LARGEST:
+            raise OSError(errno.EFBIG, "is too large to be read", str(file))
+        return stream.read()
+
+
+@contextlib.contextmanager
+def understood(file: Path) -> Iterator[None]:
+    """Say of a file that what it holds is not what the program writes.
+
+    Args:
+        file: what is in it is used in the block.
+
+    Raises:
+        InputError: it is not.
+    """
+    try:
+        yield
+    except HviError:
+        raise
+    except Exception as error:  # whatever comes of it
+        why = f"{type(error).__name__}: {error}"
+        raise InputError(f"{file}: is not as the program wrote it ({why}); --force begins anew") from None
 
 
 def hand_over(error: NotWrittenError) -> int:
@@ -128,29 +178,34 @@ Record = Mapping[str, Any]
 
 
 class Journal:
-    """A journal that is open for writing; rank 0 only.
+    """A journal; rank 0 only. Its file is begun by the first record that is added.
 
     Args:
         path: the file.
-        identity: what the computation is of.
+        identity: what the computation is of, and by what.
+        within: the folder where it is written until it is whole; by default its own.
+        anew: whether what is there is not gone on with.
+        begin: is called before the file is begun.
 
     Attributes:
         records: what it held already, if that is of the same computation.
 
     Raises:
-        OSError: it cannot be read.
-        NotWrittenError: it cannot be written.
+        InputError: it is of another one.
     """
 
-    def __init__(self, path: Path, identity: str) -> None:
-        self._path = path
-        self.records, whole = _journal(path, identity)
-        with told(path):
-            self._file = path.open("r+b" if whole else "wb")
-            self._file.truncate(whole)
-            self._file.seek(whole)
-        if not whole:
-            self.append({"identity": identity})
+    def __init__(
+        self,
+        path: Path,
+        identity: Sequence[str],
+        within: Path | None = None,
+        *,
+        anew: bool = False,
+        begin: Callable[[], object] = lambda: None,
+    ) -> None:
+        self._path, self._identity, self._within, self._begin = path, identity, within, begin
+        self.records = [] if anew else read_journal(path, identity)
+        self._file: BinaryIO | None = None
 
     def append(self, record: Record) -> None:
         """Add a record; a process that is killed afterwards leaves it whole.
@@ -161,9 +216,31 @@ class Journal:
         Raises:
             NotWrittenError: it cannot be written; the records before it are there.
         """
+        if self._file is None:
+            self._file = self._begun([*self.records, record])
+            return
         with told(self._path):
             self._file.write(_line(record))
             self._file.flush()
+
+    def replace(self, record: Record) -> None:
+        """Have this record in the place of all others.
+
+        Args:
+            record: as for :meth:`append`.
+
+        Raises:
+            NotWrittenError: it cannot be written; what was there still is.
+        """
+        self._begun([record]).close()
+
+    def _begun(self, records: Iterable[Record]) -> BinaryIO:
+        """A file of these records, open, in the place of what is there."""
+        self._begin()
+        with whole(self._path, self._within) as aside:
+            aside.write_bytes(b"".join(map(_line, [{"identity": self._identity}, *records])))
+            file = aside.open("ab")
+        return file
 
     def close(self) -> None:
         """Close the file; a power cut harms it no more.
@@ -171,56 +248,36 @@ class Journal:
         Raises:
             NotWrittenError: it could not be written.
         """
-        with told(self._path), self._file:
-            os.fsync(self._file.fileno())
+        if self._file is not None:
+            with told(self._path), self._file:
+                os.fsync(self._file.fileno())
 
 
-def write_journal(path: Path, identity: str, records: Iterable[Record]) -> None:
-    """Write a journal of some records, whole or not at all.
+def read_journal(path: Path, identity: Sequence[str]) -> list[Record]:
+    """The records of a journal; none where there is no journal, or one of the same computation by other means.
 
     Args:
         path: the file.
-        identity: what the computation is of.
-        records: what it has so far.
+        identity: what the computation is of, and by what.
 
     Raises:
-        NotWrittenError: it cannot be written.
+        InputError: it is of another computation.
     """
-    with whole(path) as aside:
-        aside.write_bytes(b"".join(map(_line, [{"identity": identity}, *records])))
+    with understood(path):
+        found = content(path) if os.path.lexists(path) else b""
+        first, *records = [*_records(found)] or [{"identity": identity}]
+        if first["identity"][0] != identity[0]:
+            raise InputError(f"{path}: is of another scene or reference; --force begins anew, --out DIR writes beside")
+        return records if first["identity"] == identity else []
 
 
-def read_journal(path: Path, identity: str) -> list[Record]:
-    """The records of a journal; none where there is no journal, or one of another computation.
-
-    Args:
-        path: the file.
-        identity: what the computation is of.
-    """
-    return _journal(path, identity)[0]
-
-
-def _journal(path: Path, identity: str) -> tuple[list[Record], int]:
-    """The records, and the length of the file as far as they are whole."""
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        return [], 0
-    found = list(_records(content))
-    if not found or found[0][0] != {"identity": identity}:
-        return [], 0
-    return [record for record, _ in found[1:]], found[-1][1]
-
-
-def _records(content: bytes) -> Iterator[tuple[Record, int]]:
-    """Records with where they end, up to the first that is not whole."""
-    end = 0
-    for line in content.splitlines(keepends=True):
-        checksum, _, text = line.partition(b" ")
-        if checksum != _checksum(text) or not text.endswith(b"\n"):
+def _records(text: bytes) -> Iterator[Record]:
+    """Records, up to the first that is not whole."""
+    for line in text.splitlines(keepends=True):
+        checksum, _, record = line.partition(b" ")
+        if checksum != _checksum(record) or not record.endswith(b"\n"):
             return
-        end += len(line)
-        yield json.loads(text, object_hook=_with_array), end
+        yield json.loads(record, object_hook=_with_array)
 
 
 def _line(record: Record) -> bytes:

@@ -17,7 +17,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from ..errors import ExitCode, HviError
+from ..errors import ExitCode, HviError, InputError
 from ..report import page
 from ..report.solution_arrays import ReportError
 from ..results import ResultFolder
@@ -28,7 +28,8 @@ from ..runtime import log, writing
 from ..runtime.cost import Timer
 from ..runtime.manifest import MARKS, __version__
 from ..runtime.mpi import largest, on_root, time_over
-from ..runtime.writing import Journal, Record
+from ..runtime.writing import Journal, Record, understood
+from ..schema import Finite, Positive, Table
 from ..solvers.method import never
 from ..workflow import Solution, find_solution, prepare
 from . import pictures
@@ -40,9 +41,27 @@ JOURNAL = "study.journal"
 """The file in which finished points are kept."""
 PATIENCE = 15.0
 """Seconds after which no further repetition of a point begins."""
-_RECORDED = ("dofs", "converged", "reason", "exit_code", "energy", "epsilon", "iterations")
-"""What is kept of a point's summary."""
 _LOG = log.logger("study")
+
+
+class _PointRecord(Table):
+    """What the journal has of a point: as in :class:`.Row`, with the seconds after which it was given up."""
+
+    point: str
+    dofs: int | None
+    converged: bool
+    reason: str
+    exit_code: int
+    energy: Finite | None
+    epsilon: Finite | None
+    iterations: dict[str, int | None] | None
+    seconds: Positive | None
+    runs: int | None
+    phases: dict[str, Finite] | None
+    h: Positive | None = None
+    errors: dict[str, Finite | None] | None = None
+    epsilon_part: dict[str, Finite | None] | None = None
+    limit: Positive | None = None
 
 
 class NoReferenceError(HviError):
@@ -119,25 +138,26 @@ class Measurement:
         if target is None:
             self.run()
             return on_root(comm, lambda: evaluate(plan, self.known, comm.size)), []
-        with ResultFolder(comm, target, force=force or resume, inputs=inputs, kind="study") as folder:
-            on_root(comm, lambda: self.resume(folder.announce(JOURNAL), anew=force))
+        with ResultFolder(
+            comm, target, force=force, resume=resume and not force, inputs=inputs, kind="study"
+        ) as folder:
+            folder.unfinished = True  # it may be gone on with along further axes
+            on_root(comm, lambda: self._resume(folder))
             self.run()
-            study = on_root(comm, lambda: evaluate(plan, self.known, comm.size))
+            with understood(folder.target / JOURNAL):
+                study = on_root(comm, lambda: evaluate(plan, self.known, comm.size))
             warnings = on_root(comm, lambda: _fill(folder.work, study))
-            folder.commit(plan.own.scene, keep=[JOURNAL])
+            folder.commit(plan.own.scene)
             return study, [*warnings, *folder.kept]
 
-    def resume(self, file: Path, *, anew: bool) -> None:
-        """Keep records in a journal, and know those in it that were measured against the same reference. Rank 0 only.
-
-        Args:
-            file: the journal.
-            anew: whether those are forgotten.
-        """
-        if anew:
-            file.unlink(missing_ok=True)
-        self._journal = Journal(file, f"{__version__} {self.comm.size} {self.plan.reference[0].name}")
-        self.known = {record["point"]: record for record in self._journal.records}
+    def _resume(self, folder: ResultFolder) -> None:
+        """Keep records in a journal, and know those of the same reference in it. Rank 0 only."""
+        known = folder.begin_journal(JOURNAL, [self.plan.reference[0].name, f"{__version__} {self.comm.size}"])
+        self._journal = folder.journal
+        try:
+            self.known = {_PointRecord.made(record).point: record for record in known}
+        except InputError as error:
+            raise InputError(f"{folder.target / JOURNAL}: {error}; --force begins anew") from None
 
     def run(self) -> None:
         """Solve what is not finished, the reference first: without it the rest is in vain. Collective.
@@ -222,13 +242,13 @@ class Measurement:
         if solution is None and over():
             reason = f"not finished after {limit:g} s; --limit SECONDS --resume gives it longer"
             record = {**_failed(reason, ExitCode.NOT_CONVERGED), "limit": limit}
-        return {"point": point.name, **record}, solution
+        return {**record, "point": point.name}, solution
 
     def _timed(self, point: Point, over: Callable[[], bool], repeats: int) -> tuple[Record, Solution | None]:
         """Solve it once to fill caches, and again for the median of its time. Collective."""
         solution = self._solved(point, Timer(), over)
         whole = summary(solution)
-        record: dict[str, Any] = {key: whole[key] for key in _RECORDED}
+        record: dict[str, Any] = {key: whole[key] for key in _PointRecord.model_fields if key in whole}
         times = [whole["time"]]
         while record["converged"] and self._again(times, repeats):
             gc.collect()
@@ -255,8 +275,7 @@ class Measurement:
 
 def _failed(reason: str, code: int) -> dict[str, Any]:
     """The record of a point that has no certified solution."""
-    empty = dict.fromkeys((*_RECORDED, "seconds", "runs", "phases"))
-    return empty | {"converged": False, "reason": reason, "exit_code": code}
+    return dict.fromkeys(_PointRecord.model_fields) | {"converged": False, "reason": reason, "exit_code": code}
 
 
 def _seconds(times: Mapping[str, float]) -> float:

@@ -16,11 +16,10 @@ import numpy as np
 from dolfinx import fem, geometry
 from mpi4py import MPI
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from .. import compat
 from ..geometry import in_space
-from ..mesh import nodes, transfer
+from ..mesh import hierarchy, nodes, transfer
 from ..problem import spaces
 from ..report.solution_arrays import ContactPart, SolutionArrays
 from ..runtime.mpi import joined
@@ -194,9 +193,8 @@ def in_bodies(source: SolutionArrays, target: SolutionArrays) -> Array:
 def _bodies(arrays: SolutionArrays) -> Integers:
     """Numbers of the connected meshes that the nodes belong to, (n,)."""
     cells = cells_of(arrays)
-    first, size = np.repeat(cells[:, 0], cells.shape[1]), len(arrays.points)
-    graph = sparse.coo_array((np.ones(cells.size, dtype=np.int8), (first, cells.ravel())), shape=(size, size))
-    return csgraph.connected_components(graph, directed=False)[1]
+    pairs = np.column_stack([np.repeat(cells[:, 0], cells.shape[1]), cells.ravel()])
+    return hierarchy.connected(pairs, len(arrays.points))[1]
 
 
 def _boxes(arrays: SolutionArrays, bodies: Integers) -> Array:

@@ -58,7 +58,7 @@ def test_the_strength_of_a_short_glued_bar_and_what_the_folder_holds(tmp_path: P
     assert path_files.JOURNAL not in {f.name for f in out.iterdir()}
     refused = hvi("path", BAR, "--out", out, *SHORT)
     assert refused.returncode == 2
-    assert "already holds a result" in refused.stderr
+    assert "already holds a path" in refused.stderr
     assert "finished already" in hvi("path", BAR, "--out", out, *SHORT, "--resume").stdout
 
 

@@ -75,9 +75,10 @@ def test_the_command_writes_each_equilibrium_and_refuses_what_is_there(
     capsys.readouterr()
     assert main([*words, "--resume"]) == 0
     assert capsys.readouterr().out == f"{out}: finished already (all equilibria, proven: 3)\n"
-    assert main(["run", *words[1:], "--resume"]) == 0  # the folder has the same scene, but no result of a run
-    assert "finished already" not in capsys.readouterr().out
-    assert "equilibria" not in json.loads((out / "summary.json").read_text())
+    before = {file: file.read_bytes() for file in sorted(out.rglob("*")) if file.is_file()}
+    for other in (["run", *words[1:]], ["path", *words[1:]], [*words, "--set", "title='another'"]):
+        assert main([*other, "--resume"]) == 2  # a search is replaced by --force alone
+    assert {file: file.read_bytes() for file in sorted(out.rglob("*")) if file.is_file()} == before
 
 
 def test_the_lowest_equilibrium_is_certified_where_a_descent_ends_slowly() -> None:

@@ -110,6 +110,33 @@ def test_a_manifest_of_others_or_one_that_points_outside_is_none(text: str, tmp_
     assert names(tmp_path / "r") == ["manifest.json", "summary.json"]
 
 
+def test_nothing_is_written_or_removed_through_a_link(tmp_path: Path) -> None:
+    """Where files are written before they are renamed, in a folder that a kill has left, and by a manifest."""
+    out, mine, work = tmp_path / "r", tmp_path / "away" / "thesis.txt", tmp_path / ".r.hvi-new"
+    written(out, summary="1", a="1")
+    mine.parent.mkdir()
+    mine.write_text("mine")
+    (out / "sub").symlink_to(mine.parent)
+    for name in (".manifest.json.part", ".j.part", "j"):
+        (out / name).symlink_to(mine)
+    folder = ResultFolder(MPI.COMM_SELF, out, force=True)
+    folder.begin_journal("j", ["this"])
+    folder.journal.append({"x": 1})
+    folder.discard()
+    assert not (out / "j").is_symlink()
+    work.mkdir()
+    for name in (".manifest.json.part", ".manifest.json.copy"):
+        (work / name).symlink_to(mine)
+    (tmp_path / ".r.hvi-lock").write_text("hvi_fenicsx: process 1 on another")
+    manifest.write(work, manifest.Manifest(kind="result", files={"summary.json": None}))
+    written(out, summary="2")
+    for listed in ("sub/thesis.txt", "./sub/thesis.txt", "sub//thesis.txt"):
+        manifest.write(out, manifest.Manifest(kind="result", files={listed: None}))
+        with pytest.raises(InputError, match="holds other files"):
+            written(out, summary="3")
+    assert mine.read_text() == "mine"
+
+
 def test_the_second_writer_is_refused_at_once_and_the_lock_goes_with_the_first(tmp_path: Path) -> None:
     first = ResultFolder(MPI.COMM_SELF, tmp_path / "deep" / "r")
     with pytest.raises(InputError, match=f"process {os.getpid()} on"):

@@ -51,9 +51,12 @@ def test_what_the_study_did_not_write_stays(way: str, copy: Path, monkeypatch: p
     kept = ["holiday.png", "body.msh"]
     for name in kept:
         (copy / "out" / name).write_text("mine")
+    before = {name: (copy / name).read_bytes() for name in names(copy)}
     if way == "--force":
         monkeypatch.setattr(Measurement, "run", no_reference)
     done = study(copy, way)
+    if way == "--force":  # nor does it lose what it had
+        assert {name: (copy / name).read_bytes() for name in names(copy)} == before
     assert all((copy / "out" / name).read_text() == "mine" for name in kept)
     assert done.returncode == (4 if way == "--force" else 0), done.stderr
     assert {"study.json", "study.csv", "report.html", "work_precision.png"} < set(names(copy / "out"))

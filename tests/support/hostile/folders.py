@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import hashlib
 import json
+import os
 import random
 import shutil
 from collections.abc import Callable
@@ -18,7 +20,7 @@ import tomli_w
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx.commands.cli import main
-from hvi_fenicsx.runtime.writing import Journal
+from hvi_fenicsx.runtime.writing import Journal, _line
 
 from .case import OUT, RUN, SCENE, Case, write
 from .requests import STUDY
@@ -30,6 +32,10 @@ _APPEND = Journal.append
 UNTIL = {"study": (), "result": (), "path": (), "search": ("--limit", "1e-9")}
 """What ends a search before it is done."""
 _JSON = [b"", b"[]", b"null", b"{}", b"\xff", b"nan", b"[" * 9999, b'{"files": 3}', b"9" * 5000, b'{"converged": true}']
+
+
+_LAST = ("path.journal", "search.journal", "study.journal", "study.json", "summary.json")
+"""What is written last, of an unfinished result and a finished one."""
 
 
 @cache
@@ -90,8 +96,7 @@ def wrong_hashes(chance: random.Random, out: Path) -> None:
 
 def odd_json(chance: random.Random, out: Path) -> None:
     """The file that marks the end, and with a manifest that knows it: as another program would leave it."""
-    names = ("summary.json", "study.json", "path.journal", "search.journal")
-    file = next(out / name for name in names if (out / name).exists())
+    file = next(out / name for name in _LAST[::-1] if (out / name).exists())
     file.write_bytes(chance.choice(_JSON))
     _manifest(out, lambda m: m["files"].update({file.name: None}))  # type: ignore[attr-defined]
 
@@ -136,6 +141,39 @@ def odd_lock(chance: random.Random, out: Path) -> None:
         lock.write_text("hvi_fenicsx: process 1 on another")
 
 
+def links_for_writing(chance: random.Random, out: Path) -> None:
+    """Where the program writes, before it renames, there is a link to, or a second name of, a file of the user's."""
+    names = [".manifest.json.part", ".manifest.json.copy", "path.journal", "search.journal", "study.journal"]
+    for place in (*(out / name for name in chance.sample(names, 3)), out.parent / f".{out.name}.hvi-new"):
+        place.unlink(missing_ok=True)
+        kind = chance.randrange(4)
+        if kind < 2:
+            place.symlink_to(chance.choice([out.parent / "mine.txt", out.parent / "absent", out.parent, place.name]))
+        elif kind == 2:
+            place.hardlink_to(out.parent / "mine.txt")
+        else:
+            os.mkfifo(place)
+
+
+def linked_folder(chance: random.Random, out: Path) -> None:
+    """The manifest names a file in a folder that is a link."""
+    (out / "sub").symlink_to("..")
+    _listing(["sub/mine.txt", "./sub/mine.txt", "sub//mine.txt", "sub", "x" * 300, "\ud800"])(chance, out)
+
+
+def lies(chance: random.Random, out: Path) -> None:
+    """A summary or a journal with values of other types, and right checksums."""
+    value = chance.choice([99, -1, None, [], {}, True, "x", {"end": 3}, float("nan")])
+    file = next(out / name for name in _LAST if (out / name).exists())
+    lines = [file.read_bytes()] if file.suffix == ".json" else file.read_bytes().splitlines(keepends=True)
+    records = [json.loads(line[line.index(b"{") :]) for line in lines]
+    changed = records[chance.choice([0, -1])]
+    changed[chance.choice(["exit_code", "accuracy", "equilibria", "path", *changed])] = value
+    file.write_bytes(json.dumps(changed).encode() if file.suffix == ".json" else b"".join(map(_line, records)))
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    _manifest(out, lambda m: m["files"].update({file.name: digest}))  # type: ignore[attr-defined]
+
+
 def emptied(chance: random.Random, out: Path) -> None:
     for file in chance.sample([f for f in sorted(out.rglob("*")) if f.is_file()], 3):
         raw = file.read_bytes()
@@ -160,6 +198,9 @@ _DAMAGES = [
     mine_beside,
     odd_lock,
     emptied,
+    links_for_writing,
+    linked_folder,
+    lies,
 ]
 _DAMAGES += [
     moved_around,
