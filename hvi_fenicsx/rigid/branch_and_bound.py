@@ -62,8 +62,9 @@ class ConcavePart:
             edges: of the cone, columns (q, q).
         """
         shares = np.linalg.solve(edges, self.basis)
-        values = [self._value(edge @ self.basis) for edge in edges.T]
         f, sides = self.functional, -shares / np.linalg.norm(shares, axis=1, keepdims=True)
+        concave = replace(f, linear=np.zeros_like(f.linear), factors=np.minimum(f.factors, 0.0))
+        values = [self.programme.evaluate(concave, edge @ self.basis) for edge in edges.T]
         return replace(
             f,
             linear=f.linear + np.array(values) @ shares,
@@ -91,42 +92,36 @@ class ConcavePart:
             part[:, j] = slip / np.linalg.norm(slip)
             yield part
 
-    def _value(self, y: Array) -> float:
-        only = replace(self.functional, linear=np.zeros_like(y), factors=np.minimum(self.functional.factors, 0.0))
-        return self.programme.evaluate(only, y)
-
 
 class GlobalProgramme(CuttingPlanes):
     """Cutting planes for factors of any sign."""
 
     @override
-    def minimise(
-        self, f: Functional, region: Polytope, give_up: float = np.inf, aim: float = -np.inf
-    ) -> Minimum | None:
+    def minimise(self, f: Functional, region: Polytope, give_up: float = np.inf) -> Minimum | None:
         """Minimum of f over region and cone; None if that is empty or nothing in it is small enough.
 
         Args:
             f: the functional, with its cone.
             region: where to search.
             give_up: values above this are of no interest.
-            aim: a value below this will do; the least is found even so where factors are negative.
 
         Raises:
             SolverError: the gap between value and bound does not close.
         """
         if not np.any(f.factors < 0.0):
-            return super().minimise(f, region, give_up, aim)
+            return super().minimise(f, region, give_up)
         part = ConcavePart.of(f, self)
         if not len(part.basis):  # no motion slips where the growth is negative
             return super().minimise(replace(f, factors=np.maximum(f.factors, 0.0)), region, give_up)
         return self._search(part, region, give_up)
 
-    def sphere(self, f: Functional, across: Array) -> Minimum | None:
+    def sphere(self, f: Functional, across: Array, aim: float = -np.inf) -> Minimum | None:
         """Minimum of f over the cone and |y| = 1, one search for each face; None if there is no such y.
 
         Args:
             f: the functional, with its cone.
             across: motions (q, k) to which y is to be orthogonal.
+            aim: a value of at most this will do.
 
         Raises:
             SolverError: the gap between value and bound does not close.
@@ -135,6 +130,8 @@ class GlobalProgramme(CuttingPlanes):
         for face in faces(self.frame, across):
             found = self.minimise(f, face, np.inf if best is None else best.value)
             best = found if best is None or (found is not None and found.value < best.value) else best
+            if best is not None and best.value <= aim:
+                break
         return best
 
     def ratio(self, f: Functional, load: Array, least: float) -> tuple[float, Array | None]:
@@ -151,7 +148,7 @@ class GlobalProgramme(CuttingPlanes):
         Raises:
             SolverError: the gap between value and bound does not close.
         """
-        start = super().minimise(f.unresisted().minus(load), ball(self.frame))
+        start = super().minimise(replace(f, linear=-load, factors=0.0 * f.factors), ball(self.frame))
         if start is None or -start.value <= least:  # it only ever holds, unless a motion it does no work on escapes
             idling = self.minimise(f, idle(self.frame, load))
             return (np.inf, None) if idling is None or idling.value >= -least else (-np.inf, idling.y)

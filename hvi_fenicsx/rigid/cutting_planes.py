@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from itertools import combinations, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from ..typing import Array
 from .motions import DEFAULT
 
 _DIGITS = 12
-"""To which directions of rows are compared; all other errors of the programme are larger."""
+"""To which directions of rows, planes and values are compared; all other errors of the programme are larger."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,11 @@ class SlipIntegral:
         """
         return SlipIntegral(merged(np.concatenate([self.rows, other.rows])), self.length)
 
-    def subgradient(self, y: Array) -> Array:
-        """One subgradient at y, (k,): a vertex without slip contributes the zero of its ball."""
-        return np.tensordot(self.length.gradient(self.rows @ y), self.rows, axes=2)
+    def subgradients(self, motions: Array) -> Array:
+        """One subgradient at each of some motions (s, k), (s, k): a vertex without slip contributes zero."""
+        slips = np.tensordot(motions, self.rows, axes=(1, 2))
+        ways = self.length.gradient(slips.reshape(-1, self.rows.shape[1])).reshape(slips.shape)
+        return np.tensordot(ways, self.rows, axes=2)
 
 
 def merged(rows: Array) -> Array:
@@ -97,22 +99,20 @@ class Functional:
         """
         return replace(self, linear=self.linear - factor * load)
 
-    def unresisted(self) -> Functional:
-        """Zero, on the same cone."""
-        return replace(self, linear=np.zeros_like(self.linear), factors=np.zeros_like(self.factors))
-
 
 @dataclass(frozen=True)
 class Polytope:
-    """The bounded set {upper @ y <= 1, equal @ y = value} to search.
+    """The bounded set of the y with upper @ (y, x) <= limits for some x, and equal @ y = value.
 
     Attributes:
-        upper: (q, k).
+        upper: (q, k + x).
+        limits: (q,).
         equal: (e, k).
         value: (e,).
     """
 
     upper: Array
+    limits: Array
     equal: Array
     value: Array
 
@@ -120,22 +120,7 @@ class Polytope:
 def ball(frame: Array) -> Polytope:
     """|y| <= 1 in the largest of the rigid coefficients z = frame @ y, frame (n, k)."""
     none = np.zeros((0, frame.shape[1]))
-    return Polytope(np.vstack([frame, -frame]), none, np.zeros(0))
-
-
-def vertices(frame: Array) -> Array:
-    """The corners (v, k) of the ball |y| <= 1.
-
-    Args:
-        frame: rigid coefficients of the basis motions, (n, k).
-    """
-    k = frame.shape[1]
-    chosen = [frame[list(rows)] for rows in combinations(range(len(frame)), k)]
-    signs = np.array(list(product((1.0, -1.0), repeat=k)))
-    corners = np.vstack(
-        [np.linalg.solve(rows, signs.T).T for rows in chosen if np.linalg.cond(rows) * DEFAULT.rounding < 1.0]
-    )
-    return corners[np.abs(corners @ frame.T).max(axis=1) <= 1.0 + DEFAULT.rounding]
+    return Polytope(np.vstack([frame, -frame]), np.ones(2 * len(frame)), none, np.zeros(0))
 
 
 def idle(frame: Array, load: Array) -> Polytope:
@@ -150,8 +135,10 @@ def idle(frame: Array, load: Array) -> Polytope:
 
 def cross(frame: Array) -> Polytope:
     """Σ|z_j| <= 1: its corners are pure translations and rotations, so it yields directions easy to name."""
-    signs = np.array(list(product((1.0, -1.0), repeat=frame.shape[0])))
-    return replace(ball(frame), upper=signs @ frame)
+    n, k = frame.shape
+    sizes = np.vstack([np.eye(n), np.eye(n), -np.ones(n)])  # x_j >= |z_j|
+    upper = np.hstack([np.vstack([frame, -frame, np.zeros(k)]), -sizes])
+    return replace(ball(frame), upper=upper, limits=np.r_[np.zeros(2 * n), 1.0])
 
 
 def faces(frame: Array, across: Array) -> Iterator[Polytope]:
@@ -195,13 +182,12 @@ class CuttingPlanes:
     frame: Array
     integrals: tuple[SlipIntegral, ...]
     scale: float
-    cuts: list[list[Array]] = field(init=False)
+    cuts: list[Array] = field(init=False)
 
     def __post_init__(self) -> None:
         k = self.frame.shape[1]
-        self.cuts = [[] for _ in self.integrals]
-        for start in np.vstack([np.eye(k), -np.eye(k)]):
-            self._cut(start)
+        self.cuts = [np.zeros((1, k)) for _ in self.integrals]
+        self._cut(np.vstack([np.eye(k), -np.eye(k)]), np.ones(len(self.integrals)))
 
     def evaluate(self, f: Functional, y: Array) -> float:
         """The value of f at y, all vertices summed; the cone is not looked at.
@@ -213,16 +199,13 @@ class CuttingPlanes:
         slip = sum(b * g.value(y) for b, g in zip(f.factors, self.integrals, strict=True) if b)
         return float(f.linear @ y + slip)
 
-    def minimise(
-        self, f: Functional, region: Polytope, give_up: float = np.inf, aim: float = -np.inf
-    ) -> Minimum | None:
+    def minimise(self, f: Functional, region: Polytope, give_up: float = np.inf) -> Minimum | None:
         """Minimum of a convex f over region and cone; None if that is empty or nothing in it is small enough.
 
         Args:
             f: the functional, with its cone.
             region: where to search.
             give_up: values above this are of no interest.
-            aim: a value below this will do, whatever the gap.
 
         Raises:
             SolverError: the gap between value and bound does not close.
@@ -233,20 +216,24 @@ class CuttingPlanes:
             found = self._solve(f, region, active)
             if found is None or found.lower > give_up:
                 return None
-            if not self._violated(f.cone, found.y, active):
-                value = self.evaluate(f, found.y)
-                best = Minimum(value, found.y, found.lower) if value < best.value else best
+            if self._violated(f.cone, found.y, active):
+                continue
+            value = self.evaluate(f, found.y)
+            best = Minimum(value, found.y, found.lower) if value < best.value else best
             gap = best.value - found.lower
-            if best.value < aim or gap <= 0.0 or smallest <= gap <= DEFAULT.rounding * self.scale:
+            if gap <= 10.0**-_DIGITS * self.scale or smallest <= gap <= DEFAULT.rounding * self.scale:
                 return replace(best, lower=found.lower)
             smallest = min(smallest, gap)
-            self._cut(found.y)
-            self._cut(0.5 * (found.y + best.y))  # where G is smooth, half way to the best one halves the rounds
+            # where G is smooth, a cut half way to the best motion halves the rounds
+            self._cut(np.array([found.y, 0.5 * (found.y + best.y)]), f.factors)
         raise SolverError(f"rigid motions: {DEFAULT.max_rounds} cutting planes left a gap of {smallest:.1e}")
 
-    def _cut(self, y: Array) -> None:
-        for integral, cuts in zip(self.integrals, self.cuts, strict=True):
-            cuts.append(integral.subgradient(y))
+    def _cut(self, motions: Array, factors: Array) -> None:
+        """Add the planes at some motions (s, k) that lie above the known ones there."""
+        for p in np.flatnonzero(factors > 0.0):
+            for y, plane in zip(motions, self.integrals[p].subgradients(motions), strict=True):
+                if plane @ y > np.max(self.cuts[p] @ y) + 10.0**-_DIGITS * np.linalg.norm(plane):
+                    self.cuts[p] = np.vstack([self.cuts[p], plane])
 
     def _solve(self, f: Functional, region: Polytope, active: list[int]) -> Minimum | None:
         """Minimum of the cut model; `value` and `lower` are both the model's."""
@@ -270,39 +257,35 @@ class CuttingPlanes:
         Heights are in units of the part's largest cut: HiGHS' tolerances are absolute, and parts may be small.
         """
         parts = [p for p, b in enumerate(f.factors) if b > 0.0]
-        cuts = [np.array(self.cuts[p]) for p in parts]
-        sizes = [float(np.abs(rows).max()) or 1.0 for rows in cuts]
-        scaled = [rows / size for rows, size in zip(cuts, sizes, strict=True)]
-        left = np.vstack([region.upper, f.cone[active], *scaled])
-        heights = np.zeros((len(left), len(parts)))
-        top = len(region.upper) + len(active)
-        for column, rows in enumerate(scaled):
-            heights[top : top + len(rows), column] = -1.0
-            top += len(rows)
-        right = np.zeros(len(left))
-        right[: len(region.upper)] = 1.0
-        return np.r_[f.linear, f.factors[parts] * sizes], np.hstack([left, heights]), right
+        sizes = [float(np.abs(self.cuts[p]).max()) or 1.0 for p in parts]
+        cuts = [self.cuts[p] / size for p, size in zip(parts, sizes, strict=True)]
+        sides, counts = np.vstack([f.cone[active], *cuts]), [len(rows) for rows in cuts]
+        k, (q, width) = len(f.linear), region.upper.shape
+        left = np.zeros((q + len(sides), width + len(parts)))
+        left[:q, :width], left[q:, :k] = region.upper, sides
+        left[q + len(active) + np.arange(sum(counts)), np.repeat(width + np.arange(len(parts)), counts)] = -1.0
+        cost = np.r_[f.linear, np.zeros(width - k), f.factors[parts] * sizes]
+        return cost, left, np.r_[region.limits, np.zeros(len(sides))]
 
     def _solve_line(self, f: Functional, region: Polytope) -> Minimum | None:
         """One motion only: two rays and the origin, no linear programme."""
         reach = 1.0 / np.abs(self.frame).max()
-        points = [np.array([t]) for t in (reach, -reach, 0.0)]
-        inside = [y for y in points if self._inside(f, region, y)]
-        values = [self.evaluate(f, y) for y in inside]
-        i = int(np.argmin(values)) if values else 0
-        return Minimum(values[i], inside[i], values[i]) if values else None
-
-    def _inside(self, f: Functional, region: Polytope, y: Array) -> bool:
-        held = np.abs(region.equal @ y - region.value).max(initial=0.0) <= DEFAULT.exact
-        return bool(held and (f.cone @ y).max(initial=0.0) <= DEFAULT.exact)
+        found = []
+        for y in np.array([[reach], [-reach], [0.0]]):
+            off = max(np.abs(region.equal @ y - region.value).max(initial=0.0), (f.cone @ y).max(initial=0.0))
+            if off <= DEFAULT.exact:
+                value = self.evaluate(f, y)
+                found.append(Minimum(value, y, value))
+        return min(found, key=lambda one: one.value, default=None)
 
     def _violated(self, cone: Array, y: Array, active: list[int]) -> bool:
-        """Whether y leaves the cone; the row it violates most is then added to the active ones."""
+        """Whether y leaves the cone; the rows it violates most are then added to the active ones."""
         excess = cone @ y
-        if not len(cone) or excess.max() <= DEFAULT.exact or int(excess.argmax()) in active:
-            return False
-        active.append(int(excess.argmax()))
-        return True
+        excess[active] = 0.0
+        most = excess.max(initial=0.0)
+        if most > DEFAULT.exact:
+            active += np.flatnonzero(excess >= 0.5 * most).tolist()
+        return bool(most > DEFAULT.exact)
 
 
 def _seeds(cone: Array) -> list[int]:
@@ -321,11 +304,13 @@ def linear_programme(*problem: Any) -> Any:
     """
     # Imported here: it takes longer than the analysis of a scene that needs no linear programme.
     from scipy.optimize import linprog
+    from scipy.sparse import csr_array
 
+    cost, rows, *rest = problem
     names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
     for tolerance, presolve in product((DEFAULT.exact, DEFAULT.rounding), (False, True)):
         options = {"presolve": presolve, **dict.fromkeys(names, tolerance)}
-        found = linprog(*problem, method="highs-ds", options=options)
+        found = linprog(cost, csr_array(rows), *rest, method="highs-ds", options=options)
         if found.status in (0, 2):
             break
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar, cast
 
@@ -14,7 +14,7 @@ from ..errors import InputError, SolverError
 from ..runtime.mpi import on_root
 from ..typing import Array
 from .branch_and_bound import GlobalProgramme
-from .cutting_planes import Functional, Minimum, Polytope, ball, cross, vertices
+from .cutting_planes import Functional, Minimum, Polytope, ball, cross
 from .motions import DEFAULT, Mode, mode_of, modes, natural_basis, null_space, triangle
 from .reduction import ReducedProblem, RigidProblem, reduce
 from .solvability import ExistenceState, LoadFactors, PaperConditions, Solvability, held_up_to, undecided
@@ -75,7 +75,7 @@ class Analysis:
     def gives_way(self) -> bool:
         """Whether the load does more work along some motion than the growth resists."""
         rest = self.growth.minus(self.work)
-        found = self.programme.minimise(rest, ball(self.reduced.frame), give_up=-self.tie, aim=-self.tie)
+        found = self.programme.minimise(rest, ball(self.reduced.frame), give_up=-self.tie)
         return found is not None and found.value < -self.tie
 
     def solvability(self) -> Solvability:
@@ -161,15 +161,15 @@ class Analysis:
     def _margin(self, f: Functional) -> Minimum | None:
         """Minimum of f - <g,·> over |y| = 1: if negative that over the ball, else one for each face."""
         inner = self._lowest(f, ball(self.reduced.frame))
-        return inner if inner.value < -self.tie else self._sphere(f, self.free[:, :0])
+        return inner if inner.value < -self.tie else self._sphere(f, self.free[:, :0], aim=self.tie)
 
     def _lowest(self, f: Functional, region: Polytope) -> Minimum:
         """Minimum over a region that contains the origin."""
         return self.programme.minimise(f.minus(self.work), region) or Minimum(0.0, np.zeros_like(self.work), 0.0)
 
-    def _sphere(self, f: Functional, across: Array) -> Minimum | None:
+    def _sphere(self, f: Functional, across: Array, aim: float = -np.inf) -> Minimum | None:
         """Minimum over |y| = 1 and y orthogonal to `across` (k, q); None if the cone holds no such y."""
-        return self.programme.sphere(f.minus(self.work), across.T)
+        return self.programme.sphere(f.minus(self.work), across.T, aim)
 
     def _steepest(self, f: Functional) -> Mode:
         """A direction of escape easy to name: on |y|_1 <= 1 the minimum is mostly at a pure motion."""
@@ -202,19 +202,15 @@ class Analysis:
 
     def _paper(self) -> PaperConditions:
         """The paper's conditions look at the load and the contact alone; the laws enter by c."""
-        margin = self._margin(replace(self.growth.unresisted(), cone=self.reduced.contact))
+        margin = self._margin(Functional(0.0 * self.work, 0.0 * self.growth.factors, self.reduced.contact))
         return PaperConditions(self.paper_c, None if margin is None else self._flat(margin.value), self.tie)
 
     @property
     def paper_c(self) -> float:
-        """(Σ c4² area)^½ γ0; γ0 is attained at a vertex of the unit ball of Y, for its square is convex."""
+        """(Σ c4² area)^½ γ0; γ0 is bounded by the sizes of a motion's coefficients, whatever their signs."""
         c4 = np.array([part.c4 for part in self.problem.resistances])
-        gram = sum(
-            (g for g, c in zip(self.reduced.traces, c4, strict=True) if c > 0.0), np.zeros((len(self.work),) * 2)
-        )
-        corners = vertices(self.reduced.frame) if c4.any() else ()
-        trace = max((float(y @ gram @ y) for y in corners), default=0.0)
-        return float(np.sqrt(c4**2 @ self.reduced.areas * trace))
+        back = np.linalg.pinv(self.reduced.frame)
+        return float(np.sqrt(c4**2 @ self.reduced.areas * np.abs(back.T @ self.reduced.trace @ back).sum()))
 
     def _flat(self, margin: float) -> float:
         return 0.0 if abs(margin) <= self.tie else margin

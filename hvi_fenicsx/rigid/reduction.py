@@ -121,13 +121,13 @@ class ReducedRows:
         contact: rows of unit length (c, k); contact admits the motions with contact @ y <= 0.
         slips: the slip integral of each resistance.
         areas: of each resistance, (p,).
-        traces: ∫ y·y over each resistance's part as a quadratic form, (p, k, k).
+        trace: ∫ y·y over the parts whose c4 is positive as a quadratic form, (k, k).
     """
 
     contact: Array
     slips: tuple[SlipIntegral, ...]
     areas: Array
-    traces: Array
+    trace: Array
 
     def joined(self, other: ReducedRows) -> ReducedRows:
         """What both have."""
@@ -135,7 +135,7 @@ class ReducedRows:
             contact=np.unique(np.vstack([self.contact, other.contact]), axis=0),
             slips=tuple(a.joined(b) for a, b in zip(self.slips, other.slips, strict=True)),
             areas=self.areas + other.areas,
-            traces=self.traces + other.traces,
+            trace=self.trace + other.trace,
         )
 
 
@@ -206,7 +206,7 @@ def _own_rows(problem: RigidProblem, basis: Array) -> ReducedRows:
             SlipIntegral(merged(p.slips @ basis * p.weights[:, None, None]), p.measured) for p in problem.resistances
         ),
         areas=np.array([float(p.weights.sum()) for p in problem.resistances]),
-        traces=np.array([_trace(p, basis) for p in problem.resistances]),
+        trace=sum((_trace(p, basis) for p in problem.resistances if p.c4 > 0.0), np.zeros((basis.shape[1],) * 2)),
     )
 
 
