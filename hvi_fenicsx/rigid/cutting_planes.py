@@ -276,7 +276,7 @@ class CuttingPlanes:
             if off <= DEFAULT.exact:
                 value = self.evaluate(f, y)
                 found.append(Minimum(value, y, value))
-        return min(found, key=lambda one: one.value, default=None)
+        return min(found, key=lambda one: one.value) if found else None
 
     def _violated(self, cone: Array, y: Array, active: list[int]) -> bool:
         """Whether y leaves the cone; the rows it violates most are then added to the active ones."""
@@ -284,7 +284,7 @@ class CuttingPlanes:
         excess[active] = 0.0
         most = excess.max(initial=0.0)
         if most > DEFAULT.exact:
-            active += np.flatnonzero(excess >= 0.5 * most).tolist()
+            active.extend(map(int, np.flatnonzero(excess >= 0.5 * most)))
         return bool(most > DEFAULT.exact)
 
 
