@@ -115,7 +115,7 @@ class GlobalProgramme(CuttingPlanes):
             return super().minimise(replace(f, factors=np.maximum(f.factors, 0.0)), region, give_up)
         return self._search(part, region, give_up)
 
-    def sphere(self, f: Functional, across: Array, aim: float = -np.inf) -> Minimum | None:
+    def sphere(self, f: Functional, across: Array, aim: float) -> Minimum | None:
         """Minimum of f over the cone and |y| = 1, one search for each face; None if there is no such y.
 
         Args:

@@ -282,10 +282,9 @@ class CuttingPlanes:
         """Whether y leaves the cone; the rows it violates most are then added to the active ones."""
         excess = cone @ y
         excess[active] = 0.0
-        most = excess.max(initial=0.0)
-        if most > DEFAULT.exact:
-            active.extend(map(int, np.flatnonzero(excess >= 0.5 * most)))
-        return bool(most > DEFAULT.exact)
+        worst = np.flatnonzero(excess > max(0.5 * excess.max(initial=0.0), DEFAULT.exact))
+        active.extend(map(int, worst))
+        return len(worst) > 0
 
 
 def _seeds(cone: Array) -> list[int]:
@@ -294,7 +293,7 @@ def _seeds(cone: Array) -> list[int]:
 
 
 def linear_programme(*problem: Any) -> Any:
-    """What HiGHS finds, its options narrow at first, wider where rounding leaves it without a verdict.
+    """What HiGHS finds, its options narrow at first, wider and by another algorithm where it is left without a verdict.
 
     Args:
         *problem: as for ``scipy.optimize.linprog``, up to the bounds.
@@ -308,9 +307,10 @@ def linear_programme(*problem: Any) -> Any:
 
     cost, rows, *rest = problem
     names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
-    for tolerance, presolve in product((DEFAULT.exact, DEFAULT.rounding), (False, True)):
+    tolerances = DEFAULT.exact, DEFAULT.rounding
+    for method, tolerance, presolve in product(("highs-ds", "highs-ipm"), tolerances, (False, True)):
         options = {"presolve": presolve, **dict.fromkeys(names, tolerance)}
-        found = linprog(cost, csr_array(rows), *rest, method="highs-ds", options=options)
+        found = linprog(cost, csr_array(rows), *rest, method=method, options=options)
         if found.status in (0, 2):
             break
     return found

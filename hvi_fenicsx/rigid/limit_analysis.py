@@ -75,7 +75,7 @@ class Analysis:
     def gives_way(self) -> bool:
         """Whether the load does more work along some motion than the growth resists."""
         rest = self.growth.minus(self.work)
-        found = self.programme.minimise(rest, ball(self.reduced.frame), give_up=-self.tie)
+        found = self.programme.minimise(rest, ball(self.reduced.frame), -self.tie)
         return found is not None and found.value < -self.tie
 
     def solvability(self) -> Solvability:
@@ -161,7 +161,7 @@ class Analysis:
     def _margin(self, f: Functional) -> Minimum | None:
         """Minimum of f - <g,·> over |y| = 1: if negative that over the ball, else one for each face."""
         inner = self._lowest(f, ball(self.reduced.frame))
-        return inner if inner.value < -self.tie else self._sphere(f, self.free[:, :0], aim=self.tie)
+        return inner if inner.value < -self.tie else self._sphere(f, self.free[:, :0], self.tie)
 
     def _lowest(self, f: Functional, region: Polytope) -> Minimum:
         """Minimum over a region that contains the origin."""
