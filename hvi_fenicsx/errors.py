@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
 
@@ -57,6 +59,24 @@ class NotWrittenError(InputError):
     def __reduce__(self) -> tuple[type[NotWrittenError], tuple[Path, str, str]]:
         """What other ranks make it of."""
         return type(self), (self.file, self.reason, str(self))
+
+
+@contextmanager
+def of_user(what: object) -> Iterator[None]:
+    """What Python, NumPy, UFL and dolfinx raise of objects that a program gives is bad input. Decorates functions too.
+
+    Args:
+        what: was given, or is called with it.
+
+    Raises:
+        InputError: with the kind of the error and its words; the error is its cause.
+    """
+    try:
+        yield
+    except (InputError, SolverError, Interrupted, KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # UFL's ArityMismatch is no Exception
+        raise InputError(f"{what}: {type(error).__name__}: {error}") from error
 
 
 class SolverError(HviError, RuntimeError):

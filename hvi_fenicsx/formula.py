@@ -135,7 +135,8 @@ class Formula(SpatialValue):
         if isinstance(source, bool) or not isinstance(source, int | float | str):
             raise InputError(f"must be a number or a formula in x, y, z in quotes, not {_shown(source)}")
         self.source = source if isinstance(source, str) else _finite(source)
-        self._tree = _parse(self.source if isinstance(self.source, str) else repr(self.source))
+        text = self.source.strip() if isinstance(self.source, str) else repr(self.source)
+        self._tree = ast.fix_missing_locations(ast.Expression(_checked(parsed(text), text)))
         if not any(isinstance(node, ast.Name) and node.id in COORDINATES for node in ast.walk(self._tree)):
             self._check_constant()
 
@@ -196,8 +197,15 @@ def _finite(value: float | int) -> float:
     return float(value)
 
 
-def _parse(text: str) -> ast.Expression:
-    text = text.strip()
+def parsed(text: str) -> ast.expr:
+    """The tree of a text that is to be a formula, or formulas that are compared; nothing in it is checked.
+
+    Args:
+        text: without blanks around it.
+
+    Raises:
+        InputError: it is none.
+    """
     if "#" in text:
         raise InputError(f"{text!r} has a comment in it; put it behind the formula's quotes")
     if len(text) > _LONGEST:
@@ -205,10 +213,9 @@ def _parse(text: str) -> ast.Expression:
     try:
         with warnings.catch_warnings():  # Python's own about "1if x < 2 else 3" and the like
             warnings.simplefilter("ignore")
-            tree = ast.parse(text, mode="eval").body
+            return ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise InputError(f"{text!r} is not a formula: {getattr(error, 'msg', error)}") from None
-    return ast.fix_missing_locations(ast.Expression(_checked(tree, text)))
 
 
 def _source(node: ast.expr, text: str) -> str:

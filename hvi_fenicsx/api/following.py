@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from .. import console
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..load_paths import path_files
 from ..load_paths.following import PathRun
 from ..model import Model, PathTable, SolverTable
@@ -23,7 +23,7 @@ from ..paths.load_path import LoadPath
 from ..report.reader import PathResult
 from ..results import ResultFolder
 from ..runtime import log
-from ..schema import require_path, unknown
+from ..schema import unknown
 from ..typing import Array
 from .solution import GIVEN, displacement
 from .solving import check, fields_of
@@ -83,11 +83,13 @@ class ModelPath(LoadPath):
         """
         return self._at_rows("displacements", part)
 
+    @of_user("path")
     def _at_rows(self, what: str, part: str) -> Array:
         if part not in self.parts:
             raise InputError(f"nothing drives or holds {part!r}; there are: {', '.join(self.parts)}")
         return np.array([getattr(row, what)[part] for row in self.rows])
 
+    @of_user("path")
     def u(self, row: int) -> fem.Function:
         """The displacement at a row, m, ghosts updated; as :attr:`.ModelSolution.u`. Collective.
 
@@ -124,6 +126,7 @@ class ModelPath(LoadPath):
             events=self.events,
         )
 
+    @of_user("write")
     def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
         """Write the folder that ``hvi path`` writes. Collective.
 
@@ -135,7 +138,6 @@ class ModelPath(LoadPath):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
-        require_path("folder", folder)
         comm = self.run.prepared.system.comm
         with ResultFolder(comm, Path(folder), force=force, kind="path") as target:
             path_files.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)
@@ -153,6 +155,7 @@ class ModelPath(LoadPath):
         return "\n".join(console.path_outcome(self))
 
 
+@of_user("follow")
 def follow(
     model: Model,
     comm: MPI.Comm | None = None,

@@ -5,17 +5,17 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import MethodType
+from typing import Self, TypeVar
 
 from dolfinx import fem
 from matplotlib.figure import Figure
 
 from .. import console
-from ..certify.certificate import Examination
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..problem import spaces
 from ..problem.scaling import Scales
 from ..problem.stress import cell_stress, space_of_stress
@@ -26,12 +26,11 @@ from ..results.gathering import contact_parts
 from ..results.whole import write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root
-from ..schema import require_kind, require_path
-from ..solvers.method import SolveResult
 from ..typing import Array
 from ..workflow import Solution
 
 _LOG = log.logger("api")
+T = TypeVar("T")
 GIVEN = {"command": None, "petsc": None}
 """The entries of ``summary.json`` for the command line, which a program has not."""
 
@@ -69,9 +68,9 @@ class ModelSolution(Solution):
         """The displacement, m, ghosts updated; Lagrange's elements of ``solver.degree``. Collective when first used.
 
         Raises:
-            InputError: on all ranks alike: nothing was solved, since no solution exists.
+            InputError: on all ranks alike: no solution under the whole load exists, or none was found.
         """
-        return displacement(self._solved.u, self.problem.scales)
+        return displacement(self._known(self.solve_result).u, self.problem.scales)
 
     @cached_property
     def stress(self) -> fem.Function:
@@ -80,10 +79,10 @@ class ModelSolution(Solution):
         Collective when first used.
 
         Raises:
-            InputError: on all ranks alike: nothing was solved, since no solution exists.
+            InputError: on all ranks alike: no solution under the whole load exists, or none was found.
         """
         field = fem.Function(space_of_stress(self.problem.space, (3, 3)), name="stress")
-        values = cell_stress(self.problem.bulk, self._solved.u)
+        values = cell_stress(self.problem.bulk, self._known(self.solve_result).u)
         field.x.array[: values.size] = values.ravel()
         field.x.scatter_forward()
         return field
@@ -93,18 +92,18 @@ class ModelSolution(Solution):
         """The potential energy, J/m in 2D, J in 3D; the same on all ranks, not collective.
 
         Raises:
-            InputError: on all ranks alike: nothing was solved, since no solution exists.
+            InputError: on all ranks alike: no solution under the whole load exists, or none was found.
         """
-        return self._examined.energy * self.problem.scales.energy
+        return self._known(self.examination).energy * self.problem.scales.energy
 
     @cached_property
     def contact(self) -> Mapping[str, ContactPart]:
         """The parts with contact or laws, by name; the same on all ranks. Collective when first used.
 
         Raises:
-            InputError: on all ranks alike: nothing was solved, since no solution exists.
+            InputError: on all ranks alike: no solution under the whole load exists, or none was found.
         """
-        parts = contact_parts(self.problem, self._examined.states)
+        parts = contact_parts(self.problem, self._known(self.examination).states)
         return self.problem.comm.bcast(_ContactParts(parts), root=0)
 
     @cached_property
@@ -115,13 +114,12 @@ class ModelSolution(Solution):
         The same on all ranks. Collective when first used.
 
         Raises:
-            InputError: on all ranks alike: nothing was solved, since no solution exists.
+            InputError: on all ranks alike: no solution under the whole load exists, or none was found.
         """
-        if self.forces is None:
-            raise InputError(self._nothing)
-        found = self.forces.resultants(self.problem.comm)
+        found = self._known(self.forces).resultants(self.problem.comm)
         return {name: force * self.problem.scales.force for name, force in found.items()}
 
+    @of_user("resultant")
     def resultant(self, part: str) -> Array:
         """The force on the body at a side or region, N/m in 2D, N in 3D; (d,). Collective when first used.
 
@@ -129,12 +127,13 @@ class ModelSolution(Solution):
             part: the name; "body" for a load on the whole body.
 
         Raises:
-            InputError: on all ranks alike: there is no such place, or nothing was solved.
+            InputError: on all ranks alike: there is no such place, or no solution under the whole load.
         """
         if part not in self.resultants:
             raise InputError(f"nothing acts on {part!r}; there are: {', '.join(self.resultants)}")
         return self.resultants[part]
 
+    @of_user("plot")
     def plot(self, picture: str | None = None) -> Figure | None:
         """A picture of it as a matplotlib figure, which a notebook shows. Collective; None on ranks other than 0.
 
@@ -145,12 +144,12 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: there is no such picture of it.
         """
-        require_kind("picture", picture, (str, type(None)), "the name of a picture, or None")
         result, figures = gathering.result(self), list[Figure]()
         wanted = picture or ("escape" if self.solve_result is None else "body")
         on_root(self.problem.comm, lambda: figures.append(_figure(result, wanted)))
         return figures[0] if figures else None
 
+    @of_user("write")
     def write(self, folder: str | os.PathLike[str], *, force: bool = False, pictures: bool = True) -> None:
         """Write the folder that ``hvi run`` writes. Collective.
 
@@ -164,27 +163,21 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
-        require_path("folder", folder)
         with ResultFolder(self.problem.comm, Path(folder), force=force) as target:
             write_whole(target, self, GIVEN, self.timer, _LOG.warning, pictures=pictures)
             target.commit(self.scene)
 
     @property
-    def _solved(self) -> SolveResult:
-        if self.solve_result is None:
-            raise InputError(self._nothing)
-        return self.solve_result
+    def borne(self) -> Self:
+        """The last state that is borne, at the factor ``last_borne.factor``; else itself. Not collective."""
+        return replace(self, last_borne=None)
 
-    @property
-    def _examined(self) -> Examination:
-        if self.examination is None:
-            raise InputError(self._nothing)
-        return self.examination
-
-    @property
-    def _nothing(self) -> str:
-        way = self.solvability.direction
-        return f"nothing was solved: {self.reason}" + (f" ({way.name})" if way else "")
+    def _known(self, found: T | None) -> T:
+        """A part of the solution under the whole load; never that of another load in its place."""
+        if found is None or self.last_borne is not None:
+            way = self.solvability.direction
+            raise InputError(f"nothing was solved under the load: {self.reason}" + (f" ({way.name})" if way else ""))
+        return found
 
     def __repr__(self) -> str:
         return "\n".join([*console.outcome(self), *console.warnings(self.warnings)])

@@ -8,14 +8,13 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from pydantic import Field
 
 from .. import console, workflow
 from ..equilibrium_search import bodies
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..load_paths import last_borne
 from ..mesh.domain import Domain
 from ..mesh.shapes import OnlyMesh
@@ -25,7 +24,7 @@ from ..problem import spaces
 from ..runtime import log
 from ..runtime.log import newton_step
 from ..runtime.mpi import time_over
-from ..schema import Positive, Table, require_path
+from ..schema import Count, Positive, Table
 from ..solvers.method import Progress
 from ..study import plan as study_plan
 from ..study.conduct import Measurement
@@ -37,8 +36,12 @@ from .solution import ModelSolution
 
 
 class _Asked(Table):
-    progress: Callable[..., None]
-    estimate: bool
+    progress: Callable[..., None] = newton_step
+    estimate: bool = True
+    lowest: bool = False
+    gap: Annotated[float, Field(gt=0, lt=1)] = 0.5
+    limit: Positive | None = None
+    repeats: Count = 1
 
 
 class ModelPreparation(Preparation):
@@ -48,6 +51,7 @@ class ModelPreparation(Preparation):
         return "\n".join(console.heading(self, self.system.comm.size))
 
 
+@of_user("solve")
 def solve(
     model: Model,
     comm: MPI.Comm | None = None,
@@ -94,6 +98,7 @@ def solve(
     return ModelSolution(**fields_of(solution))
 
 
+@of_user("check")
 def check(
     model: Model,
     comm: MPI.Comm | None = None,
@@ -159,16 +164,11 @@ def _domain(model: Model) -> Domain:
     The data may change between two solves.
     """
     domain = model.body.domain
+    model.body.check_unmoved()
     return domain if is_portable(model) else replace(domain, coarsening=None, shared=None, bends=False)
 
 
 _LOG = log.logger("api")
-
-
-class _Search(Table):
-    lowest: bool
-    gap: Annotated[float, Field(gt=0, lt=1)]
-    limit: Positive | None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -200,6 +200,7 @@ class ModelEquilibria:
         return "\n".join([self.reason, *found])
 
 
+@of_user("equilibria")
 def equilibria(
     model: Model,
     comm: MPI.Comm | None = None,
@@ -223,7 +224,7 @@ def equilibria(
     Raises:
         InputError: on all ranks alike: a law is of a kind that is not searched, or a number is not allowed.
     """
-    _Search.made({"lowest": lowest, "gap": gap, "limit": limit})
+    _Asked.made({"lowest": lowest, "gap": gap, "limit": limit})
     prepared = check(model, comm, **options)
     searched = bodies.Equilibria(prepared)
     stop = time_over(prepared.system.comm, limit)
@@ -243,6 +244,7 @@ def equilibria(
     )
 
 
+@of_user("study")
 def study(
     model: Model,
     folder: str | os.PathLike[str] | None = None,
@@ -272,11 +274,8 @@ def study(
             no number of solves.
         NoReferenceError: on all ranks alike: no solution exists, or the reference is not certified.
     """
-    if folder is not None:
-        require_path("folder", folder)
     ranks = ranks_of(model, comm)
-    if isinstance(repeats, bool) or not isinstance(repeats, int | np.integer) or repeats < 1:
-        raise InputError(f"study: repeats must be a whole number, 1 or more (is {repeats!r})")
+    _Asked.made({"repeats": repeats})
     plan = study_plan.make(_on_its_mesh(model), [_axis(name, values) for name, values in axes.items()])
     measurement = Measurement(plan=plan, comm=ranks, repeats=int(repeats))
     return measurement.conduct(None if folder is None else Path(folder), force=force)[0]
@@ -290,10 +289,8 @@ def _axis(name: str, values: Any) -> tuple[str, tuple[str, ...]]:
 
 def _on_its_mesh(model: Model) -> Model:
     """The model; on its own mesh alone, where it has data on that."""
-    portable = is_portable(model)
     values = (value for effect in model.effects for value in effect.spatial_values())
-    if model.from_file or (portable and all(value.everywhere for value in values)):
+    if model.from_file or (is_portable(model) and all(value.everywhere for value in values)):
         return model
-    domain = replace(model.body.domain, shared=None)
-    only = domain if portable else replace(domain, coarsening=None, bends=False)
+    only = replace(_domain(model), shared=None)
     return model.changed(domain=OnlyMesh(shape="given mesh", given=only))

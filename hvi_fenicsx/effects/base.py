@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 from pydantic_core import PydanticCustomError
 
 from ..class_registry import enter
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..formula import SpatialValue
 from ..laws import Superpotential
 from ..schema import Table, located_error, names_of, plain, shown
@@ -33,8 +33,9 @@ F = TypeVar("F", bound=Callable[..., None])
 
 def from_python(init: F) -> F:
     """Marks the constructor that programs call: tables are read past it, by ``model_validate``."""
-    init.__pydantic_base_init__ = True  # type: ignore[attr-defined]
-    return init
+    made: F = of_user("effect")(init)
+    made.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+    return made
 
 
 class Place(Enum):

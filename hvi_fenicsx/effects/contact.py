@@ -8,9 +8,6 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -22,6 +19,7 @@ from ..formula import Computed, Formula, SpatialValue
 from ..geometry import ROUNDING
 from ..schema import ExistingFile, Finite, Positive, Table, choose, refusal
 from ..typing import Array
+from . import surface_file
 from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, Sides, from_python
 from .contribution import Contribution, NormalBounds, ObstacleMotion
 from .values import FormulaField, Value, as_value, require_components
@@ -96,11 +94,6 @@ class Obstacle(Table):
         """Its vectors by key."""
         return {key: value for key, value in self if isinstance(value, tuple)}
 
-    @property
-    def dimension(self) -> int:
-        """The number of components of its vectors."""
-        return len(next(iter(self._vectors().values())))
-
     def moved(self, way: float) -> Obstacle:
         """The obstacle that a force presses, moved along it, and held there.
 
@@ -155,7 +148,8 @@ class Obstacle(Table):
     def lower(self) -> SpatialValue:
         """The lower bound of the opening that it makes: its distance, with the other sign."""
         text = f"-(distance from the obstacle ({self.shape}))"
-        return Computed(text, lambda points: -self.gap(points[:, : self.dimension]))
+        dimension = len(next(iter(self._vectors().values())))
+        return Computed(text, lambda points: -self.gap(points[:, :dimension]))
 
     def bounds(self) -> NormalBounds:
         """The bounds that it makes, with what moves or presses it."""
@@ -275,6 +269,10 @@ class TriangulatedSurface(Obstacle):
     def _along(self) -> TriangulatedSurface:
         if self.direction is None:
             raise refusal('shape = "surface" needs a direction, from the body towards it: direction = [0, 0, -1]')
+        try:
+            surface_file.triangles(self.file, self.file.stat().st_mtime_ns)
+        except InputError as error:
+            raise refusal(str(error)) from None
         return self
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
@@ -283,7 +281,7 @@ class TriangulatedSurface(Obstacle):
 
     def ahead(self, points: Array, direction: Array) -> Array:
         """By its triangles that face the body."""
-        return self.scale * _distances_along(self.file, points / self.scale, direction)
+        return self.scale * surface_file.distances_along(self.file, points / self.scale, direction)
 
 
 def _obstacle(value: Any, info: ValidationInfo) -> Obstacle:
@@ -303,47 +301,6 @@ ObstacleField = Annotated[Obstacle, BeforeValidator(_obstacle), PlainSerializer(
 """An obstacle as a field of a scene."""
 
 
-@lru_cache(maxsize=8)
-def _triangles(file: Path, changed: int) -> Array:
-    """The triangles of an STL file, (n, 3, 3), in the file's unit of length; one that has not changed is read once."""
-    import pyvista  # here: most scenes need none
-
-    surface = pyvista.STLReader(str(file)).read()
-    if surface.n_cells == 0:
-        raise InputError(f"{file}: is no STL file with triangles")
-    return np.asarray(surface.points[surface.regular_faces], dtype=np.float64)
-
-
-def _distances_along(file: Path, points: Array, direction: Array) -> Array:
-    """How far points are from the nearest triangle that faces them, negative behind it; NaN where there is none, (m,).
-
-    All lengths are in the file's unit.
-
-    Args:
-        file: STL; the normals of its triangles, by their order of corners, look out of the obstacle.
-        points: (m, 3).
-        direction: unit vector towards the surface, (3,).
-
-    Raises:
-        InputError: the file cannot be read.
-    """
-    from shapely import STRtree, polygons
-    from shapely import points as shapely_points
-
-    corners = _triangles(file, file.stat().st_mtime_ns)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = normals @ direction < -ROUNDING * np.linalg.norm(normals, axis=1)
-    corners, normals = corners[facing], normals[facing]
-    across = np.linalg.svd(direction[None])[2][1:]
-    tree = STRtree(polygons(corners @ across.T))
-    at, met = tree.query(shapely_points(points @ across.T), predicate="intersects")
-    lengths = np.sum((corners[met, 0] - points[at]) * normals[met], axis=1) / (normals[met] @ direction)
-    found = np.full(len(points), np.inf)
-    order = np.argsort(-np.abs(lengths), kind="stable")
-    found[at[order]] = lengths[order]
-    return np.where(np.isinf(found), np.nan, found)
-
-
 MEASURED = "measured"
 """The gap between two bodies is the distance of their sides as they are meshed."""
 Gap = Annotated[
@@ -352,17 +309,6 @@ Gap = Annotated[
     PlainSerializer(lambda gap: gap if isinstance(gap, str) else gap.source),
 ]
 """A number, a formula in x, y, z (SI), or "measured"."""
-
-
-@dataclass(frozen=True)
-class _Straight:
-    """One direction, stated by itself."""
-
-    constant: tuple[float, ...]
-
-    def towards(self, points: Array) -> Array:
-        """The same everywhere."""
-        return np.tile(self.constant, (len(points), 1))
 
 
 class Contact(Effect):
@@ -450,7 +396,9 @@ class Contact(Effect):
             return self.obstacle.bounds()
         if isinstance(self.gap, str):
             return NormalBounds(lower=Formula(0.0), upper=None, measured=True)
-        towards = _Straight(tuple(map(float, unit(self.direction)))) if self.direction is not None else None
+        towards = None
+        if (along := self.direction) is not None:
+            towards = Plane(point=along, normal=tuple(-c for c in along))
         lower = self.lower if self.gap is None else self.gap.negative()
         return NormalBounds(lower=lower, upper=self.upper, towards=towards)
 

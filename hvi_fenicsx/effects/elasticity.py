@@ -75,10 +75,7 @@ class Elasticity(Effect):
         if self.model is not None:
             return self
         usual = "plane_stress" if dimension == 2 else "three_dimensional"
-        try:
-            return self.changed(model=usual).at(self.where, self.name)
-        except InputError as error:
-            raise self.refused(str(error), self.where) from None
+        return self.changed(model=usual).at(self.where, self.name)
 
     @abstractmethod
     def held(self) -> Array:

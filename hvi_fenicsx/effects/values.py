@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..formula import Formula, SpatialValue
 from ..schema import refusal
 from ..typing import Array
@@ -44,7 +44,8 @@ class PythonFunction(SpatialValue):
 
     def at(self, points: Array) -> Array:
         """What it returns, checked."""
-        values = np.asarray(self._function(np.ascontiguousarray(points.T)))
+        with of_user(self.source):
+            values = np.asarray(self._function(np.ascontiguousarray(points.T)))
         if values.dtype.kind not in "iuf" or values.shape not in ((), (len(points),)):
             text = f"returns {values.dtype} values {values.shape} at {len(points)} points; return real numbers, (n,)"
             raise InputError(f"{self.source}: {text}")
@@ -99,7 +100,8 @@ class Expression(SpatialValue):
 
         space = fem.functionspace(self._mesh, ("Lagrange", 2))
         sampled = fem.Function(space)
-        sampled.interpolate(compat.expression(self._expression, space))
+        with of_user(self.source):
+            sampled.interpolate(compat.expression(self._expression, space))
         known = space.tabulate_dof_coordinates()
         if not len(known):
             return np.zeros(len(points))
@@ -166,7 +168,10 @@ def expression(given: Any) -> SpatialValue:
     """
     import ufl
     from dolfinx import mesh as dmesh
+    from ufl.algorithms.analysis import extract_type
 
+    if extract_type(given, ufl.classes.Restricted):
+        raise InputError("jump, avg and restrictions are of two cells; give what is known in each cell")
     if given.ufl_shape != ():
         raise InputError(f"a scalar is wanted; the UFL expression has the shape {given.ufl_shape}")
     domains = ufl.domain.extract_domains(given)

@@ -308,11 +308,11 @@ class Superpotential(ABC):
                 interval.
         """
         lo, hi = self._clarke(x)
-        for kink in self._kinks_within(x, atol):
-            near = np.abs(x - kink) <= atol
-            low, high = self._clarke(np.array([kink]))
-            lo = np.where(near, np.minimum(lo, low[0]), lo)
-            hi = np.where(near, np.maximum(hi, high[0]), hi)
+        first, last = self._kinks_near(x, atol)
+        while np.any(near := first < last):
+            low, high = self._clarke(self.kinks[np.where(near, first, 0)])
+            lo, hi = np.where(near, np.minimum(lo, low), lo), np.where(near, np.maximum(hi, high), hi)
+            first = first + 1
         return lo, hi
 
     def distance(self, x: Array, traction: Array, atol: float | Array = 0.0) -> Array:
@@ -337,19 +337,16 @@ class Superpotential(ABC):
             x: displacements (m,), m.
             atol: the distance from a kink, or one for each displacement, m, that counts as being on it.
         """
-        result = self.piece(x)
-        for kink in self._kinks_within(x, atol):
-            result = np.where(np.abs(x - kink) <= atol, -1, result)
-        return result
+        first, last = self._kinks_near(x, atol)
+        return np.where(first < last, -1, self.piece(x))
 
     def _clarke(self, x: Array) -> tuple[Array, Array]:
         left, right = self.left(x), self.right(x)
         return np.minimum(left, right), np.maximum(left, right)
 
-    def _kinks_within(self, x: Array, atol: float | Array) -> Array:
-        if np.size(x) == 0:
-            return np.empty(0)
-        return self.kinks[(self.kinks >= np.min(x - atol)) & (self.kinks <= np.max(x + atol))]
+    def _kinks_near(self, x: Array, atol: float | Array) -> tuple[Integers, Integers]:
+        """The number of the first kink within a distance, and of the first beyond it, (m,) each."""
+        return self.kinks.searchsorted(x - atol), self.kinks.searchsorted(x + atol, side="right")
 
 
 _KEYS_BESIDE = {"multiplier", "length_multiplier"}

@@ -56,11 +56,7 @@ def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
 def describe(law: Superpotential) -> dict[str, Any]:
     """The table of a scene file that `create` makes this law from: its name and parameters, as plain data."""
     parameters = {key: getattr(law, key) for key in inspect.signature(type(law)).parameters}
-    return {"law": law.name} | {key: _listed(value) for key, value in parameters.items() if value is not None}
-
-
-def _listed(value: Any) -> Any:
-    return [_listed(entry) for entry in value] if isinstance(value, list | tuple) else value
+    return {"law": law.name} | json.loads(json.dumps({k: v for k, v in parameters.items() if v is not None}))
 
 
 def _check_keys(name: str, given: Mapping[str, Any], allowed: Mapping[str, inspect.Parameter]) -> None:
@@ -82,17 +78,11 @@ def _checked(
     model = create_model(law.__name__, __config__=_STRICT, **fields)
     try:
         # As JSON, strict means what a scene file means by it: a list is a tuple, an integer is a float.
-        checked = model.model_validate_json(json.dumps(dict(given), default=_plain))
+        text = json.dumps(dict(given), default=lambda value: getattr(value, "tolist", value.__str__)())
+        checked = model.model_validate_json(text)
     except ValidationError as error:
         raise InputError(_message(law.name, error)) from error
     return {key: getattr(checked, key) for key in fields}
-
-
-def _plain(value: Any) -> Any:
-    """Numpy's numbers and arrays, and tomlkit's wrappers, as plain data."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise InputError(f"{value!r} is not plain data; give numbers, booleans, strings or lists of them")
 
 
 def _message(name: str, error: ValidationError) -> str:
@@ -113,7 +103,7 @@ def require_number(owner: str, **parameters: Any) -> None:
         InputError: with the first that is none.
     """
     for key, value in parameters.items():
-        if isinstance(value, bool) or not isinstance(value, Real) or not abs(float(value)) <= sys.float_info.max:
+        if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= sys.float_info.max:  # type: ignore[operator]
             raise InputError(f"{owner}: {key} = {value!r} is not usable; give a finite number")
 
 

@@ -304,10 +304,7 @@ def _taken(table: Array, columns: Integers) -> Array:
 
 def _outward(breaks: Array, slopes: Array, jumps: Array, start: float) -> _HalfLine:
     """The half-line that starts at 0 with the traction `start`."""
-    near, far = np.full(breaks.size, start), np.full(breaks.size, start)
-    rises = slopes[:-1] * np.diff(breaks)
-    # One after the other: without a jump the two limits must be equal to the bit.
-    for i, rise in enumerate(rises, start=1):
-        near[i] = far[i - 1] + rise
-        far[i] = near[i] + jumps[i]
+    # One sum after the other: without a jump the two limits are equal to the bit.
+    sums = np.cumsum(np.append(start, np.column_stack([slopes[:-1] * np.diff(breaks), jumps[1:]])))
+    near, far = np.append(start, sums[1::2]), sums[::2]
     return _HalfLine(breaks, near, far, slopes)

@@ -38,7 +38,7 @@ def domain_of(
         InputError: on all ranks alike, with what is wrong and how to mend it.
     """
     _check_cells(mesh)
-    _check_folds(mesh)
+    _check_nodes(mesh)
     d = mesh.topology.dim
     mesh.topology.create_connectivity(d - 1, d)
     if regions and cells is None:
@@ -62,9 +62,9 @@ def check_tags(**given: Any) -> None:
         InputError: another kind of object.
     """
     for name, tags in given.items():
-        if tags is not None and not isinstance(tags, dmesh.MeshTags):
+        if tags is not None and (not isinstance(tags, dmesh.MeshTags) or tags.values.dtype.kind != "i"):
             raise InputError(
-                f"body: {name} are of the kind {type(tags).__name__}; give dolfinx.mesh.MeshTags, as "
+                f"body: {name} are of the kind {type(tags).__name__}; give dolfinx.mesh.MeshTags of whole numbers, as "
                 "meshtags(mesh, dimension, entities, values) makes them"
             )
 
@@ -98,9 +98,11 @@ def _check_cells(mesh: dmesh.Mesh) -> None:
         )
 
 
-def _check_folds(mesh: dmesh.Mesh) -> None:
-    d = mesh.geometry.dim
-    points, cells = mesh.geometry.x[:, :d], compat.geometry_dofmap(mesh)[:, : d + 1].astype(np.int64)
+def _check_nodes(mesh: dmesh.Mesh) -> None:
+    """Refuse nodes that are no points, or fold the mesh. Collective."""
+    d, x = mesh.geometry.dim, mesh.geometry.x
+    refuse(mesh.comm, ["body: a coordinate of the mesh is no finite number"] * (not np.all(np.isfinite(x))))
+    points, cells = x[:, :d], compat.geometry_dofmap(mesh)[:, : d + 1].astype(np.int64)
     folded = folded_cells(points, cells)
     middles = (spot(points[cells[k]].mean(axis=0)) for k in folded[:1])
     text = "cells lie over each other there; move its vertices"
@@ -116,6 +118,10 @@ def _named(mesh: dmesh.Mesh, tags: Any, dimension: int, names: Mapping[str, int]
         raise InputError(f"body: {kind} are tags of dimension {tags.dim}; {kind} of this mesh have {dimension}")
     if tags.topology != mesh.topology._cpp_object:
         raise InputError(f"body: {kind} are tags of another mesh; make them with meshtags(mesh, {dimension}, ...)")
+    index_map = mesh.topology.index_map(dimension)
+    count = index_map.size_local + index_map.num_ghosts
+    beyond = np.setdiff1d(tags.indices, np.arange(count))
+    refuse(mesh.comm, (f"body: {kind}: the mesh has no {kind[:-1]} {i}, there are {count}" for i in beyond[:1]))
     present = tags_present(mesh, tags)
     for name, tag in names.items():
         if tag not in present:

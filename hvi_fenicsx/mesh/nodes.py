@@ -17,10 +17,10 @@ from dolfinx import mesh as dmesh
 from .. import compat
 from ..typing import Array, Entities
 
-_SPLIT: dict[str, tuple[tuple[int, ...], ...]] = {
-    "interval": ((0, 2), (2, 1)),
-    "triangle": ((0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)),
-    "tetrahedron": (
+_SPLIT: dict[int, tuple[tuple[int, ...], ...]] = {
+    2: ((0, 2), (2, 1)),
+    3: ((0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)),
+    4: (
         (0, 9, 8, 7),
         (9, 1, 6, 5),
         (8, 6, 2, 4),
@@ -31,9 +31,11 @@ _SPLIT: dict[str, tuple[tuple[int, ...], ...]] = {
         (9, 7, 5, 4),
     ),
 }
-"""The parts of a simplex by its nodes, corners first, then the midpoints of the edges in the order of basix."""
-_BY_NODES = {3: "interval", 6: "triangle", 10: "tetrahedron"}
-_BY_CORNERS = {2: "interval", 3: "triangle", 4: "tetrahedron"}
+"""The parts of a simplex with so many corners by its nodes: corners, then midpoints of edges in the order of basix."""
+_CORNERS = {3: 2, 6: 3, 10: 4}
+"""The number of corners of a simplex by that of its nodes."""
+_KINDS = {2: basix.CellType.interval, 3: basix.CellType.triangle, 4: basix.CellType.tetrahedron}
+"""Simplices by their number of corners."""
 
 
 def degree(space: fem.FunctionSpace) -> int:
@@ -65,7 +67,7 @@ def points(space: fem.FunctionSpace) -> Array:
     node[dofs[:, :vertices]] = corners
     x = space.mesh.geometry.x
     found = x[node]
-    for number, (a, b) in enumerate(edges(space) if dofs.shape[1] > vertices else ()):
+    for number, (a, b) in enumerate(edges(vertices) if dofs.shape[1] > vertices else ()):
         found[dofs[:, vertices + number]] = (x[corners[:, a]] + x[corners[:, b]]) / 2
     return found
 
@@ -79,7 +81,7 @@ def _cells(space: fem.FunctionSpace) -> Entities:
 def reference_points(space: fem.FunctionSpace) -> Array:
     """The nodes of a cell by their barycentric coordinates, in the order of its dofs, (nodes, d+1)."""
     corners = np.eye(space.mesh.topology.dim + 1)
-    middles = [corners[list(ends)].mean(axis=0) for ends in (edges(space) if degree(space) == 2 else ())]
+    middles = [corners[list(ends)].mean(axis=0) for ends in (edges(len(corners)) if degree(space) == 2 else ())]
     return np.vstack([corners, *middles])
 
 
@@ -106,8 +108,7 @@ def ends_of(cells: npt.NDArray[Any], count: int, dimension: int) -> Entities:
         dimension: of the cells.
     """
     found = np.repeat(np.arange(count, dtype=np.int32)[:, None], 2, axis=1)
-    edges = basix.topology(basix.CellType[_BY_CORNERS[dimension + 1]])[1]
-    for node, ends in zip(cells.T[dimension + 1 :], edges, strict=False):
+    for node, ends in zip(cells.T[dimension + 1 :], edges(dimension + 1), strict=False):
         found[node] = cells[:, list(ends)]
     return found
 
@@ -118,8 +119,7 @@ def middles(corners: Array) -> Array:
     Args:
         corners: (c, corners, d).
     """
-    pairs = basix.topology(basix.CellType[_BY_CORNERS[corners.shape[1]]])[1]
-    return corners[:, np.array(pairs)].mean(axis=2)
+    return corners[:, np.array(edges(corners.shape[1]))].mean(axis=2)
 
 
 def owned_cells(space: fem.FunctionSpace) -> Entities:
@@ -136,7 +136,7 @@ def linear_cells(space: fem.FunctionSpace) -> Entities:
 
 def parts_of_cell(space: fem.FunctionSpace) -> int:
     """How many of ``linear_cells`` a cell has."""
-    return 1 if degree(space) == 1 else len(_SPLIT[_name(space)])
+    return 1 if degree(space) == 1 else len(_SPLIT[space.mesh.topology.dim + 1])
 
 
 def middles_of_parts(space: fem.FunctionSpace) -> Array:
@@ -167,9 +167,9 @@ def hats(degree: int, barycentric: Array) -> Array:
     if degree == 1:
         return barycentric
     corners = np.maximum(2 * barycentric - 1, 0.0)
-    ends = [2 * barycentric[:, pair] for pair in basix.topology(basix.CellType[_BY_CORNERS[barycentric.shape[1]]])[1]]
-    edges = [np.minimum(both.min(axis=1), both.sum(axis=1) - 1) for both in ends]
-    return np.column_stack([corners, *(np.maximum(edge, 0.0) for edge in edges)])
+    ends = [2 * barycentric[:, pair] for pair in edges(barycentric.shape[1])]
+    middles = [np.minimum(both.min(axis=1), both.sum(axis=1) - 1) for both in ends]
+    return np.column_stack([corners, *(np.maximum(middle, 0.0) for middle in middles)])
 
 
 def facet_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
@@ -197,23 +197,23 @@ def parts(cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
     Args:
         cells: by their nodes, corners first, then midpoints of edges in the order of basix, (c, nodes).
     """
-    table = np.array(_SPLIT[_BY_NODES[cells.shape[1]]])
+    table = np.array(_SPLIT[_CORNERS[cells.shape[1]]])
     return np.ascontiguousarray(cells[:, table].reshape(-1, table.shape[1]))
 
 
 def joined(found: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The cells or facets of degree 2 by their nodes (c, nodes), of which :func:`parts` gives these (k, corners)."""
-    table = np.array(_SPLIT[_BY_CORNERS[found.shape[1]]])
+    table = np.array(_SPLIT[found.shape[1]])
     grouped = found.reshape(-1, *table.shape)
     first = [np.argwhere(table == node)[0] for node in range(table.max() + 1)]
     return np.stack([grouped[:, row, column] for row, column in first], axis=1)
 
 
-def _name(space: fem.FunctionSpace) -> str:
-    return str(space.mesh.topology.cell_name())
+def edges(corners: int) -> list[list[int]]:
+    """The edges of a simplex by its corners, in the order of their midpoints.
 
-
-def edges(space: fem.FunctionSpace) -> list[list[int]]:
-    """The edges of a cell by its corners, in the order of their midpoints."""
-    found: list[list[int]] = basix.topology(basix.CellType[_name(space)])[1]
+    Args:
+        corners: how many it has.
+    """
+    found: list[list[int]] = basix.topology(_KINDS[corners])[1]
     return found

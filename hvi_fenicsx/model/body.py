@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..effects import names_in_python
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..mesh.boundary_part import BoundaryPart, Inequalities, InterfaceSides
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
-from ..schema import unknown
+from ..schema import Table, require_kind, unknown
 
 if TYPE_CHECKING:
     from dolfinx import mesh as dmesh
@@ -25,6 +25,13 @@ if TYPE_CHECKING:
 
     from ..mesh.domain import Domain
     from ..mesh.transfer import Transfer
+
+
+class _Tags(Table):
+    names: dict[str, int]
+    """tags by name"""
+    regions: dict[str, int] | None
+    """tags of cells by name"""
 
 
 class Body:
@@ -47,6 +54,7 @@ class Body:
     pieces: Mapping[str, BoundaryPart] = MappingProxyType({})
     interfaces: Mapping[str, InterfaceSides] = MappingProxyType({})
 
+    @of_user("body")
     def __init__(
         self,
         mesh: dmesh.Mesh,
@@ -62,14 +70,15 @@ class Body:
         if not isinstance(mesh, dmesh.Mesh):
             raise InputError(f"body: {mesh!r} is no dolfinx mesh; a file is read by hvi.Body.file(path)")
         given.check_tags(facets=facets, cells=cells)
-        named = _by_name("names", names or {})
-        within = None if regions is None else _by_name("regions", regions)
-        sides, within = _sorted_out(mesh, facets, cells, named, within)
+        given_tags = _Tags.made({"names": {} if names is None else names, "regions": regions})
+        sides, within = _sorted_out(mesh, facets, cells, given_tags.names, given_tags.regions)
         domain = given.domain_of(mesh, facets, cells, sides, within)
         self.shape: DomainShape = GivenMesh(shape="given mesh", given=domain)
         self.comm: MPI.Comm | None = mesh.comm
+        self.check_unmoved()
 
     @classmethod
+    @of_user("body")
     def from_shape(cls, shape: DomainShape, comm: MPI.Comm | None = None) -> Self:
         """A body of one of the program's shapes, or of your own.
 
@@ -81,6 +90,7 @@ class Body:
         """
         from mpi4py import MPI
 
+        require_kind("comm", comm, (MPI.Comm, type(None)), "a communicator of mpi4py, or None")
         return cls.of_places(shape, comm or MPI.COMM_WORLD)
 
     @classmethod
@@ -132,6 +142,7 @@ class Body:
         return cls.from_shape(Box.made({"size": size, "cells": cells}), comm)
 
     @classmethod
+    @of_user("body")
     def file(
         cls,
         path: str | os.PathLike[str],
@@ -157,12 +168,12 @@ class Body:
         """
         if isinstance(dimension, bool) or dimension not in (2, 3):
             raise InputError(f"dimension: must be 2 or 3 (is {dimension!r})")
-        file = os.fspath(path) if isinstance(path, os.PathLike) else path
-        keys = {"file": file, "scale": scale, "refinements": refinements}
+        keys = {"file": path, "scale": scale, "refinements": refinements}
         body = cls.from_shape(MeshFile.made(keys), comm)
         body.dimension = dimension
         return body
 
+    @of_user("piece")
     def piece(self, name: str, side: str | Sequence[str], where: str) -> Self:
         """The body with one more side: a piece of a side, of the facets whose midpoints lie in it. Collective.
 
@@ -180,6 +191,7 @@ class Body:
         body.pieces = {**self.pieces, name: BoundaryPart(sides, Inequalities(where))}
         return body
 
+    @of_user("interface")
     def interface(self, name: str, first: str, second: str, *, tied: bool = False) -> Self:
         """The body with one more place: where two of its sides meet, which no cells or vertices join. Collective.
 
@@ -203,8 +215,8 @@ class Body:
 
     def _check_new(self, kind: str, name: str, *sides: str) -> None:
         """Refuse a name that is no text or is taken, and sides that are none."""
-        if not isinstance(name, str):
-            raise InputError(f"{kind}: the name must be a text (is {name!r})")
+        for text in (name, *sides):
+            require_kind(kind, text, (str,), "a text")
         for side in sides:
             if side not in self.sides:
                 raise InputError(f"{kind}: {unknown('side', side, self.sides)}")
@@ -223,6 +235,23 @@ class Body:
 
         return _remembering(self.shape.build_hierarchy(self.comm or MPI.COMM_WORLD, self.dimension))
 
+    @cached_property
+    def _at_first(self) -> int:
+        """Where the nodes of the mesh were, as a number."""
+        return hash(self.mesh.geometry.x.tobytes())
+
+    def check_unmoved(self) -> None:
+        """Refuse a mesh whose nodes have been moved: what is kept of the body would be another one's. Collective.
+
+        Raises:
+            InputError: on all ranks alike.
+        """
+        from ..runtime.mpi import refuse
+
+        moved = hash(self.mesh.geometry.x.tobytes()) != self._at_first
+        text = "body: the nodes of its mesh have been moved since it was made; make a new Body of the moved mesh"
+        refuse(self.mesh.comm, [text] * moved)
+
     @property
     def mesh(self) -> dmesh.Mesh:
         """The mesh. Collective when first used."""
@@ -240,14 +269,6 @@ class Body:
 
     def __repr__(self) -> str:
         return f"Body({self.shape.shape}, {self.dimension}D)"
-
-
-def _by_name(what: str, tags: Any) -> dict[str, int]:
-    """Tags by name, as a user gives them."""
-    named = isinstance(tags, Mapping) and all(isinstance(name, str) for name in tags)
-    if not named or any(isinstance(tag, bool) or not isinstance(tag, int | np.integer) for tag in tags.values()):
-        raise InputError(f'body: {what} are numbers of tags by name, such as {what}={{"wall": 1}}, not {tags!r}')
-    return {name: int(tag) for name, tag in tags.items()}
 
 
 def _sorted_out(

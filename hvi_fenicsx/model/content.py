@@ -325,14 +325,14 @@ def _start(model: Content) -> Iterator[Mistake]:
 
 def _path(model: Content) -> Iterator[Mistake]:
     """What the factor of the load path multiplies must be there."""
-    known = list(dict.fromkeys(load_name(where, effect) for where, effect in model.acting() if _drives(effect)))
+    known = dict.fromkeys(
+        load_name(where, effect)
+        for where, effect in model.acting()
+        if effect.displaces_obstacle() or (effect.drive is not Drive.RESISTANCE and not effect.bounds_normal)
+    )
     for name in (model.path.scaled if model.path else None) or ():
         if name not in known:
             yield Mistake(("path", "scaled"), unknown("load, prescribed displacement or moved obstacle", name, known))
-
-
-def _drives(effect: Effect) -> bool:
-    return effect.displaces_obstacle() or (effect.drive is not Drive.RESISTANCE and not effect.bounds_normal)
 
 
 def _smoothing(model: Content) -> Iterator[Mistake]:

@@ -13,17 +13,17 @@ from dolfinx.fem.petsc import assemble_matrix
 from petsc4py import PETSc
 from pydantic import Field
 from typing_extensions import override
+from ufl.algorithms.analysis import extract_type
+from ufl.constantvalue import RealValue
 
 from ..effects import Contribution, Effect, FormContext, Place, Sides, from_python
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..geometry import ROUNDING
 from ..mesh import nodes
+from ..problem.elastic_operator import feels_no_rigid_motion
 from ..problem.spaces import displacement_space
-from ..rigid import RigidBody, rigid_fields
 from ..runtime import forms
 from ..typing import Array
-
-Form = Callable[[Any, Any], Any]
 
 
 class Energy(Effect):
@@ -44,17 +44,29 @@ class Energy(Effect):
     """the stiffness against stretches, N/m²; known on a mesh"""
 
     @from_python
-    def __init__(self, form: Form, region: Sides | None = None) -> None:
+    def __init__(self, form: Callable[..., Any], region: Sides | None = None) -> None:
         self._make(region, form=form)
 
     @override
     def on_mesh(self, mesh: dmesh.Mesh) -> Energy:
         """Itself with its stiffness, its form being symmetric and without energy of rigid motions. Collective."""
         space = displacement_space(mesh)
-        matrix = _assembled(self.form, space)
+        with of_user("the form cannot be used; it must be bilinear in u and v, its data on body.mesh"):
+            form = self.form(ufl.TrialFunction(space), ufl.TestFunction(space))
+            if not isinstance(form, ufl.Form) or len(form.arguments()) != 2:
+                raise InputError("the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
+            if not np.all(np.isfinite([float(number) for number in extract_type(form, RealValue)])):
+                raise InputError("a number in the form is not finite")
+            matrix = assemble_matrix(forms.compiled(form))
+        matrix.assemble()
         _check_symmetry(matrix)
         stiffness = _stiffness(matrix, space)
         matrix.destroy()
+        if not feels_no_rigid_motion(form, space):
+            raise InputError(
+                "a rigid motion costs energy, as none of an elastic body must; write the form in the strain "
+                "sym(grad(u)), and what holds the body as a Displacement, Contact or Support"
+            )
         return self.model_copy(update={"modulus": stiffness})
 
     @override
@@ -80,25 +92,13 @@ class Energy(Effect):
         return not (form.coefficients() or form.constants() or measured)
 
 
-def _assembled(form: Form, space: fem.FunctionSpace) -> PETSc.Mat:
-    try:
-        made = form(ufl.TrialFunction(space), ufl.TestFunction(space))
-    except ValueError as error:  # so UFL refuses data of several meshes
-        raise InputError(f"UFL refuses the form: {error} Its data must be on body.mesh") from error
-    if not isinstance(made, ufl.Form) or len(made.arguments()) != 2:
-        raise InputError("the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
-    matrix = assemble_matrix(forms.compiled(made))
-    matrix.assemble()
-    return matrix
-
-
 def _check_symmetry(matrix: PETSc.Mat) -> None:
     transposed = matrix.transpose(PETSc.Mat())
     transposed.axpy(-1.0, matrix)
     gap, size = transposed.norm(PETSc.NormType.FROBENIUS), matrix.norm(PETSc.NormType.FROBENIUS)
     transposed.destroy()
     if not size > 0.0:
-        raise InputError("the form is zero on this body")
+        raise InputError("the form is zero, or no number, on this body")
     if not gap <= ROUNDING * size:
         raise InputError(
             f"the form is not symmetric: a(u, v) and a(v, u) differ by {gap / size:.1e} of its size; an energy "
@@ -107,7 +107,7 @@ def _check_symmetry(matrix: PETSc.Mat) -> None:
 
 
 def _stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:
-    """The largest energy of a unit stretch over the volume, N/m², where no rigid motion costs any. Collective."""
+    """The largest energy of a unit stretch over the volume, N/m². Collective."""
     comm, d = space.mesh.comm, space.mesh.geometry.dim
     points = nodes.points(space)[: space.dofmap.index_map.size_local]
     one = fem.Constant(space.mesh, PETSc.ScalarType(1.0))
@@ -116,16 +116,6 @@ def _stiffness(matrix: PETSc.Mat, space: fem.FunctionSpace) -> float:
     if not min(stretches) > 0.0:
         axis = "xyz"[int(np.argmin(stretches))]
         raise InputError(f"a stretch along {axis} costs no energy (a(v, v) = {min(stretches):.3g}); it must")
-    away = (points - comm.allreduce(points.sum(axis=0)) / comm.allreduce(len(points))) / volume ** (1.0 / d)
-    motions = rigid_fields(away, RigidBody(dimension=d, centre=np.zeros(3)))
-    names = [f"the translation along {axis}" for axis in "xyz"[:d]]
-    names += ["the rotation"] if d == 2 else [f"the rotation about {axis}" for axis in "xyz"]
-    for number, name in enumerate(names):
-        if abs(_energy(matrix, motions[:, number])) > ROUNDING * max(stretches) * volume ** (1.0 - 2.0 / d):
-            raise InputError(
-                f"{name} costs energy, as a rigid motion of an elastic body must not; write the form in the "
-                "strain sym(grad(u)), and what holds the body as a Displacement, Contact or Support"
-            )
     return float(max(stretches))
 
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Self
 import tomli_w
 
 from ..effects import Effect, Place, in_words
-from ..errors import InputError
+from ..errors import InputError, of_user
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.shapes import DomainShape
-from ..schema import Mistake, Table, unknown
+from ..schema import Mistake, Table, require_kind, unknown
 from . import content
 from .body import Body
 from .content import TABLES, WHOLE, Content, PathTable, SolverTable, dotted
@@ -42,9 +42,11 @@ class Model(Content):
         InputError: on all ranks alike: a value is not allowed, or effects contradict each other.
     """
 
+    @of_user("model")
     def __init__(self, body: Body, effects: Sequence[Effect], title: str = "") -> None:
         if not isinstance(body, Body):
             raise InputError(f"model: {body!r} is no body; make one of a mesh: hvi.Body(mesh, facets=..., names=...)")
+        require_kind("title", title, (str,), "a text")
         self.body, self.title = body, title
         listed = [self._placed(effect) for effect in _listed("model", effects)]
         if not any(effect.place is Place.MATERIAL for effect in listed):
@@ -90,11 +92,10 @@ class Model(Content):
             placed = effect.fitted(self.body.dimension).on_mesh(self.body.mesh)
             placed.check(self.body.dimension)
         except InputError as error:
-            if str(error).startswith(f"{type(effect).__name__} on"):
-                raise
             raise effect.refused(str(error), effect.where) from error
         return placed
 
+    @of_user("replace")
     def replace(self, *effects: Effect) -> Self:
         """The model with other effects in the place of those of the same kind at the same place. Collective.
 

@@ -296,16 +296,14 @@ def _check_agreement(context: DomainForms, found: Sequence[PrescribedComponent])
     for (one, dofs, these), (other, more, those) in combinations(prescribed, 2):
         shared, i, j = np.intersect1d(dofs, more, assume_unique=True, return_indices=True)
         apart = np.abs(these[i] - those[j]) > DEFAULT.same * size
-        differing = zip(shared[apart], these[i][apart], those[j][apart], strict=True)
-        bad += [_disagreement(context, int(dof), (one, other), (float(a), float(b))) for dof, a, b in differing]
+        for dof, *pair in zip(shared[apart], these[i][apart], those[j][apart], strict=True):
+            block, component = divmod(int(dof), context.dimension)
+            at, (a, b) = (
+                spot(context.points[block][: context.dimension]),
+                np.multiply(pair, context.scales.displacement),
+            )
+            bad.append(
+                f"boundary.{one} and boundary.{other} meet at {at} and prescribe displacements along "
+                f'{"xyz"[component]} that differ, {a:.6g} and {b:.6g} m; make them equal there, or write "free" in one'
+            )
     refuse(context.mesh.comm, bad[:1])
-
-
-def _disagreement(context: DomainForms, dof: int, parts: tuple[str, str], pair: Sequence[float]) -> str:
-    block, component = divmod(dof, context.dimension)
-    at = spot(context.points[block][: context.dimension])
-    one, other = (value * context.scales.displacement for value in pair)
-    return (
-        f"boundary.{parts[0]} and boundary.{parts[1]} meet at {at} and prescribe displacements along "
-        f'{"xyz"[component]} that differ, {one:.6g} and {other:.6g} m; make them equal there, or write "free" in one'
-    )

@@ -240,20 +240,15 @@ def _turned(normal: Array, rows: Sequence[_Row], *, flat: bool) -> Array | str:
         if math.hypot(*(normal - along * row.direction)) <= limit:
             return math.copysign(1.0, along) * row.direction
         if abs(along) > limit:
-            return _refusal(along, row, limit)
+            angle = math.degrees(math.acos(min(abs(along), 1.0)))
+            return (
+                f"its normal makes an angle of {angle:.6g}° with the direction of {row.name}; they must be orthogonal "
+                f"or equal, here to within {math.degrees(limit):.2g}°. Move the edge of the part, prescribe all "
+                "components there, leave it out of the part (`where`), or state the normal: contact = { obstacle = "
+                "{ point = ..., normal = ... } }, of a round obstacle its `direction`"
+            )
         rest = rest - (row.direction @ rest) * row.direction
     return rest / np.linalg.norm(rest)
-
-
-def _refusal(along: float, row: _Row, limit: float) -> str:
-    """Why two directions, of which this is the product, cannot stand at one vertex, and what to do."""
-    angle = math.degrees(math.acos(min(abs(along), 1.0)))
-    return (
-        f"its normal makes an angle of {angle:.6g}° with the direction of {row.name}; they must be orthogonal or "
-        f"equal, here to within {math.degrees(limit):.2g}°. Move the edge of the part, prescribe all components "
-        "there, leave it out of the part (`where`), or state the normal: contact = { obstacle = { point = ..., normal "
-        "= ... } }, of a round obstacle its `direction`"
-    )
 
 
 def refuse_facing_sides(comm: MPI.Comm, surfaces: Iterable[Surface], length: float) -> None:

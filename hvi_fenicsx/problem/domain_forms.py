@@ -163,21 +163,13 @@ def find(domain: Domain, parts: Mapping[str, BoundaryPart], effects: Sequence[Pl
         InputError: on all ranks alike: a part without facets, or two pieces with one effect that share facets.
     """
     found = {name: part.facets(domain) for name, part in parts.items()}
-    for name, part in parts.items():
-        if not sum(agree(domain.mesh.comm, len(found[name]))):
-            raise InputError(_empty(name, part))
+    for name, facets in found.items():
+        if not sum(agree(domain.mesh.comm, len(facets))):
+            raise InputError(
+                f"boundary.{name}: no facet has its midpoint there; see `on` and `where`, or take smaller cells"
+            )
     _check_overlap(domain, found, effects)
     return found
-
-
-def _empty(name: str, part: BoundaryPart) -> str:
-    """What is said of a part without facets."""
-    if part.where is None:
-        return f"boundary.{name}: no facet lies on it; see `on`"
-    return (
-        f"boundary.{name}.where: no facet of {', '.join(part.on)} has its midpoint where {part.where.source}; "
-        "change the inequality, or take smaller cells"
-    )
 
 
 def _check_overlap(domain: Domain, facets: Mapping[str, Entities], effects: Sequence[Placed]) -> None:

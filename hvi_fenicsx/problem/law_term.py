@@ -176,10 +176,9 @@ def check_laws(contributions: Sequence[PlacedContribution]) -> None:
     for (one, key, first), (other, second_key, second) in combinations(placed, 2):
         if one != other or not ((first.normal and second.normal) or (first.tangential and second.tangential)):
             continue
-        both = first.normal and first.tangential, second.normal and second.tangential
-        mend = 'adhesion = { law = "graph", ... }' if not any(both) else "cohesion alone, or adhesion and friction"
         raise InputError(
-            f"boundary.{one}: {key} and {second_key} act on the same displacement; state them as one law: {mend}"
+            f"boundary.{one}: {key} and {second_key} act on the same displacement; state them as one law: one graph, "
+            "or cohesion alone, or adhesion and friction"
         )
 
 
@@ -204,10 +203,10 @@ def check_moved(comm: MPI.Comm, contributions: Sequence[PlacedContribution], sur
         slips = bool(np.any(across > DEFAULT.turned_to_prescribed * np.linalg.norm(move)))
         normal = any(law.direction.normal for law in contribution.laws)
         if any(agree(comm, normal or slips)):
-            mend = "let it stand still" if normal else "move it along the normal, or give it a direction"
             raise InputError(
                 f"boundary.{where}.{effect.key}: acts on the displacement of the body, not on that relative to the "
-                f"obstacle, which moves along it; {mend}, or prescribe a displacement of the body"
+                "obstacle, which moves along it; let it stand still, or (beside friction) move it along the normal or "
+                "give it a direction; or prescribe a displacement of the body"
             )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -151,6 +152,56 @@ def square(file: Path, z: float) -> Path:
         text += f"facet normal 0 0 -1\nouter loop\n{points}endloop\nendfacet\n"
     file.write_text(text + "endsolid lid\n")
     return file
+
+
+def stl(corners: np.ndarray, count: int | None = None) -> bytes:
+    """Triangles (n, 3, 3) as a binary file, which says of itself how many there are."""
+    rows = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    rows["corners"] = corners
+    return b"solid lies".ljust(80) + struct.pack("<I", len(corners) if count is None else count) + rows.tobytes()
+
+
+TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]]
+APART = np.concatenate([TETRAHEDRON, TETRAHEDRON + 5.0])
+FACET = "facet normal 0 0 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(stl(TETRAHEDRON)[:length] for length in (0, 83, 84, 184, 283)),
+        *(stl(TETRAHEDRON, count) for count in (0, 2, 5, 4_000_000_000)),
+        *(stl(np.where(TETRAHEDRON == 1.0, odd, TETRAHEDRON)) for odd in (np.nan, np.inf)),
+        stl(0.0 * TETRAHEDRON),
+        stl(APART[1:]),
+        f"solid a\n{FACET}endsolid\nsolid b\n{FACET}".encode(),
+        f"solid a\n{FACET[:60]}endsolid".encode(),
+        f"solid a\n{FACET.replace('1 0 0', '1e999 0 0')}endsolid".encode(),
+    ],
+)
+def test_a_surface_that_is_cut_off_or_lies_is_refused(content: bytes, tmp_path: Path) -> None:
+    """VTK took what there was."""
+    file = tmp_path / "die.stl"
+    file.write_bytes(content)
+    with pytest.raises(hvi.InputError, match=r"obstacle.*die\.stl: "):
+        hvi.Contact("top", obstacle={"shape": "surface", "file": str(file), "direction": [0, 0, -1]})
+
+
+def test_a_binary_surface_is_that_of_a_text(tmp_path: Path) -> None:
+    """Also of two closed pieces, and of two parts of a text."""
+    binary, text = tmp_path / "binary.stl", tmp_path / "text.stl"
+    binary.write_bytes(stl(APART))
+    corners = ["".join("vertex {} {} {}\n".format(*p) for p in triangle) for triangle in APART]
+    facets = [f"facet normal 0 0 0\nouter loop\n{three}endloop\nendfacet\n" for three in corners]
+    text.write_text("".join(f"solid\n{''.join(part)}endsolid\n" for part in (facets[:4], facets[4:])))
+    points = np.random.default_rng(3).uniform(0.1, 0.3, (9, 3)) + [0.0, 0.0, 2.0]
+    gaps = [
+        obstacle({"shape": "surface", "file": str(file), "direction": [0, 0, -1]}).gap(points)
+        for file in (binary, text)
+        for file in (binary, text)
+    ]
+    np.testing.assert_allclose(gaps[0], gaps[1], atol=1e-6)
+    np.testing.assert_allclose(gaps[1], points.sum(axis=1) - 1.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -151,8 +151,8 @@ def test_an_own_energy_equal_to_the_built_in_one_gives_the_same(body: hvi.Body, 
 @pytest.mark.parametrize(
     ("form", "reason"),
     [
-        (lambda u, v: ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx, "the rotation costs energy"),
-        (lambda u, v: ufl.inner(u, v) * ufl.dx, "the translation along x costs energy"),
+        (lambda u, v: ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx, "a rigid motion costs energy"),
+        (lambda u, v: ufl.inner(u, v) * ufl.dx, "a rigid motion costs energy"),
         (lambda u, v: u[0].dx(0) * v[1].dx(0) * ufl.dx, "not symmetric"),
         (lambda u, v: u[0].dx(0) * v[0].dx(0) * ufl.dx, "a stretch along y costs no energy"),
         (lambda u, v: ufl.inner(u, v), "must return a bilinear UFL form"),
@@ -203,7 +203,7 @@ def test_what_is_wrong_with_a_mesh_or_its_tags_is_said() -> None:
         (lambda: hvi.Body(square, names={"wall": 1}), "'wall' is a side, but no tags of facets are given"),
         (lambda: hvi.Body(square, cells=tags, regions={"steel": 1}), "cells are tags of dimension 1"),
         (lambda: hvi.Body(square, np.array([1, 2])), "facets are of the kind ndarray; give dolfinx.mesh.MeshTags"),
-        (lambda: hvi.Body(square, tags, names=["wall"]), r'names are numbers of tags by name, .*"wall": 1'),  # type: ignore[arg-type]
+        (lambda: hvi.Body(square, tags, names=["wall"]), r"names: must be a table"),  # type: ignore[arg-type]
     ]
     for make, reason in wrong:
         with pytest.raises(hvi.InputError, match=reason):
@@ -246,7 +246,7 @@ def test_a_body_that_escapes_has_no_displacement_and_says_so(body: hvi.Body) -> 
     assert "no solution exists" in repr(gone)
     assert hvi.check(lifted).solvability.state == "escapes"
     for wanted in ("u", "stress", "energy", "contact"):
-        with pytest.raises(hvi.InputError, match=r"nothing was solved: .*translation along \+y"):
+        with pytest.raises(hvi.InputError, match=r"nothing was solved.*translation along \+y"):
             getattr(gone, wanted)
     assert gone.plot() is not None  # the escape
 

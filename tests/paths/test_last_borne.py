@@ -49,12 +49,28 @@ def test_its_state_is_certified_under_its_load_and_the_answer_stays_no(last: Mod
     assert last.last_borne is not None
     assert last.examination is not None
     assert last.examination.certificate.passed
-    assert np.allclose(last.resultant("pull"), [last.last_borne.factor * ABOVE, 0.0], rtol=1e-12, atol=1e-3)
-    assert np.allclose(last.resultant("floor"), -last.resultant("pull") - last.resultant("press"), atol=1e-3)
+    state = last.borne
+    assert state.converged
+    assert np.allclose(state.resultant("pull"), [last.last_borne.factor * ABOVE, 0.0], rtol=1e-12, atol=1e-3)
+    assert np.allclose(state.resultant("floor"), -state.resultant("pull") - state.resultant("press"), atol=1e-3)
     assert not last.converged
     assert last.exit_code == 4
     assert last.certificate is not None
     assert not last.certificate.passed
+
+
+FIELDS = ("u", "stress", "energy", "contact", "resultants")
+
+
+@pytest.mark.parametrize("pull", [ABOVE, 3.0 * ABOVE], ids=["metastable", "escapes"])
+def test_beyond_the_limit_no_field_is_that_of_another_load(pull: float) -> None:
+    """One answer of a loop over loads in every state; a smaller load has its fields."""
+    made = [hvi.solve(read_tables(block(CELLS, load, P, quadratic_linear(STRENGTH)))) for load in (0.5 * ABOVE, pull)]
+    assert [one.converged for one in made] == [True, False]
+    for name in FIELDS:
+        getattr(made[0], name)
+        with pytest.raises(hvi.InputError, match="nothing was solved"):
+            getattr(made[1], name)
 
 
 @pytest.mark.parametrize("method", ["auto", "branch"])
