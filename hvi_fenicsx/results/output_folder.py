@@ -128,8 +128,7 @@ class ResultFolder:
                 raise self._refused(text)
             return
         if found.kind != self.kind and not (self._force and MARKS[found.kind] == MARKS[self.kind]):
-            mend = "--force replaces all but a study, --out DIR writes beside"
-            raise self._refused(f"holds a {found.kind}, and this is a {self.kind}; {mend}")
+            raise self._refused(f"holds a {found.kind}, not a {self.kind}; --force replaces all but a study")
         if not (self._force or self._resume):
             finished = (self.target / MARKS[self.kind]).exists()
             raise self._refused(f"{'already holds a' if finished else 'holds an unfinished'} {self.kind}; {_WAYS}")
