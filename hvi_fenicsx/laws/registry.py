@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 from pydantic import ConfigDict, ValidationError, create_model
 
 from ..class_registry import hint
-from ..errors import InputError
+from ..errors import InputError, of_user
 from .base import Superpotential, registered
 
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
@@ -27,6 +27,7 @@ def available() -> tuple[str, ...]:
     return tuple(registered())
 
 
+@of_user("law")
 def create(name: str, parameters: Mapping[str, Any]) -> Superpotential:
     """The law `name` with the given parameters, checked as strictly as a scene file's.
 

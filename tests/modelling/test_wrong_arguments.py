@@ -255,6 +255,7 @@ WORDS = np.array(["left", "top"])
         (lambda: hvi.Model(hvi.Body.rectangle([1.0, 1.0], [2, 2]), [STEEL], WORDS), "title: must be a text"),  # type: ignore[arg-type]
         (lambda: hvi.Force("left", [10**400, 0.0]), "OverflowError"),
         (lambda: hvi.laws.Tresca(10**400), "finite number"),
+        (lambda: hvi.laws.create(WORDS, {}), "^law: TypeError"),  # type: ignore[arg-type]
     ],
 )
 def test_what_numpy_and_dolfinx_would_refuse_is_refused_in_words(made: Any, reason: str) -> None:
