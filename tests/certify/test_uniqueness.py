@@ -116,3 +116,20 @@ def test_the_steepest_fall_of_a_law_in_all_units(table: dict[str, Any], fall: fl
     assert law.is_convex == (fall == 0.0)
     for one, unit in ((law, 1.0), (law.scaled(1e-5, 1e6), 1e-11)):
         assert one.steepest_fall == pytest.approx(fall * unit, rel=1e-12)
+
+
+def test_tied_bodies_that_nothing_holds_may_move_as_a_whole() -> None:
+    sides = {
+        "lower": {"shape": "rectangle", "size": [1.0, 0.1], "cells": [10, 2]},
+        "upper": {"shape": "rectangle", "size": [1.0, 0.1], "cells": [10, 2], "origin": [0.0, 0.1]},
+    }
+    found = verdict(
+        {
+            "domain": sides,
+            "material": {**STEEL, "thermal_expansion": 1e-5},
+            "body": {"warm": {"region": "upper", "temperature": 100.0}},
+            "interface": {"seam": {"between": ["upper.bottom", "lower.top"], "tied": True}},
+        }
+    )
+    assert found.state == "lowest"
+    assert "rotation about" in found.why
