@@ -32,7 +32,6 @@ from ..errors import InputError
 from ..typing import Array
 from .base import ConvexPart, DerivedLaw, DifferentiablePart, Superpotential, quotient
 from .catalogue import QuadraticLinear
-from .polyline import PolylinePart
 from .registry import require_positive
 from .traction_graph import TractionGraph
 
@@ -337,7 +336,7 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
     """j ≈ -S(x, ε) for the quadratic-linear law, even, ε in N/m.
 
     -S'' = s (1 - p'(d)) - d'² p''(d) with s = γ1/δ. The second term is zero but for two bands of slips, |d| < ε/2, and
-    there at most `steepest_fall`, which is the slope of G' in them; H = G - S has the kink.
+    there is G''; H = G - S has the kink.
     """
 
     name = "paper_smoothing"
@@ -358,25 +357,33 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
 
     @cached_property
     @override
-    def concave(self) -> PolylinePart:
+    def concave(self) -> _PaperConcave:
+        return _PaperConcave(self)
+
+    @cached_property
+    def bands(self) -> tuple[Array, Array]:
+        """The slips y ≥ 0 where -S'' has its second term: the beginnings of two bands, and their widths."""
         middle, width = 0.5 * self.law.delta, self.epsilon_absolute / self.slope
         inner = min(width / (middle + math.sqrt(max(middle * middle - width, 0.0))), middle)
         outer = width / (middle + math.sqrt(middle * middle + width))
-        fall = self.steepest_fall
-        points = [(0.0, 0.0), (inner, fall * inner), (self.law.delta - inner, fall * inner)]
-        points.append((self.law.delta + outer, fall * (2.0 * inner + outer)))
-        return PolylinePart(TractionGraph.from_points(list(dict.fromkeys(points))))
+        return np.array([0.0, self.law.delta - inner]), np.array([inner, inner + outer])
 
     @property
     @override
     def steepest_fall(self) -> float:
         """At the outer end of the band around δ."""
-        return self.slope * (self.slope / self.epsilon_absolute * (0.5 * self.law.delta) ** 2 + 1.0)
+        return self.curvature * (0.5 * self.law.delta) ** 2 + self.slope
+
+    @property
+    def curvature(self) -> float:
+        """d'² p''(d) over (y - δ/2)², N/m⁵."""
+        return self.slope * (self.slope / self.epsilon_absolute)
 
     @property
     @override
     def breaks(self) -> Array:
-        return self.concave.graph.breaks
+        ends = np.add(*self.bands)
+        return np.unique([*-ends, *-self.bands[0], *self.bands[0], *ends])
 
     @property
     def slope(self) -> float:
@@ -388,7 +395,7 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
         with np.errstate(over="ignore"):
             return 0.5 * self.slope * y * (y - self.law.delta)
 
-    def _share(self, y: Array) -> Array:
+    def share(self, y: Array) -> Array:
         """p'(d) at slips y ≥ 0: how far the law has passed to its second piece, from 0 to 1."""
         return QUADRATIC.derivative(self._gap(y), self.epsilon_absolute)
 
@@ -400,17 +407,14 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
     def right(self, x: Array) -> Array:
         """γ2/2 at 0."""
         y = np.abs(x)
-        share = self._share(y)
+        share = self.share(y)
         with np.errstate(over="ignore"):
             rising = np.where(share < 1.0, (1.0 - share) * self.slope * y, 0.0)
         return np.where(x >= 0.0, 1.0, -1.0) * (rising + share * self.law.gamma2)
 
     @override
     def derivatives(self, x: Array) -> tuple[Array, Array]:
-        y = np.abs(x)
-        inside = np.abs(self._gap(y)) < 0.5 * self.epsilon_absolute
-        rate = np.where(inside, self.slope * y - self.law.gamma2, 0.0)
-        return self.right(x), self.slope * (1.0 - self._share(y)) - rate * (rate / self.epsilon_absolute)
+        return self.right(x), self.convex.second(x) - self.concave.second(x)
 
     @override
     def scaled(self, length: float, traction: float) -> Superpotential:
@@ -443,4 +447,33 @@ class _PaperConvex(ConvexPart):
 
     @override
     def second(self, x: Array) -> Array:
-        return np.maximum(self.law.derivatives(x)[1] + self.law.concave.second(x), 0.0)
+        return self.law.slope * (1.0 - self.law.share(np.abs(x)))
+
+
+@dataclass(frozen=True, eq=False)
+class _PaperConcave(DifferentiablePart):
+    """G: even, with the second derivative d'² p''(d), which is that of a polynomial in each band."""
+
+    law: PaperSmoothedLaw
+
+    def _within(self, x: Array) -> tuple[Array, Array, Array]:
+        """How far slips are beyond the beginning of each band, and within it, (m, 2); how far δ/2 is from it, (2,)."""
+        begins, widths = self.law.bands
+        beyond = np.abs(x)[:, None] - begins
+        return beyond, np.clip(beyond, 0.0, widths), begins - 0.5 * self.law.law.delta
+
+    @override
+    def value(self, x: Array) -> Array:
+        beyond, c, a = self._within(x)
+        grown = c * c * (a * a / 2.0 + a * c / 3.0 + c * c / 12.0) + (beyond - c) * c * (a * a + a * c + c * c / 3.0)
+        return self.law.curvature * grown.sum(axis=1)
+
+    @override
+    def right(self, x: Array) -> Array:
+        _, c, a = self._within(x)
+        return np.sign(x) * self.law.curvature * (c * (a * a + a * c + c * c / 3.0)).sum(axis=1)
+
+    @override
+    def second(self, x: Array) -> Array:
+        beyond, c, a = self._within(x)
+        return self.law.curvature * np.where(beyond == c, (a + c) ** 2, 0.0).sum(axis=1)

@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from ..formula import SpatialValue
 from ..mesh import nodes
 from ..mesh.boundary_part import BoundaryPart
-from ..mesh.domain import Domain
+from ..mesh.domain import Domain, SharedObjects
 from ..rigid import JoinedBodies
 from ..runtime import forms
 from ..typing import Array, Entities, Integers
@@ -217,16 +217,19 @@ class Problem:
         return self.once("bodies", None, lambda: bodies.find(self.domain, self.space, self.points, meetings))
 
     def once(self, name: str, origin: Any, make: Callable[[], T]) -> T:
-        """What problems of a degree without interfaces share on one mesh, as :meth:`.Domain.once` says. Collective.
+        """What is made once; problems of a degree without interfaces share it on meshes for many. Collective.
 
         Args:
             name: what it is.
             origin: what it is made from besides the mesh and the degree, comparable.
             make: makes it; nobody may change it afterwards. Collective.
         """
-        if self.interfaces:
-            return make()
-        return self.domain.once(f"{name} of degree {nodes.degree(self.space)}", origin, make)
+        shared = self._own if self.interfaces else self.domain.shared or self._own
+        return shared.get(self.comm, f"{name} of degree {nodes.degree(self.space)}", origin, make)
+
+    @functools.cached_property
+    def _own(self) -> SharedObjects:
+        return SharedObjects()
 
     @functools.cached_property
     def coupling(self) -> Coupling | None:

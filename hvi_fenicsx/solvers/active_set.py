@@ -180,14 +180,13 @@ class ActiveSetSolver:
             most: Newton steps at most.
         """
         with self.timer("solve"):
-            self.system.evaluate_by_cells(x)
-            run = _ProjectedRun if attempt.exact else _SnesRun
-            found, left = run(self, attempt, tolerance, bounds).into(x, most), np.inf
-            while not found.interrupted and found.measure <= self.system.thresholds.coarse_tolerance:
+            run, coarse = _ProjectedRun if attempt.exact else _SnesRun, self.system.thresholds.coarse_tolerance
+            found, left = run(self, attempt, tolerance, bounds, x).into(x, most), np.inf
+            while tolerance < coarse and not found.interrupted and found.measure <= coarse:
                 found, sizes = self._measured(found, x, attempt.models, tolerance, bounds)
                 if found.converged or found.measure > 0.5 * left:
                     return self.convergence.accept_rounding(found, sizes, x, tolerance)
-                left, again = found.measure, run(self, attempt, tolerance, bounds).into(x, most)
+                left, again = found.measure, run(self, attempt, tolerance, bounds, x).into(x, most)
                 found = replace(again, newton=found.newton + again.newton, linear=found.linear + again.linear)
             return found
 
@@ -222,8 +221,11 @@ class _Run(ABC):
     _stood = _stopped = _far = False
     _useless, _reason = 0, ""
 
-    def __init__(self, owner: ActiveSetSolver, attempt: Attempt, tolerance: float, bounds: Bounds) -> None:
+    def __init__(
+        self, owner: ActiveSetSolver, attempt: Attempt, tolerance: float, bounds: Bounds, x: PETSc.Vec
+    ) -> None:
         self._owner, self._attempt, self._tolerance, self._bounds = owner, attempt, tolerance, bounds
+        self._start = x.copy()
         self._system, self._thresholds = owner.system, owner.system.thresholds
 
     @abstractmethod
@@ -243,7 +245,7 @@ class _Run(ABC):
         before, self._last = self._last, owner.convergence.sizes(x, residual, *self._bounds).worst
         if owner.progress:
             owner.progress(iteration, self._last, owner.convergence.in_contact(x))
-        self._far = self._system.equations.from_base(x).norm(PETSc.NormType.INFINITY) > self._thresholds.runaway
+        self._far = (x - self._start).norm(PETSc.NormType.INFINITY) > self._thresholds.runaway
         if self._last <= self._tolerance and not self._far:
             return reasons.CONVERGED_FNORM_RELATIVE
         self._stopped = owner.interrupted()
@@ -333,7 +335,7 @@ class _SnesRun(_Run):
         """Solve J x = load on the inactive dofs: as exactly as the tolerance needs, or to tell an active set."""
         inactive, limits = self._snes.getVIInactiveSet(), self._thresholds
         least = 0.0 if self._attempt.steady else limits.coarse_tolerance
-        goal = limits.margin**2 * self._tolerance / self._last
+        goal = limits.margin**3 * self._tolerance / self._last
         moved = self._prepare(inactive)
         rtol = max(goal, limits.loose if moved else least)
         iterations, reason = self._owner.held.solve_reduced(inactive, load, x, rtol)
