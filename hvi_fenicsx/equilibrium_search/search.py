@@ -160,7 +160,7 @@ def find(task: Task) -> Found:
         InputError: an earlier search was for something else.
     """
     if not task.problem.size:
-        reason = "the only equilibrium: there is no contact and no law"
+        reason = "the only equilibrium, but for rigid motions that the supports leave: there is no contact and no law"
         return Found.only(np.empty(0), task.problem.constant, reason)
     if task.saved is not None and bool(task.saved["lowest"]) != task.lowest:
         raise InputError(OTHER)
