@@ -90,9 +90,5 @@ class Interrupted(HviError):
 
     exit_code = ExitCode.INTERRUPTED
 
-    def __init__(self) -> None:
-        super().__init__("interrupted; nothing was written")
-
-    def __reduce__(self) -> tuple[type[Interrupted], tuple[()]]:
-        """What other ranks make it of."""
-        return type(self), ()
+    def __init__(self, words: str = "interrupted; nothing was written") -> None:
+        super().__init__(words)

@@ -48,11 +48,10 @@ class BodyMesh:
     @cached_property
     def volumes(self) -> Array:
         """Area (m²) or volume (m³) of each cell, (c,)."""
-        first, *others = self.cells.T
-        sides = np.stack([self.points[other] - self.points[first] for other in others], axis=1)
         if self.dimension == 2:
-            return np.abs(np.cross(sides[:, 0], sides[:, 1])[:, 2]) / 2
-        return np.abs(np.linalg.det(sides)) / 6
+            return self.sizes(self.cells)
+        first, *others = (self.points[corner] for corner in self.cells.T)
+        return np.abs(np.linalg.det(np.stack([other - first for other in others], axis=1))) / 6
 
     @property
     def boundary(self) -> Integers:

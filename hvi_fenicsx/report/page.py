@@ -283,7 +283,7 @@ class PictureProcess:
 
     def begin(self) -> None:
         """Let it draw: the folder has all that pictures are drawn from."""
-        if isinstance(self.child, subprocess.Popen) and self.child.stdin and self.child.poll() is None:
+        if isinstance(self.child, subprocess.Popen) and self.child.stdin:
             with contextlib.suppress(OSError):  # it has failed already: then `finish` tells
                 self.child.stdin.write("draw\n")
                 self.child.stdin.flush()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -114,16 +114,18 @@ class Result(Finished):
 
     def roles(self, part: str) -> list[Mapping[str, Any]]:
         """What the effects on a part do (:data:`hvi_fenicsx.problem.effect_summary.Role`)."""
-        return [role for where, role in self._roles("boundary") if where == part]
+        return [role for where, _, role in self._effects("boundary") if where == part]
 
-    def _roles(self, place: str) -> list[tuple[str | None, Mapping[str, Any]]]:
-        found = [(entry["where"], entry.get("role") or {}) for entry in self.summary.get("effects") or []]
-        return [(where, role) for where, role in found if role.get("place") == place]
+    def _effects(self, place: str) -> Iterator[tuple[Any, str, Mapping[str, Any]]]:
+        """Where each effect acts, its key and its role."""
+        for entry in self.summary.get("effects") or []:
+            if (role := entry.get("role") or {}).get("place") == place:
+                yield entry["where"], entry["effect"], role
 
     @property
     def within(self) -> list[str]:
         """What acts inside of the body, in words; loads first."""
-        roles = sorted((role for _, role in self._roles("body")), key=lambda role: role["drive"] != "load")
+        roles = sorted((role for *_, role in self._effects("body")), key=lambda role: role["drive"] != "load")
         return list(dict.fromkeys(role["label"] for role in roles))
 
     @property
@@ -133,14 +135,11 @@ class Result(Finished):
         These are total loads, and displacements that are not all zero or free.
         """
         found = []
-        for entry in self.summary.get("effects") or []:
-            role, part, key = entry.get("role") or {}, entry["where"], entry["effect"]
+        for part, key, role in self._effects("boundary"):
             value = self.scene.get("boundary", {}).get(part, {}).get(key)
-            if role.get("place") != "boundary" or value is None:
-                continue
             total = role["drive"] == "load" and not role["traction"] and role["pressure"] is None
             moved = role["prescribed"] and isinstance(value, list) and any(v not in (0, "free") for v in value)
-            if total or moved:
+            if value is not None and (total or moved):
                 found.append((part, key, value))
         return found
 
@@ -169,12 +168,7 @@ class Result(Finished):
             part: the part's name.
             *directions: any of "slip", "opening", "penetration", or "separation" for opening and slip together.
         """
-        return any(self._laws(part, direction) for direction in directions)
-
-    def _laws(self, part: str, direction: str) -> list[Mapping[str, Any]]:
-        """The laws that act on a displacement of a part, as a scene writes them."""
-        laws = [law for role in self.roles(part) for law in role["laws"]]
-        return [law["law"] for law in laws if law["direction"] == direction]
+        return any(law["direction"] in directions for role in self.roles(part) for law in role["laws"])
 
     def _without_noise(self, part: ContactPart) -> ContactPart:
         """A part whose columns are zero where they are rounding beside others, or beside the body's field."""

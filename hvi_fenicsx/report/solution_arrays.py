@@ -93,7 +93,7 @@ class ContactPart:
     @property
     def points(self) -> Array:
         """The vertices in space, m, (m, 3)."""
-        return np.nan_to_num(np.column_stack([self["x"], self["y"], self["z"]]))
+        return geometry.in_space(self.x)
 
     @property
     def s(self) -> Array | None:

@@ -20,6 +20,8 @@ from ..reader import Result
 from .shape import ARROW, DeformedBody, HeldSide, LoadedSide, Side, sparse
 from .style import BLUE, INK, VERMILION, WIDTH, figure, heading, resize
 
+SHEAR = 0.2
+"""A load is along its side, and arrows to it would lie on it, where the part across is at most this part of it."""
 LETTERS = 12
 """Points: the size of a label's letters."""
 CONTACT, SUPPORT, LOADED = ("#eea06d", "contact, friction or adhesion"), ("#9fb7c9", "support"), ("#f3cf7a", "loaded")
@@ -188,9 +190,10 @@ class Canvas:
             there = np.flatnonzero(np.linalg.norm(load.traction, axis=1) > load.largest / 8)
             chosen = there[sparse(shape.points[load.side.vertices[there]], 1.4 * long)]
             feet, normals = shape.points[load.side.vertices[chosen]], load.side.normals[chosen]
-            ways, beside = load.traction[chosen] * (long / load.largest), load.sheared[chosen, None]
-            pushed = np.einsum("ki,ki->k", ways, normals)[:, None] < 0.0
-            tails = feet + np.where(beside, long / 4 * normals - ways / 2, np.where(pushed, -ways, 0.0))
+            ways = load.traction[chosen] * (long / load.largest)
+            outward = np.sum(ways * normals, axis=1, keepdims=True)
+            beside = np.abs(outward) <= SHEAR * np.linalg.norm(ways, axis=1, keepdims=True)
+            tails = feet + np.where(beside, long / 4 * normals - ways / 2, np.where(outward < 0.0, -ways, 0.0))
             self.arrows(tails, ways)
             ends, way = self.project(np.concatenate([tails, tails + ways])), self.project(load.side.normal[None])[0]
             self.reached.append(ends)

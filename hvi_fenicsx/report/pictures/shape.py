@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry import chains
-from ...typing import Array, Integers, Mask
+from ...typing import Array, Integers
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..solution_arrays import ContactPart, LoadArrays
@@ -23,8 +23,6 @@ VISIBLE = 0.1
 """The largest displacement is drawn up to this part of the body's size, and the way of an escape three times as far."""
 ARROW = 0.14
 """Part of the body's size: the longest arrow of a load, and the highest pressure."""
-SHEAR = 0.2
-"""A load is along its side where the part across it is smaller than this part of it."""
 TINTS = ("#eef2f5", "#dbe3d3", "#e6dccb", "#d9d5e3", "#d3dfe6", "#e8d9d6")
 """The colours of regions: pale, since marks and names stand on them; with more regions they come again."""
 
@@ -147,14 +145,12 @@ def escaping(body: BodyMesh) -> tuple[Array, Array]:
     """Where the escape mode brings the vertices, drawn large, (n, 3).
 
     Returns:
-        These, and the ways there of vertices that move, one far out in each diagonal direction, (j, 2, 3).
+        These, and the ways there of a few vertices far out that move, (j, 2, 3).
     """
     mode = body.escape_mode
     assert mode is not None
     moved = body.points + 3 * VISIBLE * body.size / (float(np.linalg.norm(mode, axis=1).max()) or 1.0) * mode
-    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * body.dimension)).reshape(body.dimension, -1).T
-    outer = body.points[body.outermost, : body.dimension]
-    far = body.outermost[np.unique(np.argmax((outer - outer.mean(axis=0)) @ signs.T, axis=0))]
+    far = body.outermost[sparse(body.points[body.outermost], body.size)]
     ways = np.stack([body.points[far], moved[far]], axis=1)
     lengths = np.linalg.norm(mode[far], axis=1)  # not the one that the body turns about
     return moved, ways[lengths > VISIBLE * lengths.max()]
@@ -246,12 +242,6 @@ class LoadedSide:
         if self.total is None:
             return quantity(self.largest, "Pa")
         return quantity(self.total, "N/m" if self.side.facets.shape[1] == 2 else "N")
-
-    @property
-    def sheared(self) -> Mask:
-        """Where the load is along the side, so that an arrow to it would lie on it, (m,)."""
-        across = np.abs(np.einsum("ki,ki->k", self.traction, self.side.normals))
-        return across <= SHEAR * np.linalg.norm(self.traction, axis=1)
 
 
 @dataclass(frozen=True)
