@@ -20,7 +20,7 @@ from __future__ import annotations
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -160,11 +160,6 @@ class ContactPart:
     def largest_gap(self) -> float:
         """The largest distance of a lifted vertex from the obstacle, m; 0 where none is lifted."""
         return float(np.nanmax(self.gap[self.lifted], initial=0.0))
-
-    def at(self, rows: Mask) -> ContactPart:
-        """Some of its vertices, with all facets."""
-        own = {name: getattr(self, name)[rows] for name in ("vertices", "weight", "normal", "drops")}
-        return replace(self, columns={name: values[rows] for name, values in self.columns.items()}, **own)
 
     def size(self, quantity: str) -> Array:
         """The signed value of a tangential quantity in the plane, its length in space, (m,).

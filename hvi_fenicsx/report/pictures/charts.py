@@ -14,12 +14,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.markers import CARETDOWN
-from matplotlib.ticker import FixedLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from ...typing import Array, Mask, magnitude
 from ..reader import EquilibriaResult, PathResult, Row
 from ..units import Unit, number, unit_for
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, VERMILION, figure, titled
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, VERMILION, few_ticks, figure, titled
 
 PATH_CAPTION = (
     "The load path: force (under a moment the load factor) over mean displacement of the driven part. Solid: stable; "
@@ -148,7 +148,7 @@ def _energies(axes: Axes, result: EquilibriaResult, rows: Sequence[Row]) -> None
     spread = float(values[-1]) or 1.0
     axes.set(xlim=(-0.06 * spread, 1.06 * spread), ylim=(len(rows) - 0.5, -0.5))
     axes.set_yticks(range(len(rows)), [row["index"] for row in rows])
-    axes.xaxis.set_major_locator(MaxNLocator(2) if spread != 1.0 or values[-1] else FixedLocator([0.0]))
+    few_ticks(axes, "x", 2)
     axes.tick_params(axis="y", length=0)
     axes.set_xlabel(f"{unit.name} above the lowest found,\n{number(result.energies[0])} {result.unit}")
 

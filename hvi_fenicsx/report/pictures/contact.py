@@ -92,7 +92,7 @@ def _curves(result: Result, whole: ContactPart) -> Figure:
     signs = _signs(whole)
     own = {name: signs * whole[name] for name in ("u_t1", "friction_t1")}
     part = replace(whole, columns={**whole.columns, **own}, drops=signs[:, None] * whole.drops)
-    part, along = _worth_seeing(part), " along s" if np.any(signs != signs[0]) else ""
+    along = " along s" if np.any(signs != signs[0]) else ""
     fields, length = list(_fields(result, part)), unit_for(float(np.max(part["s"])), "m")
     fig = figure(2.4 * len(fields) + 0.4)
     heading(fig, result, f"on “{part.name}”")
@@ -102,6 +102,7 @@ def _curves(result: Result, whole: ContactPart) -> Figure:
         words = f"{field.words}{along if field.kind in ('slip', 'friction') else ''} in {field.unit.name}"
         axes.set_title(words, loc="left", size=14, parse_math=True)
     panels[-1].set_xlabel(f"s along “{part.name}” in {length.name}")
+    panels[-1].set_xlim(*_worth_seeing(part) / length.size)
     if part.lifted.any():
         key = Patch(fc=ORANGE, alpha=0.3, label=f"lifted, up to {quantity(whole.largest_gap, 'm')}")
         fig.legend(handles=[key], loc="outside lower right")
@@ -114,12 +115,11 @@ def _signs(part: ContactPart) -> Array:
     return np.where(np.sum(part.tangents[:, 0] * along, axis=1) < 0.0, -1.0, 1.0)
 
 
-def _worth_seeing(part: ContactPart) -> ContactPart:
-    """The part; if it is closed on a fifth of it only, that stretch and its neighbourhood."""
-    s, closed = part["s"], part["s"][part["contact"] == 1.0]
-    if len(closed) < 2 or 5 * np.ptp(closed) > np.ptp(s):
-        return part
-    return part.at((s >= closed.min() - np.ptp(closed)) & (s <= closed.max() + np.ptp(closed)))
+def _worth_seeing(part: ContactPart) -> Array:
+    """From where to where: if it is closed on a fifth of it only, that stretch and its neighbourhood."""
+    s, closed = part["s"], part["s"][part.active]
+    room = np.ptp(closed) if len(closed) > 1 else np.inf
+    return s[[0, -1]] if 5 * room > np.ptp(s) else np.clip(closed[[0, -1]] + [-room, room], s[0], s[-1])
 
 
 def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:

@@ -124,8 +124,7 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
         colour: of these words.
     """
     tall = fig.get_figheight()
-    title = textwrap.shorten(title, 2 * _LINE, placeholder=" …")
-    lines = textwrap.wrap(title, _LINE) if len(title) > _LINE else [title]
+    lines = textwrap.wrap(textwrap.shorten(title, 2 * _LINE, placeholder=" …"), _LINE)
     size, top, second = (17, 0.19, 0.76) if len(lines) == 1 else (13.5, 0.12, 0.85)
     left, right, at = 0.3 / WIDTH, 1 - 0.3 / WIDTH, 1 - second / tall
     fig.text(left, 1 - top / tall, "\n".join(lines), size=size, weight="bold", va="top", linespacing=1.1)
