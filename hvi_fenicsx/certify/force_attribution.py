@@ -46,10 +46,8 @@ def attribute(problem: Problem, u: Array, residual: Array, near: Array) -> Force
         near: distance (of u0) from a kink or a bound that counts as being on it, at the owned blocks, (blocks,).
     """
     local = local_frames.frames_of(problem)
-    terms, bounds = problem.terms, problem.bounds
-    if local is not None:
-        u, residual = local.local_components(u), local.local_components(residual)
-        terms, bounds = tuple(map(local.term, terms)), tuple(map(local.bounds, bounds))
+    u, residual = local.local_components(u), local.local_components(residual)
+    terms, bounds = tuple(map(local.term, problem.terms)), tuple(map(local.bounds, problem.bounds))
     laws, pressed = np.zeros(residual.size, np.int64), np.zeros(residual.size, np.int64)
     for dofs, _ in (pair for term in terms for pair in components(term)):
         np.add.at(laws, dofs, 1)
@@ -104,7 +102,7 @@ class _Vertices:
         alone = self.free & (self.laws == 0) & (self.pressed < 2)
         carried = np.where(alone, -self.needed, 0.0).ravel()[dofs] * sign / weights
         carried[own] = -np.sum(forces * bounds.surface.normals[own], axis=1) / weights[own]
-        return np.asarray(carried)
+        return carried
 
 
 def _reached(bounds: Bounds, u: Array, near: Array) -> tuple[Mask, Mask]:

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 
 from ..laws import Length
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..problem.references import References
 from ..runtime.cost import Timer
+from ..runtime.mpi import agree
 from ..system import local_frames
 from ..system.equations import Cells, VertexModel
 from ..system.factorisation import Factorisation, form_of
@@ -48,9 +48,9 @@ def status(references: References, u: fem.Function, forces: Array, tolerance: fl
     problem = references.problem
     comm = problem.comm
     found = growth(references, problem.relative(u.x.array), forces, tolerance)
-    if comm.allreduce(bool(np.any(found.falls)), op=MPI.LOR):
+    if any(agree(comm, found.falls.any())):
         return NO_MINIMISER
-    if not comm.allreduce(bool(np.any(found.softens)), op=MPI.LOR):
+    if not any(agree(comm, found.softens.any())):
         return LOCAL_MINIMISER
     return _by_inertia(problem, u, found) if inertia else UNDECIDED
 
@@ -149,14 +149,10 @@ def growth(references: References, u: Array, forces: Array, tolerance: float) ->
     """
     problem = references.problem
     local = local_frames.frames_of(problem)
-    terms, bounds = problem.terms, problem.bounds
-    if local is not None:
-        u, forces = local.local_components(u), local.local_components(forces)
-        terms, bounds = tuple(local.term(t) for t in terms), tuple(local.bounds(b) for b in bounds)
-    found = _Collector(references, u, forces, tolerance)
-    for term in terms:
+    found = _Collector(references, local.local_components(u), local.local_components(forces), tolerance)
+    for term in map(local.term, problem.terms):
         (found.enter_vector_law if term.radial else found.enter_law)(term)
-    for one in bounds:
+    for one in map(local.bounds, problem.bounds):
         found.enter_bounds(one)
     found.enter_supports(problem.fixed_here)
     return found.growth()

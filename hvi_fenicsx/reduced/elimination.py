@@ -148,9 +148,9 @@ def balanced(
 
 def _fields(system: System) -> Array:
     """The motions at this rank's unknowns, (local unknowns, j)."""
-    problem, frames = system.problem, system.frames
+    problem = system.problem
     if problem.bulk.foundation is not None or system.comm.allreduce(len(system.pins)):
         return np.zeros((system.load.local_size, 0))
     fields = [field for body in problem.bodies for field in Motions.of(problem, body).fields]
-    local = fields if frames is None else [frames.local_components(field) for field in fields]
+    local = [system.frames.local_components(field) for field in fields]
     return np.array(local).reshape(len(fields), system.load.local_size).T

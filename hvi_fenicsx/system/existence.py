@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import rigid
@@ -32,6 +32,8 @@ from ..rigid import (
 from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers, Mask
 
+_T = TypeVar("_T", Solvability, LoadFactors)
+
 
 def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvability:
     """Whether a solution exists. Collective.
@@ -43,7 +45,7 @@ def solvability(problem: Problem, forces: Mapping[str, PETSc.Vec]) -> Solvabilit
     comm = problem.comm
     found = combine([analyse(comm, body) for body in rigid_problems(problem, forces)])
     if (obstacles := _with_obstacles(problem, forces)) is not None:
-        known = [_of_body(body, analyse(comm, body)) for body in obstacles]
+        known = [_of_body(body, analyse(comm, body), "direction", "critical") for body in obstacles]
         found = replace(combine(known), kernel=found.kernel, loose=found.loose, free=found.free, paper=found.paper)
     return replace(found, direction=named(problem, found.direction))
 
@@ -62,7 +64,8 @@ def load_factors(problem: Problem, forces: Mapping[str, PETSc.Vec], *loads: str)
     comm, bodies = problem.comm, _with_obstacles(problem, forces) or rigid_problems(problem, forces)
     known = list(dict.fromkeys(n for body in bodies for n in body.loads))
     names = [load_name(known, load) for load in loads]
-    found = rigid.combine_factors([_limits(body, rigid.load_factors(comm, body, *names)) for body in bodies])
+    each = [_of_body(body, rigid.load_factors(comm, body, *names), "mode", "peak_mode") for body in bodies]
+    found = rigid.combine_factors(each)
     mode, peak = (named(problem, limiting) for limiting in (found.mode, found.peak_mode))
     return replace(found, mode=mode, peak_mode=peak)
 
@@ -126,16 +129,10 @@ def _ways(problem: Problem, body: JoinedBodies, names: Sequence[str]) -> list[Ar
     return found
 
 
-def _of_body(problem: RigidProblem, found: Solvability) -> Solvability:
-    """A verdict whose motions are those of the body."""
-    direction, critical = (rigid.without_obstacles(problem, mode) for mode in (found.direction, found.critical))
-    return replace(found, direction=direction, critical=critical)
-
-
-def _limits(problem: RigidProblem, found: LoadFactors) -> LoadFactors:
-    """Load factors whose motions are those of the body."""
-    mode, peak = (rigid.without_obstacles(problem, limiting) for limiting in (found.mode, found.peak_mode))
-    return replace(found, mode=mode, peak_mode=peak)
+def _of_body(problem: RigidProblem, found: _T, *motions: str) -> _T:
+    """A verdict, or load factors, whose motions (by these names) are those of the body."""
+    own: dict[str, Any] = {name: rigid.without_obstacles(problem, getattr(found, name)) for name in motions}
+    return replace(found, **own)
 
 
 def motions(problem: Problem, *, contact_closed: bool, without: Sequence[Mode] = ()) -> list[Mode]:
@@ -201,7 +198,7 @@ def inside(problem: Problem, body: JoinedBodies, blocks: Entities) -> Mask:
         body: the body.
         blocks: local vertices, (n,).
     """
-    return np.asarray(problem.bodies.labels[blocks] == body.index)
+    return problem.bodies.labels[blocks] == body.index
 
 
 def normals(problem: Problem, body: JoinedBodies, surface: Surface, closed: Mask | None = None) -> Array:
@@ -232,12 +229,11 @@ def prescribed(problem: Problem, body: JoinedBodies) -> Array:
 def _works(problem: Problem, forces: Mapping[str, PETSc.Vec], body: JoinedBodies) -> tuple[dict[str, Array], float]:
     """<g, y> of each load on the rigid basis, and the sum of the absolute nodal forces. Collective."""
     comm, d = problem.comm, problem.dimension
-    points = problem.points
     found, size = {}, 0.0
     for name, force in forces.items():
         nodal = force.array_r.reshape(-1, d)
         loaded = np.flatnonzero(nodal.any(axis=1) & (problem.bodies.labels[: len(nodal)] == body.index))
-        fields = problem.bodies.fields(np.asarray(points[loaded] / problem.scales.length), loaded, body)
+        fields = problem.bodies.fields(problem.points[loaded] / problem.scales.length, loaded, body)
         found[name] = comm.allreduce(np.einsum("vd,vnd->n", nodal[loaded], fields))
         size += comm.allreduce(float(np.abs(nodal[loaded]).sum()))
     return found, size
@@ -251,8 +247,7 @@ def acts_on(problem: Problem, body: JoinedBodies, surface: Surface) -> bool:
         body: the body.
         surface: the part.
     """
-    mine = bool(inside(problem, body, surface.blocks).any())
-    return bool(problem.comm.allreduce(mine, op=MPI.LOR))
+    return any(agree(problem.comm, inside(problem, body, surface.blocks).any()))
 
 
 def _resistance(problem: Problem, body: JoinedBodies, term: LawTerm) -> Resistance:
@@ -284,7 +279,7 @@ def named(problem: Problem, mode: Mode | None) -> Mode | None:
     if mode is None:
         return None
     names, left = [body.name for body in problem.bodies.single()], dict[str, list[str]]()
-    moved = np.linalg.norm(problem.bodies.motion(np.asarray(problem.points / problem.scales.length), mode), axis=1)
+    moved = np.linalg.norm(problem.bodies.motion(problem.points / problem.scales.length, mode), axis=1)
     numbers = problem.bodies.number_at(np.arange(len(moved)))
     speeds = [_most(problem, moved[numbers == number]) for number in range(len(names))]
     still = STILL * max(speeds)
@@ -302,7 +297,7 @@ def _way(problem: Problem, interface: Interface, mode: Mode, still: float) -> st
     """How the first side moves relative to the second; None where it does not. Collective."""
     blocks = interface.surface.blocks
     fields = problem.motions_at(blocks, problem.bodies.bodies[mode.body])
-    relative = np.einsum("n,mnd->md", np.asarray(mode.coefficients), fields)
+    relative = np.einsum("n,mnd->md", mode.coefficients, fields)
     opening = -np.sum(relative * interface.surface.normals, axis=1)
     if _most(problem, np.linalg.norm(relative, axis=1)) <= still:
         return None

@@ -333,21 +333,12 @@ class Direct:
         self._factorisation = Factorisation(form, matrix, options)
         self._factorisation.allow_negative()
         self.matrix = form.system.jacobian.matrix if form.has_pressures else matrix
-        self.pc = applied_by(self, self.matrix) if form.has_pressures else self._factorisation.pc
+        self.pc = applied_by(self._factorisation, self.matrix) if form.has_pressures else self._factorisation.pc
 
     def prepare(self, held: Entities) -> None:
         """Take over the system's present matrix, hold these unknowns (local, owned, sorted), factorise. Collective."""
         self._factorisation.refresh()
         self._factorisation.factorise(np.union1d(held, self._system.pins))
-
-    def apply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve for y of the load x. Collective.
-
-        Args:
-            x: the load.
-            y: where the displacement is written.
-        """
-        self._factorisation.apply(x, y)
 
     def free(self) -> None:
         """Free the PETSc objects."""

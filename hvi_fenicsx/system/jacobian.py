@@ -11,14 +11,25 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
+from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from .thresholds import DEFAULT
+
+
+def rows_of(matrix: PETSc.Mat, dofs: npt.NDArray[np.integer]) -> PETSc.Mat:
+    """Some rows of a matrix. Collective.
+
+    Args:
+        matrix: the matrix.
+        dofs: local numbers of rows that this rank owns.
+    """
+    rows = (dofs + matrix.getOwnershipRange()[0]).astype(PETSc.IntType)
+    return matrix.createSubMatrix(PETSc.IS().createGeneral(rows, comm=matrix.comm), None)
 
 
 class ContactRows:
@@ -40,11 +51,9 @@ class ContactRows:
         blocks = np.concatenate([np.empty(0, np.int64), *(s.blocks for s in surfaces)])
         self.vertices: Integers = np.unique(blocks).astype(np.int64)
         self.dofs: Integers = (self.vertices[:, None] * d + np.arange(d)).ravel()
-        start = matrix.getOwnershipRange()[0]
-        rows = PETSc.IS().createGeneral((self.dofs + start).astype(PETSc.IntType), comm=matrix.comm)
-        self.bulk = matrix.createSubMatrix(rows, None)
+        self.bulk = rows_of(matrix, self.dofs)
         self._product = self.bulk.createVecLeft()
-        self._blocks = (self.vertices + start // d).astype(PETSc.IntType)[:, None]
+        self._blocks = (self.vertices + matrix.getOwnershipRange()[0] // d).astype(PETSc.IntType)[:, None]
         each = self._blocks * d + np.arange(d, dtype=PETSc.IntType)
         self._elastic = np.array([matrix.getValues(i, i) for i in each], dtype=np.float64).reshape(-1, d, d)
         self.tangent = np.zeros_like(self._elastic)
@@ -98,10 +107,8 @@ class HoldingForces:
     """
 
     def __init__(self, problem: Problem, stiffness: PETSc.Mat) -> None:
-        start = stiffness.getOwnershipRange()[0]
         self._fixed = problem.fixed_here
-        rows = PETSc.IS().createGeneral((self._fixed + start).astype(PETSc.IntType), comm=stiffness.comm)
-        self._rows = stiffness.createSubMatrix(rows, None)
+        self._rows = rows_of(stiffness, self._fixed)
         self._product = self._rows.createVecLeft()
 
     def at(self, x: PETSc.Vec, rotation: PETSc.Mat | None, rows: ContactRows) -> Array:
@@ -166,8 +173,8 @@ class Jacobian:
 
     def set_rates(self, rates: Sequence[Array]) -> None:
         """Set the tangent K, (m, d, d) by term; nothing is held then. Collective."""
-        changed = any(bool(np.any(new != old)) for new, old in zip(rates, self._rates, strict=True))
-        if self._comm.allreduce(changed, op=MPI.LOR):
+        changed = any(np.any(new != old) for new, old in zip(rates, self._rates, strict=True))
+        if any(agree(self._comm, changed)):
             self._rates = [k.copy() for k in rates]
             self.rows.set_tangent(self._terms, rates)
             self._write(np.empty(0, np.int32))
@@ -176,7 +183,7 @@ class Jacobian:
 
     def hold(self, held: Entities) -> None:
         """Hold these unknowns of Γc (local, owned, sorted), and no others, as they are in a solve. Collective."""
-        if self._comm.allreduce(not np.array_equal(held, self.held), op=MPI.LOR):
+        if not all(agree(self._comm, np.array_equal(held, self.held))):
             self._write(held)
 
     def set_restricted(self, tangent: Array, held: Entities) -> None:
@@ -186,8 +193,8 @@ class Jacobian:
             tangent: W K at the vertices of Γc, (m, d, d).
             held: unknowns to hold (local, owned, sorted).
         """
-        changed = not (np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held))
-        if self._comm.allreduce(changed, op=MPI.LOR):
+        same = np.array_equal(tangent, self.rows.tangent) and np.array_equal(held, self.held)
+        if not all(agree(self._comm, same)):
             self.rows.tangent[:] = tangent
             self._rates = [np.full_like(k, np.nan) for k in self._rates]  # they say nothing about J now
             self._write(held)

@@ -18,8 +18,7 @@ from scipy.linalg import null_space
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
-from ..runtime.mpi import agree
-from ..typing import Array, Entities, Mask
+from ..typing import Array, Entities
 from .thresholds import DEFAULT
 
 
@@ -91,33 +90,21 @@ class LocalFrames:
         return q
 
 
-def frames_of(problem: Problem) -> LocalFrames | None:
-    """The local frames of a problem; None where every normal is parallel to an axis. Collective.
+def frames_of(problem: Problem) -> LocalFrames:
+    """The local frames at the vertices where a normal of one of the parts is not parallel to an axis.
 
     Args:
         problem: the problem.
     """
-    d, comm = problem.dimension, problem.comm
-    if not any(agree(comm, any(_slanted(s.normals).any() for s in problem.surfaces))):
-        return None
-    slanted = _normals_at_slanted(problem)
-    fixed = {int(dof) for dof in problem.fixed}
-    frames = [_axes(normals, [i for i in range(d) if block * d + i in fixed], d) for block, normals in slanted.items()]
-    axes = np.array(frames, dtype=np.float64).reshape(-1, d, d)
-    return LocalFrames(np.array(list(slanted), dtype=np.int32), axes)
-
-
-def _slanted(normals: Array) -> Mask:
-    return np.asarray(np.count_nonzero(normals, axis=1) > 1)
-
-
-def _normals_at_slanted(problem: Problem) -> dict[int, list[Array]]:
-    """The normals of all parts at each vertex where one of them is slanted."""
+    d, fixed = problem.dimension, {int(dof) for dof in problem.fixed}
+    blocks = np.concatenate([np.empty(0, np.int32), *(s.blocks for s in problem.surfaces)])
+    normals = np.concatenate([np.empty((0, d)), *(s.normals for s in problem.surfaces)])
+    here = np.isin(blocks, blocks[np.count_nonzero(normals, axis=1) > 1])
     found: dict[int, list[Array]] = {}
-    for surface in problem.surfaces:
-        for block, normal in zip(surface.blocks, surface.normals, strict=True):
-            found.setdefault(int(block), []).append(np.asarray(normal))
-    return {block: normals for block, normals in found.items() if _slanted(np.array(normals)).any()}
+    for block, normal in zip(blocks[here], normals[here], strict=True):
+        found.setdefault(int(block), []).append(normal)
+    axes = [_axes(each, [i for i in range(d) if block * d + i in fixed], d) for block, each in found.items()]
+    return LocalFrames(np.array(list(found), dtype=np.int32), np.array(axes).reshape(-1, d, d))
 
 
 def _axes(normals: Sequence[Array], held: Sequence[int], d: int) -> Array:

@@ -24,6 +24,7 @@ from ..mesh.transfer import Transfer
 from ..problem.spaces import Dilatation
 from ..typing import Array, Entities
 from .factorisation import nested, without_dilatation
+from .jacobian import rows_of
 from .petsc_options import applied_by, default_options, prefix
 from .system import System
 
@@ -265,8 +266,7 @@ class Level:
     @cached_property
     def _traces(self) -> PETSc.Mat:
         """Its rows of Γc. Collective when first used."""
-        rows = (self.finer.jacobian.rows.dofs + self.finer.load.owner_range[0]).astype(PETSc.IntType)
-        return self.interpolation.createSubMatrix(PETSc.IS().createGeneral(rows, comm=self.finer.comm), None)
+        return rows_of(self.interpolation, self.finer.jacobian.rows.dofs)
 
     def _restricted(self, values: npt.NDArray[Any]) -> Array:
         """Values at the finer level's unknowns of Γc, restricted to the unknowns there on this one. Collective."""

@@ -12,7 +12,8 @@ import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -210,19 +211,6 @@ def raise_python_error(error: PETSc.Error) -> None:
         raise cause
 
 
-class _Context:
-    """The context of the PC, which refers to its owner weakly: nothing would free a circle via PETSc."""
-
-    def __init__(self, owner: Any) -> None:
-        self._owner = weakref.ref(owner)
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve for y of the load x."""
-        owner = self._owner()
-        assert owner is not None
-        owner.apply(x, y)
-
-
 def applied_by(owner: Any, matrix: PETSc.Mat) -> PETSc.PC:
     """The PC. Collective.
 
@@ -231,8 +219,9 @@ def applied_by(owner: Any, matrix: PETSc.Mat) -> PETSc.PC:
             petsc4py would call with every PC.
         matrix: what it preconditions.
     """
-    pc = PETSc.PC().create(matrix.comm)
+    # weakly: nothing would free a circle via PETSc
+    pc, apply = PETSc.PC().create(matrix.comm), cast(Any, weakref.WeakMethod(owner.apply))
     pc.setOperators(matrix)
     pc.setType(PETSc.PC.Type.PYTHON)
-    pc.setPythonContext(_Context(owner))
+    pc.setPythonContext(SimpleNamespace(apply=lambda _, x, y: apply()(x, y)))
     return pc

@@ -22,12 +22,12 @@ from ..mesh.domain import Domain
 from ..problem import references, scaling
 from ..problem.bodies import whole
 from ..problem.compose import Formulation, compose
-from ..problem.law_term import LawTerm
-from ..problem.problem import Bounds, Problem
+from ..problem.problem import Problem
 from ..problem.references import elastic_forces
 from ..problem.vectors import assembled, new_vector, null_space, product, turn
 from ..rigid import Mode, rigid_fields
 from ..runtime.cost import Timer
+from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from . import existence, local_frames, rigid_motions
 from .equations import Base, Equations
@@ -71,7 +71,9 @@ class System:
             self.forces = {name: assembled(form) for name, form in problem.loads.items()}
             self._loads = self._sum_of(self.forces)
             stiffness, self.load, pull = self._constrained()
-            stiffness, self.rotation, self.terms, self.bounds = self._in_local_components(stiffness)
+            stiffness, self.rotation = self._in_local_components(stiffness)
+            self.terms = tuple(map(self.frames.term, problem.terms))
+            self.bounds = tuple(map(self.frames.bounds, problem.bounds))
             self.jacobian = Jacobian(stiffness, self.terms, self.bounds)
             self.references = references.of(problem, self._loads)
             self.pushing = self._sum_of(existence.loads_of_rigid_motions(problem, self.forces))
@@ -82,12 +84,6 @@ class System:
     def comm(self) -> MPI.Comm:
         """The communicator."""
         return self.problem.comm
-
-    @property
-    def _owned(self) -> int:
-        """Number of unknowns of this rank."""
-        dofmap = self.problem.space.dofmap
-        return int(dofmap.index_map.size_local * dofmap.index_map_bs)
 
     @property
     def dofs(self) -> int:
@@ -117,7 +113,7 @@ class System:
     def near_null(self) -> PETSc.NullSpace:
         """The rigid motions without supports, which algebraic multigrid must keep. Collective when first used."""
         body, vectors = whole(self.problem.domain), []
-        fields = rigid_fields(np.asarray(self.problem.points / self.problem.scales.length), body)
+        fields = rigid_fields(self.problem.points / self.problem.scales.length, body)
         for number in range(body.motions):
             vectors.append(self.load.duplicate())
             vectors[-1].array[:] = self.problem.relative(fields[:, number].ravel())[: self.load.local_size]
@@ -127,25 +123,19 @@ class System:
     @cached_property
     def contact_axes(self) -> Array:
         """The local axes at the vertices of Γc that this rank owns, as rows, (m, d, d)."""
-        rows = self.jacobian.rows
-        if self.frames is None:
-            return np.broadcast_to(np.eye(rows.tangent.shape[1]), rows.tangent.shape)
-        return self.frames.at(rows.vertices)
+        return self.frames.at(self.jacobian.rows.vertices)
 
-    def _in_local_components(
-        self, stiffness: PETSc.Mat
-    ) -> tuple[PETSc.Mat, PETSc.Mat | None, tuple[LawTerm, ...], tuple[Bounds, ...]]:
-        """Stiffness, rotation, laws and bounds in local components; the load is rotated in place. Collective."""
-        if self.frames is None:
-            return stiffness, None, self.problem.terms, self.problem.bounds
+    def _in_local_components(self, stiffness: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat | None]:
+        """Stiffness in local components, and the rotation; the load is rotated in place. Collective."""
+        if not any(agree(self.comm, len(self.frames.blocks))):
+            return stiffness, None
         q = self.frames.matrix(self.problem, stiffness)
         rows, columns = stiffness.getLGMap()
         rotated = stiffness.ptap(q)
         rotated.setLGMap(rows, columns)
         stiffness.destroy()
         turn(self.load, q)
-        terms = tuple(self.frames.term(t) for t in self.problem.terms)
-        return rotated, q, terms, tuple(self.frames.bounds(b) for b in self.problem.bounds)
+        return rotated, q
 
     def with_obstacles_of(self, problem: Problem) -> System:
         """The system with the obstacles where another problem of the same body has them; all matrices are shared.
@@ -157,7 +147,7 @@ class System:
         """
         found = copy.copy(self)
         found.problem = problem
-        found.bounds = problem.bounds if self.frames is None else tuple(map(self.frames.bounds, problem.bounds))
+        found.bounds = tuple(map(self.frames.bounds, problem.bounds))
         found.references = references.of(found.problem, self._loads)
         found.lower, found.upper = found._box()
         return found
@@ -168,7 +158,7 @@ class System:
         Args:
             x: the unknowns.
         """
-        if self.comm.allreduce(np.array_equal(x.array_r, self.equations.base.x.array_r), op=MPI.LAND):
+        if all(agree(self.comm, np.array_equal(x.array_r, self.equations.base.x.array_r))):
             return
         internal = self.problem.combined(elastic_forces(self.problem, self.displacement(x)))
         elastic, residual = (self._turned(forces) for forces in (internal, internal - self._loads))
@@ -231,9 +221,10 @@ class System:
 
     def _sum_of(self, forces: Mapping[str, PETSc.Vec]) -> Array:
         """The sum of some load vectors as bounds and laws balance it, (vertices, d). Collective."""
-        d = self.problem.dimension
-        total = sum((force.array_r for force in forces.values()), np.zeros(self._owned))
-        return self.problem.combined(np.array(total).reshape(-1, d))
+        total = np.zeros((self.problem.space.dofmap.index_map.size_local, self.problem.dimension))
+        for force in forces.values():
+            total += force.array_r.reshape(total.shape)
+        return self.problem.combined(total)
 
     def holding_forces(self, x: PETSc.Vec) -> Array:
         """The elastic forces that supports, contact and laws take up; zero elsewhere, (n,). Collective."""
