@@ -26,8 +26,7 @@ class RigidThresholds:
             a body that has gone its inverse (times p0 L / E0) slides away.
         exact: the same where rows have unit length and nothing was summed up: a row that constrains no motion, the
             violation of one, an energy above the least one.
-        dropped: coefficients of at most this size may be left out of the motion that is named. So small a share of an
-            edge of a cone of slips, relative to the largest, is none.
+        dropped: so small a share of an edge of a cone of slips, relative to the largest, is none.
         max_rounds: linear programmes for one minimum (friction in 3D needs about 40), and divisions of a cone of slips.
         touching: distance from its bound, over the largest bound, at which a vertex rests on it; part of a support's
             row that must not be spanned by others.
