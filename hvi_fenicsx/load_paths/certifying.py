@@ -24,7 +24,7 @@ from ..certify.certificate import Examination
 from ..certify.contact_state import Forces
 from ..certify.thresholds import DEFAULT as THRESHOLDS
 from ..paths.distances import Distances, StateOnGraphs
-from ..paths.state import JUMPS, Event, PathState
+from ..paths.state import Event, PathState
 from ..problem import references
 from ..problem.problem import FactoredProblem, Problem
 from ..problem.vectors import product, turn
@@ -34,7 +34,7 @@ from ..solvers import frozen_mixity
 from ..system.system import System
 from ..typing import Array, magnitude
 
-ALWAYS = JUMPS | {Event.START, Event.TURN, Event.END}
+ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
 """The events whose states are examined with the whole body, and that a film shows first."""
 FIRST = 100
 """So many states are examined in any case; of twice as many each second one, and so on."""

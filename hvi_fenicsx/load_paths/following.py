@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..model import PathTable
 from ..paths.follower import Follower
 from ..paths.load_path import LoadPath, PathRow
-from ..paths.state import JUMPS, End, Event, EventPlace, Follow, PathOptions, PathState, Position
+from ..paths.state import End, Event, EventPlace, Follow, PathOptions, PathState, Position
 from ..paths.vertex_laws import is_straight
 from ..problem.problem import FactoredProblem, Problem
 from ..reduced import loading
@@ -156,7 +156,6 @@ class PathRun:
             work=state.work * scales.energy,
             dissipated=state.dissipated * scales.energy,
             released=state.released * scales.energy,
-            way=state.way,
             unstable=state.unstable,
             forces=self._measures.forces(state.x, state.factor, self._reached),
             displacements=self._measures.displacements(state.x, state.factor),
@@ -192,7 +191,7 @@ class PathRun:
         for number, (before, after) in enumerate(zip(self.states, self.states[1:], strict=False)):
             low, high = sorted((before.factor, after.factor))
             last = number + 2 == len(self.states)
-            if after.event in JUMPS or not low <= factor <= high or low == high:
+            if after.event is Event.JUMP or not low <= factor <= high or low == high:
                 continue
             if factor == after.factor and not last:
                 continue

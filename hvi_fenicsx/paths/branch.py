@@ -101,6 +101,10 @@ class Branch(ABC):
     def directions(self) -> Array:
         """How fast the points go along their graphs, (m,)."""
 
+    @abstractmethod
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        """Motions in which the energy may fall, (n,) each, and the point that leads it."""
+
     @property
     def values(self) -> Values:
         """Displacements and forces of all points."""
@@ -170,6 +174,10 @@ class Branch(ABC):
         Args:
             aim: the factor that is wanted.
         """
+
+    @abstractmethod
+    def beyond(self) -> Array:
+        """The coordinates a little farther on, (n,)."""
 
     @abstractmethod
     def balanced(self, factor: float) -> Array:

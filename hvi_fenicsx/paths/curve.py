@@ -9,6 +9,7 @@ does not converge or goes far, or where the tangent turns by more than some degr
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -20,7 +21,7 @@ from .branch import Branch, Move, Passage, Refused, StepEnd
 from .equations import CurvePoint
 from .events import Crossing, CurveStep, Events, displacement_rate
 from .pivoting import StraightBranch
-from .relations import ContactPoints
+from .relations import ContactPoints, FreeMotions
 from .state import Position
 from .thresholds import DEFAULT
 
@@ -190,6 +191,44 @@ class CurvedBranch(Events):
     def must_leave(self, aim: float) -> bool:
         """Unstable, or away from the factor: a bond that turns back makes the path stable, and turn."""
         return self.unstable > 0 or (aim - self.factor) * self.trend < 0.0
+
+    @override
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        drops, motion, groups = self.points.on_drops(), self.motion, self.points.unknowns
+        free = self.points.motions(self.here.values)
+        if drops:
+            found = [self._after_drops(drops, free), motion]
+        else:
+            lowest = free.ways.T @ np.linalg.eigh(free.matrix)[1][:, 0] if len(free.slopes) else np.zeros_like(motion)
+            lowest *= np.sign(self._into_cell(lowest) or float(lowest @ motion)) or 1.0
+            found = [lowest, motion, -lowest]
+        for one in found:
+            for k in drops or [int(np.argmax([magnitude(one[group]) for group in groups]))]:
+                yield one, k
+
+    def _after_drops(self, drops: list[int], free: FreeMotions) -> Array:
+        """How a body moves when points on drops go on: these outwards, all others follow."""
+        found, directions = np.zeros_like(self.z), self.directions
+        for k in drops:
+            found += (np.sign(directions[k]) or 1.0) * self.row(k, self.here.y)[:-1]
+        return found - free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (self.points.stiffness @ found))[0]
+
+    def _into_cell(self, motion: Array) -> float:
+        """How far a motion takes points at ends of their segments into these: many may be there at once."""
+        points, values = self.points, self.here.values
+        allowed = points.allowances(values, self.directions, magnitude(self.here.tangent))
+        low, high = (values.s <= points.low + allowed), (values.s >= points.high - allowed)
+        return float((values.moves > 0.0) * (low * 1.0 - high) @ points.along(values, motion))
+
+    @property
+    def motion(self) -> Array:
+        """How fast the displacements change along the branch, (n,)."""
+        return displacement_rate(self.points, self.here)
+
+    @override
+    def beyond(self) -> Array:
+        ways, _ = self._ends()
+        return self.z + min(DEFAULT.near, float(np.min(ways, initial=np.inf))) * self.here.tangent[:-1]
 
     @override
     def balanced(self, factor: float) -> Array:

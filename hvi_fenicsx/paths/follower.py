@@ -16,7 +16,7 @@ from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
 from .jumps import Jump
 from .relations import ContactPoints
-from .state import JUMPS, Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped
+from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped
 from .thresholds import DEFAULT
 from .vertex_laws import multiplied
 
@@ -95,7 +95,7 @@ class Follower(LoadHistory):
         else:
             self._restore(self._resume)
             self._peak = max(map(abs, programme[: self._leg]), default=0.0)
-            self._adrift = self._resume.event not in (Event.START, *JUMPS) and self._is_adrift()
+            self._adrift = self._resume.event not in (Event.START, Event.JUMP) and self._is_adrift()
         while self.end is None and self._leg < len(programme):
             yield from self._gone_to(programme[self._leg])
             self._leg += 1
@@ -303,23 +303,15 @@ class Follower(LoadHistory):
         """On to the next stable equilibrium at the same factor, or off."""
         factor = self.factor
         heading, held = (1 if aim > factor else -1), self._is_held(factor)
-
-        def energy(z: Array) -> float:
-            stored = self._balance.at(self._points.values(z), factor)
-            return stored.energy + stored.dissipated
-
-        landing = Jump(self._problem, self._branch, heading, held=held, energy=energy).landing()
+        landing = Jump(self._problem, self._branch, heading, held=held).landing()
         if landing is not None and landing.z is not None:
-            landed = self._landed(landing.z, factor, aim, landing.inverse)
-            event = Event.BRANCHING if landing.branching else Event.JUMP
-            yield from self._goes_on(replace(landed, event=event, way=landing.way))
+            yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
             return
         if landing is None:
-            tried = "along the curve of equilibria, in motion, by descent"
-            self._lose(factor, f"no stable state was found at the factor {factor:.6g} ({tried})")
+            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
         else:
-            self._come_off(factor, f"at the factor {factor:.6g} all motions run away: a body comes off")
-        yield replace(self._last, event=Event.END, place=None, released=0.0, way="")
+            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
+        yield replace(self._last, event=Event.END, place=None, released=0.0)
 
     def _goes_on(self, landed: PathState) -> Iterator[PathState]:
         """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""

@@ -77,8 +77,8 @@ def settled(
         held: whether there is an equilibrium at this factor, so that no way leads off.
     """
     first = DEFAULT.small * towards
-    motion = OverdampedMotion(problem, points, z, held=held)
-    if not motion.run(problem.load(first), np.zeros(len(points))) or motion.escapes:
+    motion = OverdampedMotion(problem, points, z, problem.load(first), held=held)
+    if not motion.run(np.zeros(len(points))) or motion.escapes:
         return Nowhere.AWAY if motion.escapes else Nowhere.UNKNOWN
     heading, most = -int(np.sign(first)), DEFAULT.waits * (1 + len(points))
     try:

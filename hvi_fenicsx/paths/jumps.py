@@ -1,18 +1,17 @@
 """From a state that is not stable to the next stable equilibrium at the same loads.
 
-It is looked for along the curve of equilibria first: where the curve turns, falls, and comes back to the loads, with
-one unstable direction on its way, that is where the body goes. Else the body moves as an overdamped one
-(:mod:`.motion`), under loads that are a little larger until it rests, in steps that are halved until its end stands.
-It sets out with two small forces at random, the one against the other: where they lead to two ends, the jump has
-several ways, and that is taken which releases most. What is found in no motion is looked for by descent, in steps that
-are as long as they may be. Where all of these lead out of reach, a body comes off. Bonds remember on the way.
+A force t c holds the body back, against the way in which it leaves, while it goes: the loads f(λ) + t c, t < 0, give a
+branch of equilibria that begins at the state with t = 0. The energy falls along it, dE = t cᵀdx, and where t is 0 again
+is an equilibrium of the loads alone. Where the branch goes on for ever with t < 0 a body comes off; with t = 0 it is in
+equilibrium wherever it goes. Where no such branch leads to an end soon, the body moves as an overdamped one
+(:mod:`.motion`). Bonds remember on the way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,8 +19,9 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, magnitude
 from .branch import Branch, Refused, StepEnd, advancing
+from .curve import branch_from
 from .motion import OverdampedMotion
-from .statuses import Kept
+from .relations import ContactPoints
 from .thresholds import DEFAULT
 
 
@@ -30,20 +30,12 @@ class Landing:
     """Where a body went.
 
     Attributes:
-        way: how that was found.
         z: the coordinates of a stable equilibrium, (n,); None: the body comes off.
-        energy: stored and dissipated there; infinite where it comes off.
-        kept: where the points are then.
         inverse: of its equations; None where it is not known.
-        branching: whether another way leads elsewhere.
     """
 
-    way: str
-    z: Array | None = None
-    energy: float = np.inf
-    kept: Kept | None = None
+    z: Array | None
     inverse: CellInverse | None = None
-    branching: bool = False
 
 
 class Jump:
@@ -54,104 +46,132 @@ class Jump:
         branch: it is at the state; after the jump its points are where they are then.
         heading: 1 where larger factors are wanted, -1 where smaller ones are.
         held: whether there is an equilibrium at these loads whatever the bonds remember, so that no way leads off.
-        energy: what is stored and dissipated, from the coordinates of the points.
     """
 
-    def __init__(
-        self,
-        problem: CondensedProblem,
-        branch: Branch,
-        heading: int,
-        *,
-        held: bool,
-        energy: Callable[[Array], float],
-    ) -> None:
+    def __init__(self, problem: CondensedProblem, branch: Branch, heading: int, *, held: bool) -> None:
         self._problem, self._branch, self._points = problem, branch, branch.points
-        self._factor, self._heading, self._held, self._energy = branch.factor, heading, held, energy
-        self._z, self._directions, self._kept = branch.z.copy(), branch.directions.copy(), branch.points.kept()
+        self._load, self._heading, self._held = problem.load(branch.factor), heading, held
+        self._z, self._values, self._directions = branch.z.copy(), branch.values, branch.directions.copy()
 
     def landing(self) -> Landing | None:
         """Where it leads; None where this was not found, with the points where they were."""
-        found = (None if self._several_lead() else self._along()) or self._in_motion()
-        if found is None or found.z is None:
-            found = self._moved("by descent", np.inf, 1.0) or found
-        self._points.restore(self._kept if found is None or found.kept is None else found.kept)
-        return found
-
-    def _several_lead(self) -> bool:
-        """Whether several points that move are at ends of their segments: then the curve takes them in any order."""
-        ends, speeds = np.stack([self._points.low, self._points.high]), np.abs(self._directions)
-        sizes = np.max(np.where(np.isfinite(ends), np.abs(ends), 0.0), axis=0, initial=0.0)
-        there = np.min(np.abs(ends - self._branch.values.s), axis=0) <= DEFAULT.none * sizes
-        return bool(np.count_nonzero(there & (speeds > DEFAULT.slow * magnitude(speeds))) > 1)
-
-    def _along(self) -> Landing | None:
-        """The next state along the curve that bears more than these loads, if one unstable direction leads there."""
-        branch, rate, found, released = self._branch, self._problem.force_rate, None, 0.0
-        beyond = self._factor + self._heading * DEFAULT.slow * abs(self._factor)
-        with suppress(Refused, np.linalg.LinAlgError):
-            for _ in range(DEFAULT.waits * (2 + len(self._points))):
-                before, x = branch.factor, branch.values.x
-                move = next(advancing(branch, beyond if found else self._factor, 1))
-                branch.note(move)
-                released += (self._factor - 0.5 * (before + branch.factor)) * float(rate @ (branch.values.x - x))
-                rises, there = self._heading * branch.rising > 0.0, move.outcome is StepEnd.FACTOR
-                if found and there:
-                    return found
-                if rises and there and released > 0.0:
-                    found = self._landed("along the curve", branch.z.copy(), branch.inverse())
-                found = found if rises else None
-                lost = move.outcome in (StepEnd.AWAY, StepEnd.STUCK) or branch.unstable > 1
-                if lost or self._heading * (branch.factor - beyond) > 0.0:
-                    break
-        return None
-
-    def _in_motion(self) -> Landing | None:
-        """The end of a motion: the same with either force at random and with shorter steps, or the best of two."""
-        first, second = self._moved("in motion", 1.0, 1.0), self._moved("in motion", 0.5, -1.0)
-        if first is not None and second is not None and self._are_same(first, second):
-            return second
-        ends = [end for end in map(self._resolved, (1.0, -1.0)) if end is not None]
-        if len(ends) < 2 or self._are_same(*ends):
-            return ends[0] if len(ends) == 2 else None
-        return replace(min(ends, key=lambda end: end.energy), branching=True)
-
-    def _resolved(self, sign: float) -> Landing | None:
-        """The end of a motion whose steps are halved until it stands."""
-        last, growth = None, 1.0
-        for _ in range(4):
-            found = self._moved("in motion", growth, sign)
-            if found is not None and last is not None and self._are_same(found, last):
+        kept = self._points.kept()
+        for way in (self._held_back, self._released, self._pushed_off):
+            found = way()
+            if found is not None:
                 return found
-            last, growth = found, 0.5 * growth
+            self._points.restore(kept)
         return None
 
-    def _are_same(self, one: Landing, other: Landing) -> bool:
-        if one.z is None or other.z is None:
-            return one.z is other.z
-        off = magnitude(one.z - other.z)
-        return off <= DEFAULT.near * max(magnitude(one.z - self._z), magnitude(other.z - self._z))
+    def _held_back(self) -> Landing | None:
+        """The landing of the first restraint whose branch leads to an end soon."""
+        kept = self._points.kept()
+        for restraint, k in _restraints(self._branch):
+            with suppress(Refused, np.linalg.LinAlgError):
+                found = self._restrained(restraint, k)
+                if found is not None:
+                    return found
+            self._points.restore(kept)
+        return None
 
-    def _moved(self, way: str, growth: float, sign: float) -> Landing | None:
-        """The end of one motion, pushed off at first; None where it has none."""
-        points, load = self._points, self._problem.load(self._factor)
+    def _restrained(self, restraint: Array, k: int) -> Landing | None:
+        """The landing of the branch along which a restraint grows at first; None where none is found."""
+        points, inverse = self._points, self._branch.inverse()
+        restraint = points.unresisted(self._values, restraint).balanced * float(np.mean(points.forces))
+        branch = branch_from(points, self._load, restraint, self._z, 0.0, inverse)
+        branch.set_out(-1.0)
+        back = points.straight and branch.directions[k] * self._directions[k] <= 0.0
+        if back or branch.rising > DEFAULT.undecided:
+            return None
+        forces = self._load, self._values.force
+        largest = max(magnitude(force) for force in forces)
+        none = DEFAULT.none * largest / magnitude(restraint)
+        return self._at_its_end(branch, none)
+
+    def _at_its_end(self, branch: Branch, none: float) -> Landing | None:
+        standing, x = 0, self._values.x
+        most = DEFAULT.waits * (2 + len(self._points) * self._points.straight)
+        for move in advancing(branch, 0.0, most):
+            stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
+            standing, x = standing + 1 if stands else 0, branch.values.x
+            anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
+            if move.outcome is StepEnd.FACTOR or anywhere:
+                stable = self._points.unstable_directions(branch.values) == 0
+                return self._landed(branch.z.copy(), branch.inverse()) if stable else None
+            if move.outcome is StepEnd.AWAY:
+                off = branch.stands and branch.factor < 0.0 and not self._held
+                return Landing(z=None) if off else None
+            lost = move.outcome is StepEnd.STUCK or branch.factor > none
+            if lost or standing > DEFAULT.waits + 4 * len(self._points):
+                return None
+        return None
+
+    def _landed(self, z: Array, inverse: CellInverse | None = None) -> Landing | None:
+        """The landing at a stable equilibrium; None where it is the state itself, or a curve leads back from there."""
+        x, before = self._points.values(z).x, self._values.x
+        size = max(magnitude(x), magnitude(before))
+        if magnitude(x - before) <= DEFAULT.none * size:
+            return None
+        return Landing(z=z, inverse=inverse) if self._points.straight or self._leads_on(z) else None
+
+    def _leads_on(self, z: Array) -> bool:
+        """Whether a way leads from a state to wanted loads."""
+        kept, rate, leads_on = self._points.kept(), self._heading * self._problem.force_rate, False
+        onward = branch_from(self._points, self._load, rate, z, 0.0)
+        with suppress(Refused, np.linalg.LinAlgError):
+            onward.set_out(1.0)
+            leads_on = onward.rising >= 0.0 and not np.any(self._points.unresisted(onward.values, rate).driven)
+        self._points.restore(kept)
+        return leads_on
+
+    def _released(self) -> Landing | None:
+        """The landing of an overdamped motion, from a little farther along the path: there smaller loads are borne."""
+        return self._relaxed(self._z if self._points.on_drops() else self._branch.beyond(), self._load)
+
+    def _pushed_off(self) -> Landing | None:
+        """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
         rate = self._problem.force_rate
-        points.restore(self._kept)
-        size = magnitude(load) or magnitude(rate)
-        push = self._heading * DEFAULT.slow * size / (magnitude(rate) or 1.0) * rate
-        push += sign * DEFAULT.none * size * (points.order[points.point_of] - 1.0)
-        motion = OverdampedMotion(self._problem, points, self._z, held=self._held, growth=growth)
-        for one in (load + push, load):
-            if not motion.run(one, self._directions):
+        push = DEFAULT.slow * self._heading
+        push = push * magnitude(self._load) / np.max(np.abs(rate), initial=1e-300)
+        return self._relaxed(self._z, self._load + push * rate, self._load)
+
+    def _relaxed(self, z: Array, *loads: Array) -> Landing | None:
+        """The landing of overdamped motions under one load after the other."""
+        for load in loads:
+            motion = OverdampedMotion(self._problem, self._points, z, load, held=self._held)
+            if not motion.run(self._directions):
                 return None
             if motion.escapes:
-                return Landing(way=way)
-        return self._landed(way, motion.z)
+                return Landing(z=None)
+            z = motion.z
+        return self._landed(z)
 
-    def _landed(self, way: str, z: Array, inverse: CellInverse | None = None) -> Landing | None:
-        """The landing at a stable equilibrium; None where it is none, or the state itself."""
-        values = self._points.values(z)
-        size = max(magnitude(values.x), magnitude(self._z))
-        if self._points.unstable_directions(values) or magnitude(z - self._z) <= DEFAULT.none * size:
-            return None
-        return Landing(way=way, z=z, energy=self._energy(z), kept=self._points.kept(), inverse=inverse)
+
+def _restraints(branch: Branch) -> Iterator[tuple[Array, int]]:
+    """Forces against the ways in which a body may leave, of size 1, and the point that leads.
+
+    They are even on all bonds that move, as the motion is, and on one point alone.
+    """
+    points, seen = branch.points, list[Array]()
+    for motion, k in branch.leaving():
+        size = magnitude(motion)
+        if size == 0.0:
+            continue
+        alone, group = np.zeros_like(motion), points.unknowns[k]
+        alone[group] = motion[group]
+        for force in (_evened(points, motion, size), motion, alone):
+            found = force / (magnitude(force) or 1.0)
+            known = any(np.allclose(found, other, rtol=0.0, atol=DEFAULT.slow) for other in seen)
+            if np.any(found) and not known:
+                seen.append(found)
+                yield found, k
+
+
+def _evened(points: ContactPoints, motion: Array, size: float) -> Array:
+    """Forces in the direction of a motion, of the size of each point's area."""
+    found = np.zeros_like(motion)
+    for laws, unknowns in zip(points.laws, points.unknowns, strict=True):
+        own = float(np.linalg.norm(motion[unknowns]))
+        if laws and own > DEFAULT.slow * size:
+            found[unknowns] = sum(law.weight for law in laws) * motion[unknowns] / own
+    return found

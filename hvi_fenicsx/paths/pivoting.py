@@ -12,6 +12,8 @@ random: each coordinate then has a part of the order ε as well, which says who 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from typing_extensions import override
 
@@ -49,7 +51,7 @@ class StraightBranch(StraightEquations):
         Raises:
             numpy.linalg.LinAlgError: the tangent is singular.
         """
-        self.heading, self.trend, self.unstable = 1, 0, 0
+        self.heading, self.trend, self.unstable, self._leader = 1, 0, 0, 0
         self._stiffest, self._live = magnitude(self._stiffness.diagonal), magnitude(self.rate)
         random, z = np.random.default_rng(0), self.z
         # coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them
@@ -81,6 +83,16 @@ class StraightBranch(StraightEquations):
     @override
     def directions(self) -> Array:
         return self.rates[:-1]
+
+    @override
+    def leaving(self) -> Iterator[tuple[Array, int]]:
+        k, found = self._leader, self.motion
+        if self.points.rise[k]:  # on a drop: it goes on, and all others follow
+            way = np.sign(self.rates[k])
+            pull = np.where(self.points.moving, -way * self.points.elastic.column(k), 0.0)
+            found = np.where(self.points.moving, (self.inverse() or self.factorised()).solve(pull), 0.0)
+            found[k] = way
+        yield found, k
 
     @property
     def motion(self) -> Array:
@@ -215,6 +227,8 @@ class StraightBranch(StraightEquations):
         change = softens if trend * self.trend < 0 else 0  # by the sign of the pivot
         neutral = stood or self.stands or self.held is not held
         self.unstable = self.points.unstable_directions(self.values) if neutral else self.unstable + change
+        if change > 0 or neutral:
+            self._leader = i
         return [(i, event_between(before, after))]
 
     def _turn_back(self, i: int, *, forward: bool) -> None:
@@ -257,6 +271,12 @@ class StraightBranch(StraightEquations):
         forces = magnitude(np.where(points.moving, points.slope, points.rise) * self.directions)
         size = self._stiffest * magnitude(self.motion) + forces
         return abs(self.rates[FACTOR]) * self._live < DEFAULT.reached * size
+
+    @override
+    def beyond(self) -> Array:
+        found = self._first_end(self.factor)
+        length = self.points.scale / (magnitude(self.directions) or 1.0) if found is None else found[1]
+        return self.z + DEFAULT.near * length * self.directions
 
     @override
     def must_leave(self, aim: float) -> bool:

@@ -24,16 +24,11 @@ class Event(StrEnum):
     """The factor turns."""
     JUMP = "jump"
     """The body has jumped to the next stable equilibrium."""
-    BRANCHING = "branching"
-    """So it has, and another way led elsewhere."""
     TURN = "turn"
     """The programme turns."""
     STEP = "step"
     """Nothing happens; on a curve that is not straight the states between two events."""
     END = "end"
-
-
-JUMPS = frozenset({Event.JUMP, Event.BRANCHING})
 
 
 class Follow(StrEnum):
@@ -105,7 +100,6 @@ class PathState:
         work: of loads and of what moves prescribed displacements, since the start.
         dissipated: lost in bonds with memory.
         released: at a jump, what the body has lost in motion.
-        way: how a jump was found.
         unstable: number of directions in which the energy falls.
         memory: what the bonds remember, (bonds, 4) as :attr:`.VertexLaws.memory`; None without memory.
         position: where on its curve the path is.
@@ -119,7 +113,6 @@ class PathState:
     work: float
     dissipated: float
     released: float = 0.0
-    way: str = ""
     unstable: int
     memory: Array | None
     position: Position

@@ -16,14 +16,13 @@ class FollowingThresholds:
         standing: a rate this small is none; where the curve bends a step, or a way to an end, likewise.
         reached: a coordinate this near to an end on a curve, or a displacement to a break of a law, may be there; where
             the factor stands while a body moves, rates are rounding up to this.
-        none: a load, force or stiffness this small is none; random forces with which motions set out.
+        none: a load, force or stiffness this small is none.
         undecided: a rate this small may have either sign where the curve bends; a difference of places that is none.
         slow: a variable that moves by so little fixes no point of the curve; digits that an inverse or a step may cost;
             by so much loads are larger that push a body off; a factor this near to the largest that is borne is it.
         small: a pivot or row this small costs digits; the part of a load that takes a body to where something holds it;
             the shortest step in a motion in time.
-        near: factors of a point nearby serve while corrections fall by this; ends of motions so near to each other,
-            beside the way to them, are one.
+        near: factors of a point nearby serve while corrections fall by this; a step beyond a state along the path.
         digits: the last digits of coordinates, and what they make of forces.
         least_turn: least cosine of the angle between the tangents at both ends of a step.
         reach: a step changes the argument of a curved law by this part of its length scale and of the argument at most.

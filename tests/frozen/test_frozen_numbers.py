@@ -16,11 +16,9 @@ FAST = {
 WHOLE = ("curved", "ranks")
 """Sets of which all cases are in the long tier; of others those that are quick."""
 KNOWN = {
-    "curved: slip in space": "a motion in time is pushed off by 1e-6: one of 12 jumps releases 2.4e-5 more",
-    "curved: slip in space remembers": "the same",
     "paths: two arms, pulled apart": "overlaps have another quadrature: two energies after 50 folds differ by 1.1e-9",
     "curved: glued plates, opening and slip": "two kinks at the place where one of seven jumps ends are gone",
-    "curved: energies that differ by mode": "a path that was lost at a fold reaches its end",
+    "curved: energies that differ by mode": "a path that was lost after a jump at a fold is lost at this fold",
     "curved: energies that differ by mode, unloaded, power law": "work differs by 3e-6: its quadrature followed steps",
     "ranks: energies that differ by mode, 3 ranks": "dissipated differs by 3e-4, as do short steps: its quadrature",
     "curved: exponential glue lifted at its end": "bonds load again to where they were after one of twelve jumps",

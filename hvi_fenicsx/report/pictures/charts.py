@@ -81,7 +81,7 @@ def _path_verdict(result: PathResult) -> tuple[str, str]:
 
 def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
     """The curve, each kind of it in its own look."""
-    jump = np.array([event in ("jump", "branching") for event in result.events[1:]], dtype=bool)
+    jump = np.array([event == "jump" for event in result.events[1:]], dtype=bool)
     stable, points = result.stable[:-1] & ~jump, np.column_stack([x, y])
     kinds: tuple[tuple[Mask, str, dict[str, Any]], ...] = (
         (stable, "stable", {"color": BLUE, "ls": "-", "lw": 2.4, "zorder": 3}),
