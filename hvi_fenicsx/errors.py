@@ -69,11 +69,11 @@ def of_user(what: object) -> Iterator[None]:
         what: was given, or is called with it.
 
     Raises:
-        InputError: with the kind of the error and its words; the error is its cause.
+        InputError: with the kind of the error and its words; the error is its cause. The program's own pass.
     """
     try:
         yield
-    except (InputError, SolverError, Interrupted, KeyboardInterrupt, SystemExit):
+    except (HviError, KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # UFL's ArityMismatch is no Exception
         raise InputError(f"{what}: {type(error).__name__}: {error}") from error

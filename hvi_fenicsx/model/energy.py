@@ -57,7 +57,10 @@ class Energy(Effect):
                 raise InputError("the function must return a bilinear UFL form a(u, v), such as inner(σ(u), ε(v))*dx")
             if not np.all(np.isfinite([float(number) for number in extract_type(form, RealValue)])):
                 raise InputError("a number in the form is not finite")
-            matrix = assemble_matrix(forms.compiled(form))
+            try:
+                matrix = assemble_matrix(forms.compiled(form))
+            except forms.CompilationError as error:
+                raise InputError(f"the form cannot be used: {error}") from error
         matrix.assemble()
         _check_symmetry(matrix)
         stiffness = _stiffness(matrix, space)

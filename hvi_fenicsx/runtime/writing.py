@@ -23,7 +23,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..errors import HviError, InputError, NotWrittenError
+from ..errors import InputError, NotWrittenError, of_user
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LARGEST = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 16
@@ -127,8 +127,7 @@ def content(file: Path) -> bytes:
         return stream.read()
 
 
-@contextlib.contextmanager
-def understood(file: Path) -> Iterator[None]:
+def understood(file: Path) -> contextlib.AbstractContextManager[None]:
     """Say of a file that what it holds is not what the program writes.
 
     Args:
@@ -137,13 +136,7 @@ def understood(file: Path) -> Iterator[None]:
     Raises:
         InputError: it is not.
     """
-    try:
-        yield
-    except HviError:
-        raise
-    except Exception as error:  # whatever comes of it
-        why = f"{type(error).__name__}: {error}"
-        raise InputError(f"{file}: is not as the program wrote it ({why}); --force begins anew") from None
+    return of_user(f"{file}: is not as the program wrote it; --force begins anew")
 
 
 def hand_over(error: NotWrittenError) -> int:

@@ -11,6 +11,7 @@ import ufl
 from own_mesh import own_square, steel_square
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.study.conduct import NoReferenceError
 
 COARSE = 4
 
@@ -39,6 +40,12 @@ def test_meshes_of_a_model_are_refinements_of_its_body(body: hvi.Body) -> None:
     assert errors[0] is not None
     assert errors[1] is not None
     assert 1.4 < errors[0] / errors[1] < 2.6  # of first order in h
+
+
+def test_a_study_without_a_reference_says_so_by_its_own_error(body: hvi.Body) -> None:
+    lifted = steel_square(body=body).replace(hvi.Traction("press", [0.0, 1e6]))
+    with pytest.raises(NoReferenceError, match="no solution exists"):
+        hvi.study(lifted, tolerance=[1e-4], repeats=1)
 
 
 @pytest.mark.long
