@@ -140,7 +140,7 @@ def _mend(kind: str, value: Any) -> str:
         try:
             float(value)
         except ValueError:
-            return "; no formula can stand here"
+            return "; no formula can stand here" if re.search(r"\b[xyz]\b", value) else ""
         return "; write it without quotes"
     return ""
 
@@ -372,3 +372,16 @@ def require_kind(name: str, given: Any, kinds: tuple[type, ...], wanted: str) ->
     """
     if isinstance(given, bool) or not isinstance(given, kinds):
         raise InputError(f"{name}: must be {wanted} (is {given!r})")
+
+
+def require_path(name: str, given: Any) -> None:
+    """Refuse anything but a path.
+
+    Args:
+        name: of the argument.
+        given: what the user gave.
+
+    Raises:
+        InputError: it is something else.
+    """
+    require_kind(name, given, (str, os.PathLike), "a path, as a text or a pathlib.Path")

@@ -23,7 +23,7 @@ from ..paths.load_path import LoadPath
 from ..report.reader import PathResult
 from ..results import ResultFolder
 from ..runtime import log
-from ..schema import unknown
+from ..schema import require_path, unknown
 from ..typing import Array
 from .solution import GIVEN, displacement
 from .solving import check, fields_of
@@ -138,6 +138,7 @@ class ModelPath(LoadPath):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
+        require_path("folder", folder)
         comm = self.run.prepared.system.comm
         with ResultFolder(comm, Path(folder), force=force, kind="path") as target:
             path_files.write(target, self.run, self, GIVEN, _LOG.warning, draw=pictures)

@@ -26,6 +26,7 @@ from ..results.gathering import contact_parts
 from ..results.whole import write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root
+from ..schema import require_kind, require_path
 from ..typing import Array
 from ..workflow import Solution
 
@@ -144,6 +145,7 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: there is no such picture of it.
         """
+        require_kind("picture", picture, (str, type(None)), "the name of a picture, or None")
         result, figures = gathering.result(self), list[Figure]()
         wanted = picture or ("escape" if self.solve_result is None else "body")
         on_root(self.problem.comm, lambda: figures.append(_figure(result, wanted)))
@@ -163,11 +165,12 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: the folder holds a result or other files, or cannot be written.
         """
+        require_path("folder", folder)
         with ResultFolder(self.problem.comm, Path(folder), force=force) as target:
             write_whole(target, self, GIVEN, self.timer, _LOG.warning, pictures=pictures)
             target.commit(self.scene)
 
-    @property
+    @cached_property
     def borne(self) -> Self:
         """The last state that is borne, at the factor ``last_borne.factor``; else itself. Not collective."""
         return replace(self, last_borne=None)

@@ -24,7 +24,7 @@ from ..problem import spaces
 from ..runtime import log
 from ..runtime.log import newton_step
 from ..runtime.mpi import time_over
-from ..schema import Count, Positive, Table
+from ..schema import Count, Positive, Table, require_path
 from ..solvers.method import Progress
 from ..study import plan as study_plan
 from ..study.conduct import Measurement
@@ -274,6 +274,8 @@ def study(
             no number of solves.
         NoReferenceError: on all ranks alike: no solution exists, or the reference is not certified.
     """
+    if folder is not None:
+        require_path("folder", folder)
     ranks = ranks_of(model, comm)
     _Asked.made({"repeats": repeats})
     plan = study_plan.make(_on_its_mesh(model), [_axis(name, values) for name, values in axes.items()])

@@ -79,11 +79,17 @@ def _checked(
     model = create_model(law.__name__, __config__=_STRICT, **fields)
     try:
         # As JSON, strict means what a scene file means by it: a list is a tuple, an integer is a float.
-        text = json.dumps(dict(given), default=lambda value: getattr(value, "tolist", value.__str__)())
-        checked = model.model_validate_json(text)
+        checked = model.model_validate_json(json.dumps(dict(given), default=_plain))
     except ValidationError as error:
         raise InputError(_message(law.name, error)) from error
     return {key: getattr(checked, key) for key in fields}
+
+
+def _plain(value: Any) -> Any:
+    """Numpy's numbers and arrays, and tomlkit's wrappers, as plain data."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise InputError(f"{value!r} is not plain data; give numbers, booleans, strings or lists of them")
 
 
 def _message(name: str, error: ValidationError) -> str:

@@ -100,15 +100,20 @@ def create(
         epsilon_absolute: instead, the width ε in N/m.
 
     Raises:
-        InputError: the name is unknown, ε is no finite number > 0, or the smoothing cannot
+        InputError: the name is unknown, not exactly one ε is given, it is no finite number > 0, or the smoothing cannot
             smooth this law.
     """
     kind = registered().get(name)
     if kind is None:
         raise InputError(f"unknown smoothing {name!r}{hint(name, registered())}; available: {', '.join(registered())}")
-    if epsilon_absolute is None:
-        return kind().relative(law, 0.0 if epsilon is None else epsilon)
-    return kind().smooth(law, epsilon_absolute)
+    if epsilon is not None and epsilon_absolute is None:
+        return kind().relative(law, epsilon)
+    if epsilon_absolute is not None and epsilon is None:
+        return kind().smooth(law, epsilon_absolute)
+    raise InputError(
+        "smoothing: give either epsilon (relative to the law's energy scale, for example 0.01) "
+        "or epsilon_absolute (in N/m)"
+    )
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ..effects import names_in_python
 from ..errors import InputError, of_user
 from ..mesh.boundary_part import BoundaryPart, Inequalities, InterfaceSides
 from ..mesh.shapes import Box, DomainShape, GivenMesh, MeshFile, Rectangle
-from ..schema import Table, require_kind, unknown
+from ..schema import require_kind, unknown
 
 if TYPE_CHECKING:
     from dolfinx import mesh as dmesh
@@ -25,13 +25,6 @@ if TYPE_CHECKING:
 
     from ..mesh.domain import Domain
     from ..mesh.transfer import Transfer
-
-
-class _Tags(Table):
-    names: dict[str, int]
-    """tags by name"""
-    regions: dict[str, int] | None
-    """tags of cells by name"""
 
 
 class Body:
@@ -70,8 +63,9 @@ class Body:
         if not isinstance(mesh, dmesh.Mesh):
             raise InputError(f"body: {mesh!r} is no dolfinx mesh; a file is read by hvi.Body.file(path)")
         given.check_tags(facets=facets, cells=cells)
-        given_tags = _Tags.made({"names": {} if names is None else names, "regions": regions})
-        sides, within = _sorted_out(mesh, facets, cells, given_tags.names, given_tags.regions)
+        named = _by_name("names", {} if names is None else names)
+        within = None if regions is None else _by_name("regions", regions)
+        sides, within = _sorted_out(mesh, facets, cells, named, within)
         domain = given.domain_of(mesh, facets, cells, sides, within)
         self.shape: DomainShape = GivenMesh(shape="given mesh", given=domain)
         self.comm: MPI.Comm | None = mesh.comm
@@ -269,6 +263,14 @@ class Body:
 
     def __repr__(self) -> str:
         return f"Body({self.shape.shape}, {self.dimension}D)"
+
+
+def _by_name(what: str, tags: Any) -> dict[str, int]:
+    """Tags by name, as a user gives them."""
+    named = isinstance(tags, Mapping) and all(isinstance(name, str) for name in tags)
+    if not named or any(isinstance(tag, bool) or not isinstance(tag, int | np.integer) for tag in tags.values()):
+        raise InputError(f'body: {what} are numbers of tags by name, such as {what}={{"wall": 1}}, not {tags!r}')
+    return {name: int(tag) for name, tag in tags.items()}
 
 
 def _sorted_out(

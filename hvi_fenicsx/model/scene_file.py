@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..schema import Keys, Mistake, require_kind, shown, unknown
+from ..schema import Keys, Mistake, require_path, shown, unknown
 from .content import dotted
 from .model import Mistakes, Model
 from .reader import KEYS, read_tables
@@ -34,7 +34,7 @@ def read_scene(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> M
         InputError: the file cannot be read or is not a valid scene; up to ten mistakes, one a line, each
             with its line in the file, the key, what is allowed and how to mend it.
     """
-    require_kind("path", path, (str, os.PathLike), "a path")
+    require_path("path", path)
     source = _Source.read(Path(path), overrides)
     try:
         huge = "is a whole number beyond 64 bits, which TOML does not have; write 1e20 for 100000000000000000000"

@@ -303,7 +303,7 @@ def test_names_and_parameters_from_plain_data() -> None:
         ("tresca", {"yield_traction": float("inf")}, "finite"),
         ("tresca", {"yield_traction": 10**400}, "number"),
         ("tresca", {"yield_traction": -1.0}, "must be > 0"),
-        ("tresca", {"yield_traction": object()}, "not usable"),
+        ("tresca", {"yield_traction": object()}, "plain data"),
         ("quadratic_linear", {"gamma1": 1e3, "gamma2": 4e2, "delta": 1.0}, 'law = "graph", points = '),
         (
             "exponential",

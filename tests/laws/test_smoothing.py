@@ -215,7 +215,8 @@ def test_papers_own_data_return_250_at_zero_slip() -> None:
     [
         ("quadratik", {"epsilon": 1.0}, "did you mean 'quadratic'"),
         ("none", {"epsilon": 1.0}, "available: chks"),
-        ("chks", {}, "> 0"),
+        ("chks", {}, "either epsilon"),
+        ("chks", {"epsilon": 1.0, "epsilon_absolute": 1.0}, "either epsilon"),
         ("chks", {"epsilon": 0.0}, "> 0"),
         ("chks", {"epsilon": -1.0}, "> 0"),
         ("chks", {"epsilon_absolute": math.nan}, "finite"),

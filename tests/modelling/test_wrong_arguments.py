@@ -190,9 +190,9 @@ def test_a_contradiction_names_effects_and_places(square: hvi.Body) -> None:
     ("made", "reason"),
     [
         (lambda model: hvi.read_scene(3), "^path: must be a path.* .is 3"),  # type: ignore[arg-type]
-        (lambda model: hvi.study(model, True), "^study: TypeError"),
-        (lambda model: hvi.solve(model, estimate=False).write(True), "^write: TypeError"),
-        (lambda model: hvi.solve(model, estimate=False).plot([1.0]), "^plot: TypeError"),
+        (lambda model: hvi.study(model, True), "^folder: must be a path.* .is True"),
+        (lambda model: hvi.solve(model, estimate=False).write(True), "^folder: must be a path.* .is True"),
+        (lambda model: hvi.solve(model, estimate=False).plot([1.0]), "^picture: must be the name.* .is .1.0"),
     ],
 )
 def test_a_value_of_another_kind_is_refused_in_words(square: hvi.Body, made: Any, reason: str) -> None:
