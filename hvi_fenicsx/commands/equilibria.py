@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from ..results.summary import common
 from ..results.whole import made, write_record, write_whole
 from ..runtime import writing
 from ..runtime.mpi import largest, on_root, time_over
-from ..runtime.writing import understood
 from ..workflow import Preparation, Solution, prepare
 from . import session
 from .session import COMM, LOG, Record, Session, say, tell_moving
@@ -61,17 +59,17 @@ def execute(options: argparse.Namespace) -> int:
 def _run(call: Session) -> int:
     """Search, write and tell; the exit code. Collective."""
     options, kept = call.options, _StateFile(call)
-    saved = next(iter(call.begin_journal(JOURNAL)), None)
+    known = call.begin_journal(JOURNAL)
     prepared = prepare(call.scene, COMM, call.timer)
     say(console.heading(prepared, COMM.size))
     bodies, late = Equilibria(prepared, interrupted=call.interrupted), time_over(COMM, options.limit)
-    with understood(call.folder.target / JOURNAL) if saved else nullcontext():
+    with call.going_on(JOURNAL, known):
         found = bodies.find(
             lowest=options.lowest,
             gap=options.gap,
             stop=lambda: call.interrupted() or late(),
             report=tell_moving,
-            saved=saved,
+            saved=next(iter(known), None),
             keep=kept.keep,
         )
     if found.left:

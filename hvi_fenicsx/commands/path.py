@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import nullcontext
 
 from .. import console
 from ..load_paths import path_files
@@ -11,7 +10,7 @@ from ..load_paths.following import PathRun
 from ..model import Model, PathTable
 from ..paths.state import End
 from ..runtime.mpi import on_root
-from ..runtime.writing import Record, understood
+from ..runtime.writing import Record
 from ..workflow import prepare
 from . import session
 from .session import COMM, LOG, Session, say, tell_moving
@@ -48,7 +47,7 @@ def _run(call: Session) -> int:
         kind = ", unstable" if record["unstable"] else ""
         tell_moving(f"row {len(run.states) - 1}, factor {record['factor']:.6g}{kind}: {record['event']}{place}")
 
-    with understood(call.folder.target / path_files.JOURNAL) if known else nullcontext():
+    with call.going_on(path_files.JOURNAL, known):
         if known:
             say([f"{len(known)} rows are there already; on from factor {known[-1]['factor']:.6g}"])
         path = run.follow(known, keep, call.interrupted)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,6 +57,15 @@ class Session:
         target = self.folder.target
         others = f"{__version__} {COMM.size} {inputs_of(self.scene, target)}"
         return on_root(COMM, lambda: self.folder.begin_journal(name, [dump_scene(self.scene, target), others]))
+
+    def going_on(self, name: str, known: Sequence[Record]) -> AbstractContextManager[None]:
+        """Whatever comes of records that a journal had is told of its file.
+
+        Args:
+            name: of the journal.
+            known: the records.
+        """
+        return understood(self.folder.target / name) if known else nullcontext()
 
 
 def execute(
