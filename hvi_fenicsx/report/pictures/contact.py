@@ -28,6 +28,7 @@ from .style import (
     WIDTH,
     few_ticks,
     figure,
+    fill,
     heading,
     pressure_scale,
     shades,
@@ -170,10 +171,10 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
     if field.kind != "pressure":
         colours, low = shades("#f4f4f1", field.colour), 0.0
     mesh, idle = flat.mesh, part.idle[flat.facets].all(axis=1)
-    drawn = axes.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=low, vmax=high or 1.0)
+    drawn = fill(axes, mesh, values, (low, high or 1.0), cmap=colours)
     if idle.any():
         grey = Triangulation(mesh.x, mesh.y, flat.facets[idle])
-        axes.tripcolor(grey, np.zeros(len(values)), cmap="gray", vmin=-1, vmax=1, alpha=0.45, antialiased=False)
+        fill(axes, grey, np.zeros(len(values)), (-1.0, 1.0), cmap="gray", alpha=0.45)
     bar = fig.colorbar(drawn, ax=axes, ticks=None if largest > 0.0 else [0.0], aspect=12)
     bar.outline.set_visible(False)  # type: ignore[operator]
     axes.set_title(f"{field.words} in {field.unit.name}", loc="left", size=14, parse_math=True)

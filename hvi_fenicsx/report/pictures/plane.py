@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import TriMesh
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -23,7 +22,7 @@ from ..solution_arrays import NOTHING
 from ..units import quantity
 from .canvas import CONTACT, Canvas
 from .shape import ARROW, TINTS, DeformedBody, HeldSide, PartGeometry, Region, Side, sparse
-from .style import GREY, INK, ORANGE, PURPLE, VERMILION
+from .style import GREY, INK, ORANGE, PURPLE, VERMILION, fill
 
 LEGIBLE = 5000
 """Cells up to which their edges are drawn, in a square body."""
@@ -56,12 +55,11 @@ class PlaneCanvas(Canvas):
         self.key(Line2D([], [], color=GREY, label="undeformed outline", **dashed))
 
     def _fill(self, points: Array, cells: Integers, values: Any, end: float, cmap: Colormap) -> None:
-        """Fill cells in the colours of values by vertex, or by corner of each cell: matplotlib's quickest way."""
+        """Fill cells in the colours of values by vertex, or by corner of each cell."""
         if len(values) == cells.size:
             points, cells = points[cells].reshape(-1, 2), np.arange(cells.size).reshape(-1, 3)
         x, y = points.T
-        mesh = TriMesh(Triangulation(x, y, cells), array=values, zorder=1, clim=(0.0, end), cmap=cmap)
-        self.axes.add_collection(mesh, autolim=False)  # limits would be those of a path for each cell: slow
+        fill(self.axes, Triangulation(x, y, cells), values, (0.0, end), zorder=1, cmap=cmap)
 
     def show(self, shape: DeformedBody, areas: Sequence[Region]) -> None:
         """Draw the body at rest, its regions in their tints.

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import TriMesh
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from ...runtime import writing
+from ...typing import Array
 from ..page import CAPTION
 from ..reader import Result
 from ..solution_arrays import NOTHING
@@ -132,6 +135,23 @@ def titled(fig: Figure, title: str, below: str, words: str = "", colour: str = I
     bold = fig.text(right, at, words, size=12, weight="bold", color=colour, ha="right")
     wide, other = (text.get_window_extent().width / fig.dpi for text in (grey, bold))
     grey.set_fontsize(min(12.0, 12.0 * (WIDTH - 0.8 - other) / wide))  # it is never written into what is at its right
+
+
+def fill(axes: Axes, mesh: Triangulation, values: Array, ends: tuple[float, float], **look: Any) -> TriMesh:
+    """Fill triangles in the colours of values at their corners: matplotlib's quickest way, without a path for each.
+
+    Args:
+        axes: where to.
+        mesh: the triangles.
+        values: at its points, (n,).
+        ends: the values at the ends of the colours.
+        look: as for matplotlib's collections.
+    """
+    filled = TriMesh(mesh, array=values, clim=ends, **look)
+    axes.add_collection(filled, autolim=False)  # matplotlib's own limits are those of the paths
+    axes.update_datalim(np.column_stack([mesh.x, mesh.y]))
+    axes.autoscale_view()
+    return filled
 
 
 def few_ticks(axes: Axes, axis: Literal["x", "y"], most: int = 4) -> None:
