@@ -192,7 +192,7 @@ class Analysis:
         """Unit rigid coefficients (3|6,) of y, small ones dropped if f stays as low and y in the cone."""
         z = self.reduced.frame @ y
         z, limit = z / np.abs(z).max(), self.programme.evaluate(f, y) / np.abs(z).max() + self.tie
-        for snap in 10.0 ** -np.arange(1.0, 10.0):
+        for snap in np.geomspace(0.1, DEFAULT.rounding, 9):
             short = np.where(np.abs(z) <= snap, 0.0, z)
             trial = np.linalg.lstsq(self.reduced.frame, short, rcond=None)[0]
             off = max(np.abs(self.reduced.frame @ trial - short).max(), (f.cone @ trial).max(initial=0.0))

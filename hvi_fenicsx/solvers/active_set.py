@@ -20,12 +20,13 @@ from typing_extensions import override
 
 from ..compat import NOT_A_NUMBER
 from ..runtime.cost import Timer
+from ..runtime.mpi import largest
 from ..system.equations import VertexModel
 from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.multigrid import Levels
 from ..system.petsc_options import default_options, prefix, raise_python_error
 from ..system.system import System
-from ..typing import Array, Entities, Mask
+from ..typing import Array, Entities, Mask, magnitude
 from .convergence import ConvergenceTest, Counts, Outcome, Sizes
 
 StepReport = Callable[[int, float, int], None]
@@ -225,7 +226,7 @@ class _Run(ABC):
         self, owner: ActiveSetSolver, attempt: Attempt, tolerance: float, bounds: Bounds, x: PETSc.Vec
     ) -> None:
         self._owner, self._attempt, self._tolerance, self._bounds = owner, attempt, tolerance, bounds
-        self._start = x.copy()
+        self._start = x.array_r.copy()
         self._system, self._thresholds = owner.system, owner.system.thresholds
 
     @abstractmethod
@@ -245,7 +246,7 @@ class _Run(ABC):
         before, self._last = self._last, owner.convergence.sizes(x, residual, *self._bounds).worst
         if owner.progress:
             owner.progress(iteration, self._last, owner.convergence.in_contact(x))
-        self._far = (x - self._start).norm(PETSc.NormType.INFINITY) > self._thresholds.runaway
+        self._far = largest(self._system.comm, magnitude(x.array_r - self._start)) > self._thresholds.runaway
         if self._last <= self._tolerance and not self._far:
             return reasons.CONVERGED_FNORM_RELATIVE
         self._stopped = owner.interrupted()

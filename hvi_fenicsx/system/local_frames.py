@@ -18,7 +18,7 @@ from scipy.linalg import null_space
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
-from ..typing import Array, Entities
+from ..typing import Array, Entities, Integers
 from .thresholds import DEFAULT
 
 
@@ -96,18 +96,20 @@ def frames_of(problem: Problem) -> LocalFrames:
     Args:
         problem: the problem.
     """
-    d, fixed = problem.dimension, {int(dof) for dof in problem.fixed}
+    d = problem.dimension
     blocks = np.concatenate([np.empty(0, np.int32), *(s.blocks for s in problem.surfaces)])
     normals = np.concatenate([np.empty((0, d)), *(s.normals for s in problem.surfaces)])
     here = np.isin(blocks, blocks[np.count_nonzero(normals, axis=1) > 1])
     found: dict[int, list[Array]] = {}
     for block, normal in zip(blocks[here], normals[here], strict=True):
         found.setdefault(int(block), []).append(normal)
-    axes = [_axes(each, [i for i in range(d) if block * d + i in fixed], d) for block, each in found.items()]
-    return LocalFrames(np.array(list(found), dtype=np.int32), np.array(axes).reshape(-1, d, d))
+    slanted = np.array(list(found), dtype=np.int32)
+    held = np.isin(slanted[:, None] * d + np.arange(d), problem.fixed)
+    axes = [_axes(each, np.flatnonzero(own), d) for each, own in zip(found.values(), held, strict=True)]
+    return LocalFrames(slanted, np.array(axes).reshape(-1, d, d))
 
 
-def _axes(normals: Sequence[Array], held: Sequence[int], d: int) -> Array:
+def _axes(normals: Sequence[Array], held: Integers, d: int) -> Array:
     """Local axes as rows: the prescribed components, the normals, orthogonal or equal to these; others near axes."""
     rows: dict[int, Array] = {i: np.eye(d)[i] for i in held}
     for normal in normals:
