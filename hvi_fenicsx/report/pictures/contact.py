@@ -174,7 +174,8 @@ def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Fiel
     drawn = fill(axes, mesh, values, (low, high or 1.0), cmap=colours)
     if idle.any():
         grey = Triangulation(mesh.x, mesh.y, flat.facets[idle])
-        fill(axes, grey, np.zeros(len(values)), (-1.0, 1.0), cmap="gray", alpha=0.45)
+        # seams would be seen through colours that are blended at corners
+        axes.tripcolor(grey, np.zeros(len(values)), cmap="gray", vmin=-1, vmax=1, alpha=0.45, antialiased=False)
     bar = fig.colorbar(drawn, ax=axes, ticks=None if largest > 0.0 else [0.0], aspect=12)
     bar.outline.set_visible(False)  # type: ignore[operator]
     axes.set_title(f"{field.words} in {field.unit.name}", loc="left", size=14, parse_math=True)
