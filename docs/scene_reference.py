@@ -11,7 +11,6 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
-from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from hvi_fenicsx.effects import Effect, Place
@@ -20,7 +19,7 @@ from hvi_fenicsx.laws.base import registered
 from hvi_fenicsx.mesh.shapes import DomainShape
 from hvi_fenicsx.model.content import PathTable, SolverTable
 from hvi_fenicsx.model.reader import BodyTable, BoundaryTable, InterfaceTable, MaterialTable, TopLevel
-from hvi_fenicsx.schema import OneOf
+from hvi_fenicsx.schema import OneOf, Table, meanings
 
 T = TypeVar("T")
 
@@ -80,7 +79,7 @@ def _document() -> Iterator[str]:
     yield from _table("`[path]`", PathTable)
 
 
-def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None) -> Iterator[str]:
+def _table(title: str, model: type[Table], only: Iterable[str] | None = None) -> Iterator[str]:
     yield from (f"## {title}", "", _summary(model), "", "| key | value | default |", "|---|---|---|")
     for name in only or model.model_fields:
         yield _row(model, name)
@@ -90,7 +89,7 @@ def _table(title: str, model: type[BaseModel], only: Iterable[str] | None = None
 def _effects(place: Place, title: str) -> Iterator[str]:
     for key, kind in _provided(Effect.registry[place]).items():
         yield from (f"### {title.format(key=key)}", "", f"{_summary(kind)} Adds `{kind.term}`.", "")
-        fields = [name for name, field in kind.model_fields.items() if field.description]
+        fields = [name for name in kind.model_fields if name in meanings(kind)]
         if fields:
             yield from ("| key | value | default |", "|---|---|---|")
             yield from (_row(kind, name) for name in fields)
@@ -110,9 +109,9 @@ def _parameter(parameter: inspect.Parameter) -> str:
     return f"`{parameter.name}`{default}"
 
 
-def _row(model: type[BaseModel], name: str) -> str:
+def _row(model: type[Table], name: str) -> str:
     field = model.model_fields[name]
-    text = field.description or ""
+    text = meanings(model).get(name, "")
     value = ", ".join(filter(None, [_escaped(text), _limits(field), _choices(field)]))
     required = field.is_required() or (name == "shape" and issubclass(model, DomainShape))  # its name tells the kind
     default = "required" if required else _toml(field.get_default(call_default_factory=True))

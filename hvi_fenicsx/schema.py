@@ -5,11 +5,15 @@ Light: it loads pydantic and nothing heavier, and knows no particular table.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
 import os
 import re
+import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self, TypeVar
 
@@ -96,8 +100,8 @@ def _message(error: ErrorDetails, table: type[Table]) -> str:
     """What is allowed and what is there, without pydantic's own terms."""
     kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
     if kind == "missing":
-        field = table.model_fields.get(str(error["loc"][-1]))
-        return "is missing" + (f": {field.description}" if field and field.description else "")
+        meaning = meanings(table).get(str(error["loc"][-1]))
+        return "is missing" + (f": {meaning}" if meaning else "")
     if kind == "extra_forbidden":
         return unknown("key", str(error["loc"][-1]), table.allowed_keys())
     if kind == "literal_error":
@@ -181,10 +185,26 @@ def mistakes_of(error: ValidationError, table: type[Table]) -> list[Mistake]:
     return [Mistake(tuple(e["loc"]), _message(e, table)) for e in found]
 
 
+def meanings(table: type[Table]) -> dict[str, str]:
+    """What the source says below the fields of a table; only read when it is asked for, since that takes long.
+
+    Args:
+        table: the table.
+    """
+    found: dict[str, str] = {}
+    for kind in (kind for kind in reversed(table.__mro__) if issubclass(kind, Table)):
+        body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
+        for pair in pairwise(body):
+            match pair:
+                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                    found[name] = inspect.cleandoc(text)
+    return found
+
+
 class Table(BaseModel):
     """A table of the scene file: frozen, no unknown keys, no silent conversions."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     @model_validator(mode="wrap")
     @classmethod

@@ -91,7 +91,7 @@ class ContactState:
     @property
     def resultant(self) -> Array:
         """The resultant of :attr:`pressure` on this rank's nodes, in units of force, (d,)."""
-        return np.asarray((self.surface.weights[:, None] * self.pressure[:, None] * self.surface.normals).sum(axis=0))
+        return (self.surface.weights[:, None] * self.pressure[:, None] * self.surface.normals).sum(axis=0)
 
     def branch(self, *directions: Direction) -> Integers | None:
         """The active piece of the law in one of these directions, (m,); None where there is no such law."""

@@ -162,7 +162,7 @@ def _doubt(system: System, motions: Motions) -> str | None:
             f"a law falls, and it was not tried whether the body is stiffer: more than {UNIQUENESS.most_on_boundary} "
             f"unknowns on Γc, or {UNIQUENESS.most_unknowns[system.problem.dimension - 2]:,} in all"
         )
-    each = [np.asarray(fall / term.stretch, dtype=np.float64) for term, fall in zip(system.terms, falls, strict=True)]
+    each = [fall / term.stretch for term, fall in zip(system.terms, falls, strict=True)]
     if (moved := _moved(system, motions, each)) is not None:
         return f"a law falls, and only laws and contact hold the motion {moved}"
     return None if _stiffer(system, motions, each) else "a law falls more steeply than the body is stiff"

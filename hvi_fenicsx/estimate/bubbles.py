@@ -45,7 +45,7 @@ def collected(space: fem.FunctionSpace, parts: Iterable[LocalForces]) -> Array:
     for blocks, values in parts:
         np.add.at(forces, blocks, values)
     field.x.scatter_reverse(la.InsertMode.add)
-    return np.array(forces[: space.dofmap.index_map.size_local])
+    return forces[: space.dofmap.index_map.size_local]
 
 
 Index = tuple[int, ...]

@@ -198,11 +198,7 @@ def surface_compliance(stiffness: Array, corners: Array) -> Array:
     d = corners.shape[1]
     sides = np.asarray((corners[:, 1:] - corners[:, :1])[:, :, :d], dtype=np.float64)
     along = _unit(sides[:, 0])
-    normals = (
-        np.stack([along[:, 1], -along[:, 0]], axis=1)
-        if d == 2
-        else _unit(np.asarray(np.cross(along, sides[:, 1]), dtype=np.float64))
-    )
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) if d == 2 else _unit(np.cross(along, sides[:, 1]))
     waves = [along]
     if d == 3:
         across, angles = np.cross(normals, along), np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS

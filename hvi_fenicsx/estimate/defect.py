@@ -228,7 +228,7 @@ class LeastEnergy:
 
     def _guess(self) -> Array:
         """What the diagonal alone makes of the load, and what is prescribed, (n, d)."""
-        found = np.asarray(self.residual * self._stiffness.inverse)
+        found = self.residual * self._stiffness.inverse
         for part in self._parts:
             part.put_on_bounds(found)
         return found

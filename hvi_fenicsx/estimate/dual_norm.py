@@ -156,7 +156,7 @@ def algebraic(problem: Problem, examination: Examination) -> Array:
             possible = (state.on_upper & (p <= 0)) | (state.on_lower & (p >= 0))
             force = np.where(possible, 0.0, state.surface.weights * p)
             rest[state.surface.blocks] += force[:, None] * state.surface.normals
-    return np.asarray(rest)
+    return rest
 
 
 def penetration_energy(problem: Problem, states: Sequence[ContactState]) -> float:

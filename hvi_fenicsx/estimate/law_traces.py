@@ -142,7 +142,7 @@ class LawTraces:
         """
         solved, (asked, slip) = self.of_u(state, law), self._asked(state, law, error)
         k, of_law, length = slip.shape[2], solved.nodal / solved.multiplier, law.term.length
-        near = np.asarray(CERTIFICATE.near / solved.stretch, dtype=np.float64).ravel()
+        near = np.ravel(CERTIFICATE.near / solved.stretch)
         traction = nearest(asked, length, slip.reshape(-1, k), of_law.reshape(-1, k), near)
         return solved.multiplier * traction.reshape(slip.shape)
 
@@ -196,7 +196,7 @@ class LawTraces:
                 multiplier=points.interpolated(law.term.multiplier[:, None]),
                 stretch=stretch,
                 nodal=points.interpolated(law.carried, along=True),
-                sticks=np.asarray(on_kink > 1 - CERTIFICATE.near),
+                sticks=on_kink > 1 - CERTIFICATE.near,
                 nodewise=points.of_field(self.u, "hats") / stretch,
                 slip=points.of_field(self.u) / stretch,
             )

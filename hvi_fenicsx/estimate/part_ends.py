@@ -101,7 +101,7 @@ def _areas(problem: Problem, facets: Entities) -> Array:
     owned = references.lumped(problem, facets) / problem.scales.length ** (problem.dimension - 1)
     found.array[: len(owned)] = owned
     found.scatter_forward()
-    return np.asarray(found.array, dtype=np.float64)
+    return found.array
 
 
 def _means(problem: Problem, facets: Entities, forces: Array, areas: Array, counted: Mask) -> Array:
@@ -226,7 +226,7 @@ def _loads(problem: Problem, part: _Part) -> Array:
         if load.pressure is not None and load.pressure.everywhere:
             there -= on.of(load.pressure)[:, :, None] * _outward(problem, on)[:, None]
         found += np.where(missing[:, :, None] == 0.0, 0.0, missing[:, :, None] * there)
-    return np.asarray(found / problem.scales.stress)
+    return found / problem.scales.stress
 
 
 def _sums(problem: Problem, part: _Part) -> Array:
@@ -239,7 +239,7 @@ def _sums(problem: Problem, part: _Part) -> Array:
         moments = domain_forms.of_points(problem.comm, at[:, :d], areas)
         for effect in spread:
             found += sign * counted[:, :, None] * effect.spread_at(moments, at).reshape(found.shape)
-    return np.asarray(found / problem.scales.stress)
+    return found / problem.scales.stress
 
 
 def _of_loads(problem: Problem, inverse: DualNorm, parts: Sequence[_Part], lacking: Sequence[Array]) -> Array:
@@ -257,7 +257,7 @@ def _of_loads(problem: Problem, inverse: DualNorm, parts: Sequence[_Part], lacki
         return cells
     missing = collected(problem.space, forces)
     energy = problem.bulk.energy_by_cell(inverse.solve(problem.combined(missing))[0])
-    return np.asarray(total(comm, float(energy.sum())) * cells / whole)
+    return total(comm, float(energy.sum())) * cells / whole
 
 
 def _outward(problem: Problem, on: FacetModes) -> Array:

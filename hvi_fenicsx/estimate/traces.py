@@ -245,13 +245,13 @@ class Shared:
         """Values at the owned ones (m, ...) by facet, (f, k, ...). Collective."""
         every = np.zeros((self.count, *values.shape[1:]))
         every[self.own] = values
-        return np.asarray(self.comm.allreduce(every)[self.at])
+        return self.comm.allreduce(every)[self.at]
 
     def summed(self, values: Array) -> Array:
         """Sums of values (f, k, ·) of facets at the owned ones, (m, ·). Collective."""
         every = np.zeros((self.count, values.shape[2]))
         np.add.at(every, self.at, values)
-        return np.asarray(self.comm.allreduce(every)[self.own])
+        return self.comm.allreduce(every)[self.own]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -292,7 +292,7 @@ def _of_interface(problem: Problem, space: fem.FunctionSpace, side: Facets, name
     nodes_of, found = (np.concatenate(parts) for parts in zip(*agree(problem.comm, own), strict=True))
     numbers = np.empty_like(found)
     numbers[np.lexsort(side.nodes.T)] = found[np.lexsort(nodes_of.T)]
-    return np.asarray(numbers)
+    return numbers
 
 
 def _numbers(space: fem.FunctionSpace, blocks: Entities) -> Integers:
@@ -424,7 +424,7 @@ class Spread(Shared):
         the rows of the problem (:mod:`.dual_basis`) say by how much. So a uniform traction has the problem's own
         nodal forces. Collective.
         """
-        return np.asarray(self.summed(np.where(self.kept[:, :, None], values, 0.0)) * self.shares)
+        return self.summed(np.where(self.kept[:, :, None], values, 0.0)) * self.shares
 
 
 def _of_carriers(problem: Problem, interface: Interface) -> Spread:

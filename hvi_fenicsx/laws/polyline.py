@@ -243,7 +243,7 @@ class SampledLaw(PolylineLaw):
     def piece(self, x: Array) -> Integers:
         """Number (m,) of ends between 0 and x."""
         slip = np.maximum(x, 0.0) if self.one_sided else np.abs(x)
-        return np.asarray(np.searchsorted(np.asarray(self.ends(), dtype=float), slip, side="right"), dtype=np.int64)
+        return np.searchsorted(self.ends(), slip, side="right")
 
     @property
     @override

@@ -135,7 +135,7 @@ class Measures:
         for name, force in self._system.forces.items():
             if name.rpartition(".")[0] == part:
                 found[int(name in self._scaled)] += force.array_r[component :: self._scales.dimension].sum()
-        return np.asarray(self._system.comm.allreduce(found))
+        return self._system.comm.allreduce(found)
 
 
 def driven(problem: Problem) -> Iterator[str]:

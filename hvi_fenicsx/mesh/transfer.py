@@ -132,8 +132,9 @@ def weighted_rows(numbers: Numbers, weights: Array, d: int) -> Rows:
     sums = sparse.csr_array((weights.ravel(), numbers.ravel(), np.arange(0, n * k + 1, k, dtype=numbers.dtype)), shape)
     sums.sum_duplicates()
     sums.eliminate_zeros()
-    whole = sparse.kron(sums, sparse.identity(d), format="csr")
-    return whole.indptr.astype(PETSc.IntType), whole.indices.astype(PETSc.IntType), whole.data
+    rows = sums[np.repeat(np.arange(n), d)]  # a Kronecker product takes six times as long
+    columns = d * rows.indices + np.repeat(np.arange(n * d) % d, np.diff(rows.indptr))
+    return rows.indptr.astype(PETSc.IntType), columns.astype(PETSc.IntType), rows.data
 
 
 def _sizes(space: fem.FunctionSpace) -> tuple[int, int]:

@@ -159,4 +159,4 @@ class StateOnGraphs:
             columns = CellColumns(slope=self._points.slope, rise=self._points.rise, driver=None, factor=load)
             return self._points.elastic.inverse(columns).solve(load)
         matrix = self._points.jacobian(self._points.values(self._z))
-        return np.asarray(np.linalg.lstsq(matrix, load, rcond=ROUNDING)[0])
+        return np.linalg.lstsq(matrix, load, rcond=ROUNDING)[0]

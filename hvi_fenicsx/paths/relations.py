@@ -119,7 +119,7 @@ class ContactPoints(PointStatuses):
         Args:
             values: of the points.
         """
-        return np.asarray(np.abs(values.lengths) <= DEFAULT.reached * self.length)
+        return np.abs(values.lengths) <= DEFAULT.reached * self.length
 
     def allowances(self, values: Values, rates: Array, fastest: float) -> Array:
         """How near to an end of its segment a point is there, (m,): on a steep segment a short way is a large force.
@@ -315,7 +315,7 @@ class ContactPoints(PointStatuses):
 
     def reach(self, values: Values) -> Array:
         """How far the curved points may move in one step, in units of s, (m,); infinite for the others."""
-        return np.asarray(self._deviations.reach(values.lengths, DEFAULT.reach) / self.length)
+        return self._deviations.reach(values.lengths, DEFAULT.reach) / self.length
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -226,7 +226,7 @@ class PointStatuses(PointLaws):
     @property
     def moving(self) -> Mask:
         """The points whose displacements move, (m,)."""
-        return np.asarray(self._moves != 0.0)
+        return self._moves != 0.0
 
     @property
     def slope(self) -> Array:

@@ -59,6 +59,8 @@ class MeshBodies:
             blocks: their local numbers, (m,).
             body: one of these.
         """
+        if len(body.bodies) == 1:  # all at once: twice as quick
+            return rigid_fields(points, body.bodies[0])
         found = np.zeros((len(points), body.motions, body.dimension))
         for number, one in enumerate(body.bodies):
             here = np.flatnonzero(self.members[blocks] == number)
@@ -79,7 +81,7 @@ class MeshBodies:
 
 def whole(domain: Domain) -> RigidBody:
     """All that a domain is made of, as one body."""
-    return RigidBody(domain.dimension, np.asarray(domain.centre / domain.length), domain.length)
+    return RigidBody(domain.dimension, domain.centre / domain.length, domain.length)
 
 
 def find(domain: Domain, space: fem.FunctionSpace, points: Array, meetings: Sequence[Entities] = ()) -> MeshBodies:

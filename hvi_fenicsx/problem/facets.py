@@ -102,7 +102,7 @@ def across(slopes: Array) -> Array:
     """
     if slopes.shape[2] == 2:
         return np.column_stack([slopes[:, 0, 1], -slopes[:, 0, 0]])
-    return np.asarray(np.cross(slopes[:, 0], slopes[:, 1]), dtype=np.float64)
+    return np.cross(slopes[:, 0], slopes[:, 1])
 
 
 @dataclass(frozen=True, kw_only=True)

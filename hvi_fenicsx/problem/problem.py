@@ -231,6 +231,10 @@ class Problem:
     def _own(self) -> SharedObjects:
         return SharedObjects()
 
+    def forget(self) -> None:
+        """Keep nothing that was made once for this problem alone: on several ranks its PETSc objects outlive it."""
+        self.__dict__.pop("_own", None)
+
     @functools.cached_property
     def coupling(self) -> Coupling | None:
         """The way between displacements and unknowns; None where both are the same. Collective when first used."""

@@ -235,5 +235,5 @@ def _motions(problem: Problem) -> list[tuple[Integers, int, Array]]:
         places = (blocks[:, None] * d + np.arange(d)).ravel()
         values, owned = fields.reshape(len(fields), -1), d * int(np.count_nonzero(blocks < here))
         factor = np.linalg.cholesky(problem.comm.allreduce(values[:, :owned] @ values[:, :owned].T))
-        every.append((places, owned, np.asarray(np.linalg.solve(factor, values))))
+        every.append((places, owned, np.linalg.solve(factor, values)))
     return every

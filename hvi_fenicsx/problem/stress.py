@@ -123,7 +123,7 @@ def _nearest(space: fem.FunctionSpace, work: Any) -> Array:
         mass.append(masses.values().reshape(len(right[0]), basis))
     if basis == 1:  # a division, a tenth of the time
         return np.stack(right, axis=1) / mass[0][:, None]
-    return np.asarray(np.linalg.solve(np.stack(mass, axis=1), np.stack(right, axis=1)))
+    return np.linalg.solve(np.stack(mass, axis=1), np.stack(right, axis=1))
 
 
 def _each_basis_function(weight: fem.Function) -> Iterator[None]:

@@ -69,7 +69,7 @@ def _strain_of_parts(problem: Problem, u: Array) -> Array:
     slopes: Array = np.asarray(lagrange.tabulate(1, nodes.middles_of_parts(space)[:, 1:]))[1:, :, :, 0]
     cells = nodes.owned_cells(space)
     found = np.zeros((len(cells), slopes.shape[1], 3, 3))
-    positions, rises = (np.einsum("kpn,cni->cpki", slopes, v[cells, :d]) for v in (problem.positions, u))
+    positions, rises = (np.einsum("kpn,cni->cpki", slopes, v[cells, :d], optimize=True) for v in (problem.positions, u))
     gradient = np.linalg.solve(positions, rises)
     found[:, :, :d, :d] = (gradient + gradient.swapaxes(2, 3)) / 2
     return found.reshape(-1, 3, 3)

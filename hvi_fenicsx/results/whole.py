@@ -163,9 +163,7 @@ def write_table(file: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]
 
 
 def _text(cell: Any) -> Any:
-    if isinstance(cell, float):
-        return repr(float(cell)) if math.isfinite(cell) else ""
-    return "" if cell is None else cell
+    return "" if isinstance(cell, float) and not math.isfinite(cell) else cell
 
 
 def contact_rows(parts: Mapping[str, ContactPart]) -> Iterator[tuple[Any, ...]]:

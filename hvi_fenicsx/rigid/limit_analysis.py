@@ -45,7 +45,7 @@ class Analysis:
     @cached_property
     def work(self) -> Array:
         """Work of the whole load on the kernel's basis, (k,)."""
-        return np.asarray(sum(self.reduced.loads.values(), np.zeros(self.reduced.frame.shape[1])))
+        return sum(self.reduced.loads.values(), np.zeros(self.reduced.frame.shape[1]))
 
     @cached_property
     def tie(self) -> float:

@@ -197,7 +197,7 @@ def kernel(comm: MPI.Comm, body: JoinedBodies, fixed: Sequence[Array]) -> Array:
     rows = np.vstack([np.zeros((0, body.motions)), *fixed])
     factors = comm.gather(triangle(rows), root=0)
     basis = None if factors is None else natural_basis(null_space(np.vstack(factors)), body.shifts)
-    return np.asarray(comm.bcast(basis, root=0))
+    return comm.bcast(basis, root=0)
 
 
 def modes(basis: Array, body: JoinedBodies) -> tuple[Mode, ...]:

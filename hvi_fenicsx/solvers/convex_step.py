@@ -169,7 +169,7 @@ class ConvexStep:
             How it ended, and whether x is stationary.
         """
         arguments = zip(self._laws, self.arguments(x), strict=True)
-        if not self.anywhere([np.asarray(law.concave.second(a) > 0) for law, a in arguments]):
+        if not self.anywhere([law.concave.second(a) > 0 for law, a in arguments]):
             return outcome, False
         trial = x.copy()
         found, stationary = self.newton(trial, cells)

@@ -170,7 +170,7 @@ def _pulls(term: LawTerm, forces: Array) -> Array:
     """The tractions that carry minus the forces (n,) along a law's components, each alone, times area, (m, k)."""
     along = -np.einsum("mkd,md->mk", term.directions, term.surface.values(forces) * term.free) / _factors(term)
     along[:, _opens(term)] = np.maximum(along[:, _opens(term)], 0.0)
-    return np.asarray(along)
+    return along
 
 
 def _factors(term: LawTerm) -> Array:

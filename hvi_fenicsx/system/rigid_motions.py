@@ -238,7 +238,7 @@ class NetForces:
     @property
     def _acts(self) -> Mask:
         """Along which motions anything acts at all, (j,): a body in neutral balance has none but digits of its mesh."""
-        return np.asarray(self.scale > NOTHING * self.sizes)
+        return self.scale > NOTHING * self.sizes
 
     @property
     def relative(self) -> tuple[float, float]:

@@ -291,6 +291,7 @@ class System:
         self.equations.free()
         self.jacobian.free()
         self.holding.free()
+        self.problem.forget()
         self.free_leftovers()
 
 

@@ -80,7 +80,7 @@ class PlaneCanvas(Canvas):
     def _outline(self, points: Array, loops: Sequence[Integers], *, fc: str = "none", **look: Any) -> None:
         """Draw closed chains as one path, holes included."""
         path = DrawnPath.make_compound_path(*(DrawnPath(points[loop, :2], closed=True) for loop in loops))
-        self.axes.add_patch(PathPatch(path, fc=fc, joinstyle="round", **look))
+        self.axes.add_artist(PathPatch(path, fc=fc, joinstyle="round", **look))  # its limits are those reached
         self.reached.append(points[np.concatenate(loops), :2])
 
     @override
