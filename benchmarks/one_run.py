@@ -110,9 +110,9 @@ def warm(task: Figures) -> None:
         contact(read_scene(Path(task["scene"]), [*task["overrides"], *task["warm"]]))
     elif task.get("warm", True):
         scene = read_scene(Path(task["scene"]), task["overrides"])
-        cells = (16, 16) if scene.dimension == 2 else (4, 4, 4)
+        cells = "[16, 16]" if scene.dimension == 2 else "[4, 4, 4]"
         if scene.domain.shape != "file":
-            scene = scene.with_domain(cells=cells)
+            scene = read_scene(Path(task["scene"]), [*task["overrides"], f"domain.cells={cells}"])
         contact(scene)
 
 

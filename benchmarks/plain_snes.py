@@ -36,7 +36,7 @@ def solve(system: System, tolerance: float) -> dict[str, Any]:
     snes.getKSP().getPC().setType("gamg")
     snes.solve(None, x)
     equations.residual(x, residual, models)
-    measure = solver.measure(x, residual, system.lower, system.upper)
+    measure = solver.convergence.sizes(x, residual, system.lower, system.upper).worst
     return {
         "newton": snes.getIterationNumber(),
         "linear": snes.getLinearSolveIterations(),

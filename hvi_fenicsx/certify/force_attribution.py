@@ -175,10 +175,11 @@ class Carrier:
             The force (k, d), on a segment with its hidden components, and the derivative (k, d, d).
         """
         seen, rest = wanted * self.visible, self.at_rest
-        disc, turns = self._in_disc(seen)
-        segment, moves = self._on_segment(seen)
-        both = self.visible[:, :, None] & self.visible[:, None, :]
-        return np.where(rest, disc, segment), np.where(rest[:, :, None], turns, moves) * both
+        found, slope = self._on_segment(seen)
+        if np.any(rest):
+            disc, turns = self._in_disc(seen)
+            found, slope = np.where(rest, disc, found), np.where(rest[:, :, None], turns, slope)
+        return found, slope * (self.visible[:, :, None] & self.visible[:, None, :])
 
     def _on_segment(self, wanted: Array) -> tuple[Array, Array]:
         shown = self.along * self.visible

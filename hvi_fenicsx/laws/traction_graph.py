@@ -1,7 +1,4 @@
-"""The numerical kernel of all polyline laws: tables of the pieces of a traction, one for all vertices or a row each.
-
-The rows of a table have their breaks at 0 in one column; a row with fewer breaks than others has some at -inf or inf.
-"""
+"""The numerical kernel of all polyline laws: the pieces of a traction."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers
 
 Place = TypeVar("Place", float, Array)
 
@@ -42,10 +39,10 @@ class TractionGraph:
     """A piecewise linear traction over displacement, and its primitive with the value 0 at 0.
 
     Attributes:
-        breaks: displacements (k,), strictly ascending, one of them 0; of a table with a row a vertex, (m, k).
-        left: limits from the left at the breaks, of the same shape.
-        right: limits from the right at the breaks, of the same shape.
-        slopes: of the pieces, (k+1,) or (m, k+1); the first and the last piece are unbounded.
+        breaks: displacements (k,), strictly ascending, one of them 0.
+        left: limits from the left at the breaks, (k,).
+        right: limits from the right at the breaks, (k,).
+        slopes: of the pieces, (k+1,); the first and the last piece are unbounded.
     """
 
     breaks: Array
@@ -108,64 +105,41 @@ class TractionGraph:
     def turned(self) -> TractionGraph:
         """The graph of a law that acts on -x: its traction along x."""
         parts = (-self.breaks, -self.right, -self.left, self.slopes)
-        return TractionGraph(*(part[..., ::-1] for part in parts))
+        return TractionGraph(*(part[::-1] for part in parts))
 
-    def at_vertices(self, factors: Array) -> TractionGraph:
-        """A row a vertex: of a law that acts on factor times x, the traction along x.
+    def along(self, factor: float) -> TractionGraph:
+        """The graph of a law that acts on factor times x: the traction along x.
 
         Args:
-            factors: not zero, (m,).
+            factor: not zero.
         """
-        halves = _padded(self._ahead, self.turned()._ahead)
-        size = np.abs(factors)[:, None]
-        along, against = (_HalfLine(h.places / size, h.near * size, h.far * size, h.after * size**2) for h in halves)
-        forward = factors[:, None] > 0.0
-        return _joined(_chosen(forward, against, along), _chosen(forward, along, against))
+        graph, size = self if factor > 0.0 else self.turned(), abs(factor)
+        return TractionGraph(graph.breaks / size, graph.left * size, graph.right * size, graph.slopes * size**2)
 
     def remembering(self, memory: Array) -> TractionGraph:
-        """A row a vertex, of bonds that have been so far: secants up to there, the graph beyond.
+        """The graph of a bond that has been so far: secants up to there, the graph beyond.
 
         Args:
-            memory: the least and the greatest displacement, ≤ 0 and ≥ 0, and the tractions there, (m, 4).
+            memory: the least and the greatest displacement, ≤ 0 and ≥ 0, and the tractions there, (4,).
         """
-        rows = self if self.breaks.ndim == 2 else self.at_vertices(np.ones(len(memory)))
-        low, high, low_traction, high_traction = memory.T
-        ahead, behind = rows._beyond(high, high_traction), rows.turned()._beyond(-low, -low_traction)
-        return _joined(behind, ahead)
+        low, high, low_traction, high_traction = memory
+        return _joined(self.turned()._beyond(-low, -low_traction), self._beyond(high, high_traction))
 
-    def _beyond(self, end: Array, traction: Array) -> _HalfLine:
-        """The half-line x ≥ 0: up to the end a secant, then the graph, (m, k + 1)."""
-        places, near, far, after = self._ahead
-        been, start = end > 0.0, np.where(end > 0.0, end, 0.0)
-        secant = np.divide(traction, end, out=np.zeros_like(end), where=been)
-        there = self.traction(start, "right"), _taken(self.slopes, self._pieces(start)[1])
-        first = (
-            np.zeros_like(end),
-            np.zeros_like(end),
-            np.where(been, 0.0, far[:, 0]),
-            np.where(been, secant, after[:, 0]),
-        )
-        rest = np.where(places[:, 1:] > end[:, None], places[:, 1:], np.inf), near[:, 1:], far[:, 1:], after[:, 1:]
-        columns = zip(first, (np.where(been, end, np.inf), traction, *there), rest, strict=True)
-        found = [np.column_stack(column) for column in columns]
-        order = np.argsort(found[0], axis=1, kind="stable")  # breaks that are left out, at inf, last
-        return _HalfLine(*(np.take_along_axis(part, order, axis=1) for part in found))
-
-    def row(self, i: int) -> TractionGraph:
-        """The graph of one vertex.
-
-        Args:
-            i: its number.
-        """
-        known = np.isfinite(self.breaks[i])
-        pieces = np.append(known[: self.zero], np.append(True, known[self.zero :]))
-        return TractionGraph(self.breaks[i][known], self.left[i][known], self.right[i][known], self.slopes[i][pieces])
+    def _beyond(self, end: float, traction: float) -> _HalfLine:
+        """The half-line x ≥ 0: up to the end a secant, then the graph."""
+        if end <= 0.0:
+            return self._ahead
+        rest = (part[self._ahead.places > end] for part in self._ahead)
+        _, (piece,) = self._pieces(np.array([end]))
+        beyond = self.traction(np.array([end]), "right")[0], self.slopes[piece]
+        start = (0.0, end), (0.0, traction), (0.0, beyond[0]), (traction / end, beyond[1])
+        return _HalfLine(*map(np.append, start, rest))
 
     @property
     def _ahead(self) -> _HalfLine:
         """What is at x ≥ 0."""
         z = self.zero
-        return _HalfLine(self.breaks[..., z:], self.left[..., z:], self.right[..., z:], self.slopes[..., z + 1 :])
+        return _HalfLine(self.breaks[z:], self.left[z:], self.right[z:], self.slopes[z + 1 :])
 
     @property
     def jumps(self) -> Array:
@@ -180,27 +154,26 @@ class TractionGraph:
     @cached_property
     def zero(self) -> int:
         """Index of the break at displacement 0."""
-        return int(np.argmax(np.reshape(self.breaks, (-1, self.breaks.shape[-1]))[0] == 0.0))
+        return int(np.argmax(self.breaks == 0.0))
 
     @cached_property
     def _anchor(self) -> Integers:
         """For each piece the break nearest to 0. Evaluated from there, an odd graph is odd to the bit."""
-        return np.append(np.arange(self.zero + 1), np.arange(self.zero, self.breaks.shape[-1]))
+        return np.append(np.arange(self.zero + 1), np.arange(self.zero, len(self.breaks)))
 
     @cached_property
     def _start(self) -> Array:
         """Traction of each piece at its anchor."""
-        return np.concatenate([self.left[..., : self.zero + 1], self.right[..., self.zero :]], axis=-1)
+        return np.append(self.left[: self.zero + 1], self.right[self.zero :])
 
     @cached_property
     def _energy(self) -> Array:
         """Primitive at the breaks, of their shape, summed outward from 0."""
-        z, gaps = self.zero, np.diff(np.where(np.isfinite(self.breaks), self.breaks, 0.0), axis=-1)
-        signs = np.append(-np.ones(z), np.ones(gaps.shape[-1] - z))
-        starts = np.concatenate([self.left[..., 1 : z + 1], self.right[..., z:-1]], axis=-1)
-        steps = starts * gaps * signs + 0.5 * self.slopes[..., 1:-1] * gaps**2
-        behind, ahead = np.cumsum(steps[..., :z][..., ::-1], axis=-1)[..., ::-1], np.cumsum(steps[..., z:], axis=-1)
-        return np.concatenate([behind, np.zeros_like(self.breaks[..., :1]), ahead], axis=-1)
+        z, gaps = self.zero, np.diff(self.breaks)
+        signs = np.append(-np.ones(z), np.ones(len(gaps) - z))
+        starts = np.append(self.left[1 : z + 1], self.right[z:-1])
+        steps = starts * gaps * signs + 0.5 * self.slopes[1:-1] * gaps**2
+        return np.concatenate([np.cumsum(steps[:z][::-1])[::-1], [0.0], np.cumsum(steps[z:])])
 
     def traction(self, x: Array, side: str) -> Array:
         """Limit (m,) of the traction; at a break to the bit.
@@ -212,21 +185,17 @@ class TractionGraph:
         next_break, passed = self._pieces(x)
         piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
         with np.errstate(over="ignore"):
-            distance = x - _taken(self.breaks, self._anchor[piece])
-            inside = _taken(self._start, piece) + _taken(self.slopes, piece) * distance
-        last = limits.shape[-1] - 1
-        return np.where(passed > next_break, _taken(limits, np.minimum(next_break, last)), inside)
+            inside = self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
+        return np.where(passed > next_break, limits[np.minimum(next_break, len(limits) - 1)], inside)
 
     def _pieces(self, x: Array) -> tuple[Integers, Integers]:
         """The pieces before and behind x, (m,) each; off the breaks they are one."""
-        if self.breaks.ndim == 1:
-            return self.breaks.searchsorted(x), self.breaks.searchsorted(x, side="right")
-        return np.sum(self.breaks < x[:, None], axis=1), np.sum(self.breaks <= x[:, None], axis=1)
+        return self.breaks.searchsorted(x), self.breaks.searchsorted(x, side="right")
 
     def slope(self, x: Array) -> Array:
         """Slope (m,) at x; at a break the larger of the two."""
         before, behind = self._pieces(x)
-        return np.maximum(_taken(self.slopes, before), _taken(self.slopes, behind))
+        return np.maximum(self.slopes[before], self.slopes[behind])
 
     def primitive(self, x: Array) -> Array:
         """Integral (m,) of the traction from 0 to x; inf where that is beyond the largest float."""
@@ -234,10 +203,9 @@ class TractionGraph:
         ahead, behind = self._pieces(x)
         piece = np.where(x < 0.0, behind, ahead)
         anchor = self._anchor[piece]
-        d = x - _taken(self.breaks, anchor)
-        start, half = _taken(self._start, piece), 0.5 * _taken(self.slopes, piece)
+        d, half = x - self.breaks[anchor], 0.5 * self.slopes[piece]
         with np.errstate(over="ignore"):
-            return _taken(self._energy, anchor) + (start + half * d) * d
+            return self._energy[anchor] + (self._start[piece] + half * d) * d
 
     @cached_property
     def table(self) -> Array:
@@ -272,34 +240,12 @@ class _HalfLine(NamedTuple):
 def _joined(behind: _HalfLine, ahead: _HalfLine) -> TractionGraph:
     """The graph of two half-lines; the one behind is that of the law of -x."""
     columns = (
-        (-behind.places[..., :0:-1], ahead.places),
-        (-behind.far[..., ::-1], ahead.near[..., 1:]),
-        (-behind.near[..., :0:-1], ahead.far),
-        (behind.after[..., ::-1], ahead.after),
+        (-behind.places[:0:-1], ahead.places),
+        (-behind.far[::-1], ahead.near[1:]),
+        (-behind.near[:0:-1], ahead.far),
+        (behind.after[::-1], ahead.after),
     )
-    return TractionGraph(*(np.concatenate(parts, axis=-1) for parts in columns))
-
-
-def _padded(one: _HalfLine, other: _HalfLine) -> tuple[_HalfLine, _HalfLine]:
-    """Two half-lines with equally many breaks, more of them at inf."""
-    most = max(one.places.size, other.places.size)
-
-    def filled(part: Array, end: float) -> Array:
-        return np.append(part, np.full(most - part.size, end))
-
-    first, second = (_HalfLine(filled(h.places, np.inf), *(filled(p, 0.0) for p in h[1:])) for h in (one, other))
-    return first, second
-
-
-def _chosen(first: Mask, one: _HalfLine, other: _HalfLine) -> _HalfLine:
-    return _HalfLine(*(np.where(first, a, b) for a, b in zip(one, other, strict=True)))
-
-
-def _taken(table: Array, columns: Integers) -> Array:
-    """The entry of each vertex, (m,), of one table or of its row."""
-    if table.ndim == 1:
-        return table[columns]
-    return np.take_along_axis(table, columns[:, None], axis=1)[:, 0]
+    return TractionGraph(*(np.concatenate(parts) for parts in columns))
 
 
 def _outward(breaks: Array, slopes: Array, jumps: Array, start: float) -> _HalfLine:

@@ -98,19 +98,19 @@ class VertexLaws:
         """
         return self if self.memory is None else replace(self, memory=self._reached(x, traction))
 
-    def graphs(self, ends: Array | None = None) -> TractionGraph:
-        """The table of tractions over the coordinates, a row a vertex, with memory; of a curved law its chords.
+    def graph(self, number: int, ends: Array | None = None) -> TractionGraph:
+        """The traction of a vertex over its coordinate, with memory; of a curved law its chords.
 
         Args:
+            number: the vertex.
             ends: further coordinates at which the chords of a curved law meet it, (k,).
         """
-        graph = self.law.graph or self._chords(np.empty(0) if ends is None else ends)
-        rows = graph.at_vertices(self.factors)
-        return rows if self.memory is None else rows.remembering(self.memory)
+        graph = self.law.graph or self._chords(number, np.empty(0) if ends is None else ends)
+        found = graph.along(float(self.factors[number]))
+        return found if self.memory is None else found.remembering(self.memory[number])
 
-    def _chords(self, ends: Array) -> TractionGraph:
-        places = np.outer(self.factors, np.append(ends, self._memory[:, :2])).ravel()
-        known = np.union1d(self.law.breaks, places)
+    def _chords(self, number: int, ends: Array) -> TractionGraph:
+        known = np.union1d(self.law.breaks, self.factors[number] * np.append(ends, self._memory[number, :2]))
         return TractionGraph.chords(known, self.law.left(known), self.law.right(known))
 
     def _limits(self, x: Array) -> tuple[Array, Array]:

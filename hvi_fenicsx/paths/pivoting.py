@@ -129,6 +129,7 @@ class StraightBranch(StraightEquations):
         self.rates: Array = self.variables(-self.heading * self.column)
         self.rates[self.driver] = self.heading
         self.rates[:-1] -= self.held.T @ (self.held @ self.directions)
+        self._stands = self._is_standing()
         if not self.stands:
             self.trend = int(np.sign(self.rates[FACTOR]))
 
@@ -267,6 +268,9 @@ class StraightBranch(StraightEquations):
     @property
     @override
     def stands(self) -> bool:
+        return self._stands
+
+    def _is_standing(self) -> bool:
         points = self.points
         forces = magnitude(np.where(points.moving, points.slope, points.rise) * self.directions)
         size = self._stiffest * magnitude(self.motion) + forces

@@ -200,20 +200,29 @@ class ContactPoints(PointStatuses):
             right=(rates[p] - across)[owner] * e,
         )
 
-    def unresisted(self, values: Values, rate: Array) -> Unresisted:
-        """The rigid motions that nothing resists; none while something else holds the body back.
+    def resisting(self, values: Values) -> Mask:
+        """The axes along which displacements are resisted; all of them while something else holds the body back, (n,).
 
         A length whose traction vanishes resists its own turning less and less: that is nothing before it is rounding.
 
         Args:
             values: at the point.
+        """
+        held_back = self.elastic is not self._problem.elastic
+        return held_back | ~(np.abs(self._slopes(values)) <= DEFAULT.none * self.stiffest)  # nan: it stands
+
+    def unresisted(self, values: Values, rate: Array) -> Unresisted:
+        """The rigid motions that nothing resists.
+
+        Args:
+            values: at the point.
             rate: the load that grows, (n,).
         """
-        if not len(self.rigid) or self.elastic is not self._problem.elastic:
-            return Unresisted(motions=self.rigid[:0], rate=rate)
-        stiff = np.flatnonzero(~(np.abs(self._slopes(values)) <= DEFAULT.none * self.stiffest))  # nan: it stands
-        parts = self._axes(values.directions).sparse[stiff] @ self.rigid.T
-        return Unresisted(motions=without(self.rigid, parts.T, DEFAULT.none), rate=rate)
+        if not len(self.rigid):
+            return Unresisted(motions=self.rigid, rate=rate)
+        axes = self._axes(values.directions)
+        parts = np.array([axes @ motion for motion in self.rigid])[:, self.resisting(values)]
+        return Unresisted(motions=without(self.rigid, parts, DEFAULT.none), rate=rate)
 
     def held_stiffness(self, held: Array | None) -> Array:
         """The stiffness with springs against motions that are as stiff as the body, (n, n).

@@ -58,7 +58,7 @@ def without(motions: Array, parts: Array, none: float) -> Array:
     """
     if not len(motions) or not parts.size:
         return motions
-    left, values, _ = np.linalg.svd(parts)
+    left, values, _ = np.linalg.svd(parts, full_matrices=parts.shape[1] < len(motions))
     return left[:, np.count_nonzero(values > none) :].T @ motions
 
 

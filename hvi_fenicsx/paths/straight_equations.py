@@ -6,7 +6,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..reduced.condensed_stiffness import CellColumns, CellInverse
-from ..typing import Array, magnitude
+from ..typing import Array, Mask, magnitude
 from .branch import Branch
 from .relations import ContactPoints
 from .rigid_motions import are_same, pins
@@ -38,6 +38,7 @@ class StraightEquations(Branch):
         self.points, self._constant, self.rate = points, constant, rate
         self._stiffness, self.y = points.elastic, np.append(z, factor)
         self._pins = np.zeros(len(z))
+        self._resisting: Mask = np.empty(0, dtype=bool)
         self.held: Array = np.empty((0, len(z)))
         self.column: Array = np.empty(0)
         self.hold()
@@ -54,8 +55,10 @@ class StraightEquations(Branch):
 
     def hold(self) -> bool:
         """Hold the motions that nothing resists and no load drives; whether they are others than before."""
-        if not len(self.points.rigid):
+        resisting = self.points.resisting(self.values) if len(self.points.rigid) else self._resisting
+        if np.array_equal(resisting, self._resisting):
             return False
+        self._resisting = resisting
         held = self.points.unresisted(self.values, self.rate).held
         if are_same(held, self.held):
             return False

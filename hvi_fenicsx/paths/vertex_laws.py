@@ -74,7 +74,7 @@ class VertexLaw:
     def graph(self) -> TractionGraph:
         """Traction over the coordinate, with memory; of a curved law the chords between its breaks."""
         if self._present is None:
-            self._present = self._one.graphs(np.array(self.bounds)).row(0)
+            self._present = self.laws.graph(self.number, np.array(self.bounds))
         return self._present
 
     @property

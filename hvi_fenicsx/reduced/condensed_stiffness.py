@@ -11,7 +11,6 @@ S is an array (:class:`DenseStiffness`), or known by factorisations of the whole
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from copy import copy
@@ -19,7 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg.lapack import dsytrf
+from scipy.linalg.lapack import dgetrf, dgetrs, dsytrf
 from typing_extensions import override
 
 from ..typing import Array, Mask
@@ -225,10 +224,12 @@ class DenseStiffness(CondensedStiffness):
         matrix[np.diag_indices(len(matrix))] += np.where(moving, columns.slope, columns.rise)
         if columns.driver is not None:
             matrix[:, columns.driver] = columns.factor
-        found = np.linalg.inv(matrix)
-        if not np.all(np.isfinite(found)):
+        if not matrix.size:
+            return CellInverse(np.copy, 0)  # LAPACK factorises no empty matrix
+        factors, pivots, failed = dgetrf(matrix)
+        if failed or not np.all(np.isfinite(factors)):
             raise np.linalg.LinAlgError("the tangent is singular")
-        return CellInverse(found.__matmul__, math.isqrt(len(found)))
+        return CellInverse(lambda right: dgetrs(factors, pivots, right)[0], len(factors) // 10)
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:

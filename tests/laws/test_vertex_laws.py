@@ -8,6 +8,7 @@ import pytest
 from hvi_fenicsx import laws
 from hvi_fenicsx.laws import Superpotential, VertexLaws
 from hvi_fenicsx.laws.smoothing import QUADRATIC
+from hvi_fenicsx.typing import Array
 
 DROPS = laws.Graph(((0.0, 0.0), (1.0, 2.0), (1.0, 0.5), (3.0, 0.0)))
 LAWS = [
@@ -27,6 +28,12 @@ def _rows(law: Superpotential, m: int = 60) -> tuple[VertexLaws, np.random.Gener
     return VertexLaws(law=law, factors=factors, weights=rng.random(m) + 0.1), rng
 
 
+def _on_graphs(rows: VertexLaws, what: str, x: Array, *sides: str) -> Array:
+    """What the graph of each vertex has at its coordinate."""
+    found = [getattr(rows.graph(i), what)(x[i : i + 1], *sides) for i in range(len(x))]
+    return np.concatenate(found)
+
+
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_without_memory_the_traction_is_the_derivative_of_the_law(law: Superpotential) -> None:
     rows, rng = _rows(law)
@@ -34,8 +41,8 @@ def test_without_memory_the_traction_is_the_derivative_of_the_law(law: Superpote
     rate = (rows.recoverable(x + step, x) - rows.recoverable(x - step, x)) / (2.0 * step) / rows.weights
     assert rows.traction(x, "left") == pytest.approx(rate, abs=1e-5)
     if law.graph is not None:
-        assert rows.graphs().traction(x, "right") == pytest.approx(rows.traction(x, "right"), abs=1e-13)
-        assert rows.graphs().primitive(x) == pytest.approx(law.value(rows.factors * x) - law.value(np.zeros(1)))
+        assert _on_graphs(rows, "traction", x, "right") == pytest.approx(rows.traction(x, "right"), abs=1e-13)
+        assert _on_graphs(rows, "primitive", x) == pytest.approx(law.value(rows.factors * x) - law.value(np.zeros(1)))
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -48,10 +55,9 @@ def test_a_bond_unloads_along_the_secant_and_goes_on_along_its_law(law: Superpot
     for share in (0.25, 0.75):
         assert been.traction(share * far, "left") == pytest.approx(share * turned)
     assert been.traction(1.25 * far, "right") == pytest.approx(rows.traction(1.25 * far, "right"))
-    table = been.graphs()
-    ends = table.traction(far, "left"), table.traction(far, "right")
+    ends = _on_graphs(been, "traction", far, "left"), _on_graphs(been, "traction", far, "right")
     assert np.all((np.minimum(*ends) <= turned + 1e-12) & (turned <= np.maximum(*ends) + 1e-12))
-    assert table.primitive(far) == pytest.approx(0.5 * turned * far)
+    assert _on_graphs(been, "primitive", far) == pytest.approx(0.5 * turned * far)
 
 
 def test_what_is_lost_is_the_area_between_law_and_secant() -> None:
@@ -62,14 +68,3 @@ def test_what_is_lost_is_the_area_between_law_and_secant() -> None:
     assert rows.remembering(far, traction).dissipated(np.zeros(1), np.zeros(1)) == pytest.approx(2.0 * (area - 0.25))
     spring = VertexLaws(law=laws.LinearSpring(3.0), factors=np.ones(1), weights=np.ones(1))
     assert spring.with_memory.memory is None
-
-
-def test_a_row_of_a_table_is_the_graph_of_its_vertex() -> None:
-    rows, rng = _rows(DROPS)
-    x = np.round(2.0 * rng.normal(size=60), 1)
-    table = rows.with_memory.remembering(*(0.5 * x, rows.traction(0.5 * x, "left"))).graphs()
-    one = table.row(7)
-    assert np.all(np.diff(one.breaks) > 0.0)
-    assert one.primitive(x[7:8])[0] == pytest.approx(table.primitive(x)[7])
-    for side in ("left", "right"):
-        assert one.traction(x[7:8], side)[0] == pytest.approx(table.traction(x, side)[7])
