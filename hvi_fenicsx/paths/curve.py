@@ -41,6 +41,7 @@ class CurvedBranch(Events):
     """
 
     length = _next = 0.1
+    _size = 0.0
 
     @override
     def advance(self, aim: float) -> CurveStep:
@@ -51,6 +52,8 @@ class CurvedBranch(Events):
                 move = self._tried(aim)
             except (Refused, np.linalg.LinAlgError):
                 self.length *= 0.5
+                while self.length > max(self._size, self.shortest):  # it would be the same step
+                    self.length *= 0.5
                 continue
             self.here = move.after
             if move.outcome is StepEnd.FACTOR:
@@ -99,6 +102,7 @@ class CurvedBranch(Events):
         ways, ends = self._ends()
         first, until, safe = float(np.min(ways, initial=np.inf)), self._until(aim), self._safe()
         way = min(first, until, safe)
+        self._size = way * magnitude(tangent)
         # what ends with the factor at its aim goes on from there, if at all
         if until <= way * (1.0 + 0.1 * DEFAULT.reached):
             way = until
