@@ -12,6 +12,7 @@ import os
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -186,14 +187,16 @@ def mistakes_of(error: ValidationError, table: type[Table]) -> list[Mistake]:
 
 
 def meanings(table: type[Table]) -> dict[str, str]:
-    """What the source says below the fields of a table; only read when it is asked for, since that takes long.
+    """What the source says below the fields of a table, where there is one; read when it is asked for: it takes long.
 
     Args:
         table: the table.
     """
     found: dict[str, str] = {}
     for kind in (kind for kind in reversed(table.__mro__) if issubclass(kind, Table)):
-        body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
+        body: list[ast.stmt] = []
+        with suppress(OSError, TypeError, SyntaxError):  # a class that was typed in has no source
+            body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
         for pair in pairwise(body):
             match pair:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):

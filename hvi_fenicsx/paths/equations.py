@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg.lapack import dgetrf, dgetrs
 from typing_extensions import override
 
-from ..reduced.condensed_stiffness import CellInverse
+from ..reduced.condensed_stiffness import by_factors
 from ..typing import Array, Integers, magnitude
 from .branch import Branch, Refused
 from .relations import ContactPoints, Values
@@ -347,9 +346,8 @@ class Bordered:
 
     def __init__(self, matrix: Array) -> None:
         self._row = matrix[-1].copy()
-        factors, pivots, singular = dgetrf(matrix, overwrite_a=1)
-        self._inverse = CellInverse(lambda right: dgetrs(factors, pivots, right)[0], DEFAULT.waits)
-        if singular or not self._has_tangent():
+        self._inverse = by_factors(matrix, DEFAULT.waits)
+        if not self._has_tangent():
             raise np.linalg.LinAlgError("the equations have no tangent here")
 
     def _has_tangent(self) -> bool:

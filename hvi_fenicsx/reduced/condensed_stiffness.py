@@ -110,6 +110,24 @@ class CellInverse:
         return len(self._changes) > self._most
 
 
+def by_factors(matrix: Array, most: int) -> CellInverse:
+    """The inverse of a matrix by its triangular factors.
+
+    Args:
+        matrix: the equations, (n, n); overwritten if its columns are contiguous.
+        most: columns to exchange before it is long.
+
+    Raises:
+        numpy.linalg.LinAlgError: it is singular, or not finite.
+    """
+    if not matrix.size:
+        return CellInverse(np.copy, most)  # LAPACK factorises no empty matrix
+    factors, pivots, failed = dgetrf(matrix, overwrite_a=1)
+    if failed or not np.all(np.isfinite(factors)):
+        raise np.linalg.LinAlgError("the tangent is singular")
+    return CellInverse(lambda right: dgetrs(factors, pivots, right)[0], most)
+
+
 class CondensedStiffness(ABC):
     """S, symmetric and positive semidefinite, (n, n)."""
 
@@ -224,12 +242,7 @@ class DenseStiffness(CondensedStiffness):
         matrix[np.diag_indices(len(matrix))] += np.where(moving, columns.slope, columns.rise)
         if columns.driver is not None:
             matrix[:, columns.driver] = columns.factor
-        if not matrix.size:
-            return CellInverse(np.copy, 0)  # LAPACK factorises no empty matrix
-        factors, pivots, failed = dgetrf(matrix)
-        if failed or not np.all(np.isfinite(factors)):
-            raise np.linalg.LinAlgError("the tangent is singular")
-        return CellInverse(lambda right: dgetrs(factors, pivots, right)[0], len(factors) // 10)
+        return by_factors(matrix, len(matrix) // 10)
 
     @override
     def negative_directions(self, moving: Mask, slope: Array, negligible: float) -> int:
