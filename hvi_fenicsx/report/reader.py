@@ -17,14 +17,12 @@ from ..geometry import ROUNDING
 from ..typing import Array, Mask, magnitude
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
-from .solution_arrays import ContactPart, ResultError, SolutionArrays
+from .solution_arrays import CONTACT_LENGTHS, CONTACT_STRESSES, ContactPart, ResultError, SolutionArrays
 
 Row = Mapping[str, str]
 """The cells of a row by the names of the columns."""
 _WORDS = frozenset({"event", "part"})
 """Columns of a path that are no numbers."""
-_STRESSES = ("sigma_n", "friction_t1", "friction_t2")
-_DISPLACEMENTS = ("u_n", "u_t1", "u_t2", "gap")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +171,7 @@ class Result(Finished):
     def _without_noise(self, part: ContactPart) -> ContactPart:
         """A part whose columns are zero where they are rounding beside others, or beside the body's field."""
         kept = dict(part.columns)
-        for names, field in ((_STRESSES, self.body.von_mises), (_DISPLACEMENTS, self.body.displacement)):
+        for names, field in ((CONTACT_STRESSES, self.body.von_mises), (CONTACT_LENGTHS, self.body.displacement)):
             own = {name: _largest(kept[name]) for name in names if name in kept}
             least = ROUNDING * max([*own.values(), 0.0 if field is None else _largest(field)], default=0.0)
             kept |= {name: 0.0 * kept[name] for name, largest in own.items() if largest <= least}

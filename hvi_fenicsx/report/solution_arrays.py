@@ -39,6 +39,9 @@ _OF_PART = {"vertices": "vertices", "facets": "facets", "weights": "weight", "no
 """The attributes of a part that are no columns, by their keys."""
 NOTHING = 1e-6
 """A pressure, or a length, so small beside the largest is none."""
+CONTACT_LENGTHS = ("u_n", "u_t1", "u_t2", "gap")
+CONTACT_STRESSES = ("sigma_n", "friction_t1", "friction_t2")
+"""Columns of ``contact.csv`` by their unit, m and N/m²."""
 
 
 class ReportError(HviError):

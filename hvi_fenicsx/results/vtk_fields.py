@@ -19,6 +19,7 @@ from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Problem
 from ..problem.stress import von_mises
+from ..report.solution_arrays import CONTACT_LENGTHS, CONTACT_STRESSES
 from ..rigid import Mode
 from ..typing import Array, Entities
 from ..workflow import Solution
@@ -26,9 +27,8 @@ from . import vtk_files
 from .gathering import columns_of
 from .vtk_files import Entry, Grid
 
-_LENGTHS = ("displacement", "u_n", "u_t1", "u_t2", "gap")
-_STRESSES = ("stress", "von_mises", "sigma_n", "friction_t1", "friction_t2", "inclusion_distance", "traction")
-_UNITS = dict.fromkeys(_LENGTHS, "m") | dict.fromkeys(_STRESSES, "N/m²")
+_STRESSES = ("stress", "von_mises", "inclusion_distance", "traction", *CONTACT_STRESSES)
+_UNITS = dict.fromkeys(("displacement", *CONTACT_LENGTHS), "m") | dict.fromkeys(_STRESSES, "N/m²")
 
 
 def write_body(path: Path, solution: Solution, stress: Array) -> None:

@@ -170,7 +170,7 @@ def contact_rows(parts: Mapping[str, ContactPart]) -> Iterator[tuple[Any, ...]]:
     """The rows of ``contact.csv``, the parts one after the other. Rank 0 only.
 
     Args:
-        parts: by their names, as :func:`.contact_parts.contact_parts` finds them.
+        parts: by their names, as :func:`.gathering.contact_parts` finds them.
     """
     for name, part in parts.items():
         yield from zip([name] * len(part), *(_column(part, column) for column in CONTACT[1:]), strict=True)
