@@ -182,6 +182,8 @@ class ActiveSetSolver:
             most: Newton steps at most.
         """
         with self.timer("solve"):
+            if self._travels(x):
+                self.system.evaluate_by_cells(x)
             run, coarse = _ProjectedRun if attempt.exact else _SnesRun, self.system.thresholds.coarse_tolerance
             found, left = run(self, attempt, tolerance, bounds, x).into(x, most), np.inf
             while tolerance < coarse and not found.interrupted and found.measure <= coarse:
@@ -196,9 +198,12 @@ class ActiveSetSolver:
 
     def _is_sure(self, measure: float, x: PETSc.Vec, tolerance: float) -> bool:
         """Whether products by the matrix tell the residual as well as forces by cells do. Collective."""
-        u = self.system.displacement(x)
-        exact = strained(self.system.problem, u) is u  # no body travels far
-        return exact and measure + float(np.max(self.convergence.rounding(x))) <= tolerance
+        return not self._travels(x) and measure + float(np.max(self.convergence.rounding(x))) <= tolerance
+
+    def _travels(self, x: PETSc.Vec) -> bool:
+        """Whether a body is far from where forces are known, which its rounding hides then. Collective."""
+        u = self.system.displacement(self.system.equations.from_base(x))
+        return strained(self.system.problem, u) is not u
 
     def judged(
         self, found: Outcome, x: PETSc.Vec, models: Sequence[VertexModel], tolerance: float, bounds: Bounds
