@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,6 +15,15 @@ Integers = npt.NDArray[np.int64]
 """Whole numbers."""
 Mask = npt.NDArray[np.bool_]
 """Yes or no."""
+
+
+def together(parts: Iterable[Entities]) -> Entities:
+    """Numbers one after the other; none where there are no parts.
+
+    Args:
+        parts: (n,) each.
+    """
+    return np.concatenate([np.empty(0, np.int32), *parts])
 
 
 def magnitude(values: npt.ArrayLike) -> float:

@@ -21,7 +21,7 @@ from ..rigid import Solvability, kernel
 from ..runtime.log import percent
 from ..runtime.mpi import largest, total
 from ..system import existence
-from ..typing import Array
+from ..typing import Array, together
 from .certificate import Examination
 from .contact_state import ContactState, LawState
 from .thresholds import DEFAULT, PLAUSIBILITY
@@ -105,7 +105,7 @@ def _polygons(problem: Problem) -> Iterator[str]:
     domain, comm = problem.domain, problem.comm
     if nodes.degree(problem.space) == 1:
         return
-    known = np.concatenate([np.empty(0, np.int32), *(domain.sides[name] for name in domain.curves)])
+    known = together(domain.sides[name] for name in domain.curves)
     for surface in (bounds.surface for bounds in problem.bounds):
         turns = facets.turns(domain.mesh, np.setdiff1d(surface.facets, known).astype(np.int32))
         bent = turns[(turns > PLAUSIBILITY.straight) & (turns < PLAUSIBILITY.corner)]

@@ -233,7 +233,7 @@ def _stiffer(system: System, motions: Motions, falls: Sequence[Array]) -> bool:
     system.jacobian.set_rates([_rate(t, -enlarged * c) for t, c in zip(system.terms, falls, strict=True)])
     with negative_eigenvalues(system) as negative:
         count = negative(pins)
-    system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
+    system.jacobian.clear()
     return count == 0
 
 

@@ -21,7 +21,7 @@ from .contribution import Averaged, Contribution
 _LOCKING = 0.45
 """Poisson's ratio above which P1 cells answer too stiffly (docs/methods.md)."""
 Plane = Literal["plane_stress", "plane_strain", "three_dimensional"]
-_PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
+COMPONENTS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
 """Voigt's order of tensor components, by dimension."""
 
 
@@ -39,7 +39,7 @@ def voigt(tensor: Any, dimension: int) -> list[Any]:
         tensor: the strain, in UFL.
         dimension: of space.
     """
-    return [tensor[i, j] if i == j else 2 * tensor[i, j] for i, j in _PAIRS[dimension]]
+    return [tensor[i, j] if i == j else 2 * tensor[i, j] for i, j in COMPONENTS[dimension]]
 
 
 class Elasticity(Effect):

@@ -203,7 +203,7 @@ class ArcTable:
             x: a point, (n,).
         """
         rows, k = np.arange(len(x)), self.at(x)
-        inside = self.tractions[rows, k] + self.slopes[rows, k] * (x - self.anchors[rows, k])
+        inside = self.rates(x)
         low = np.where(x <= self.low[:, 0], -INF, inside)
         return low, np.where(x >= self.high[rows, k], self._around_ends[1][rows, k + 1], inside)
 

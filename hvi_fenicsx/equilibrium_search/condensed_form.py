@@ -279,5 +279,4 @@ def _joined(law: Superpotential, nodes: Array) -> TractionGraph:
     places[::2], places[1::2] = nodes, 0.5 * (nodes[:-1] + nodes[1:])
     left[::2], right[::2] = law.left(nodes), law.right(nodes)
     left[1::2] = right[1::2] = _middle_tractions(law, nodes[:-1], nodes[1:])
-    slopes = (left[1:] - right[:-1]) / np.diff(places)
-    return TractionGraph(places, left, right, np.concatenate([[0.0], slopes, [0.0]]))
+    return TractionGraph.chords(places, left, right)

@@ -110,7 +110,7 @@ class _Programme:
         x = np.where(joint, chains.ends[rows, k], 0.0)
         arc = np.minimum(k, chains.slopes.shape[1] - 1)
         slope = chains.slopes[rows, arc]
-        offset = chains.tractions[rows, arc] - slope * chains.anchors[rows, arc]
+        offset = chains.offsets[rows, arc]
         free, held = np.flatnonzero(~joint), np.flatnonzero(joint)
         if free.size:
             matrix = a[np.ix_(free, free)]

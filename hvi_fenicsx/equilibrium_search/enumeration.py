@@ -53,9 +53,7 @@ class Enumeration:
 
     def start(self) -> None:
         """Begin with a cell that is far larger than the problem's displacements."""
-        problem, far = self.problem, self.problem.far
-        low, high = np.maximum(problem.lower, -far), np.minimum(problem.upper, far)
-        self.waiting.append(Box.around(low, high, np.zeros(problem.size)))
+        self.waiting.append(Box.around(*self.problem.ends, np.zeros(self.problem.size)))
 
     def run(self, stop: Callable[[], bool], report: Callable[[Enumeration], None]) -> bool:
         """Divide cells until none is left; whether that is so.

@@ -70,9 +70,8 @@ class LowestSearch:
             SolverError: the energy is not bounded from below, or this cannot be shown.
             Cut: the search stops before this is known.
         """
-        problem, far = self.problem, self.problem.far
-        whole = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
-        self.region = low, high = whole if region is None else region
+        problem = self.problem
+        self.region = low, high = problem.with_lengths(*problem.ends) if region is None else region
         self.x = clipped(np.zeros(problem.size), low, high)
         for x in (self.x, *points):
             self._try(x)

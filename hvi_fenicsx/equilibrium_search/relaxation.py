@@ -18,6 +18,7 @@ from ..typing import Array, Integers, Mask
 from .arcs import ArcTable
 from .convex_programme import Optimum, envelopes, minimise, never
 from .length_programme import LengthProgramme
+from .rigid_balance import kernel
 from .scalar_problem import Box, ScalarProblem
 from .thresholds import LIMITS
 
@@ -125,9 +126,7 @@ class Relaxation:
     @cached_property
     def kernel(self) -> Array:
         """Orthonormal columns that S maps to zero, (n, k)."""
-        values, vectors = np.linalg.eigh(self.problem.stiffness)
-        zero = LIMITS.zero * max(float(values[-1]), 0.0)
-        return vectors[:, values <= zero]
+        return kernel(self.problem.stiffness)
 
     def _curvature(self, low: Array, high: Array, seen: Array) -> Curvature:
         """D on a box; ``seen``: where envelopes were not tight, (n + m,), all zero where nothing is known."""

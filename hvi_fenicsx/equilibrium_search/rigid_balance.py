@@ -44,8 +44,7 @@ class RigidMotions:
         Args:
             stiffness: S, (n, n).
         """
-        values, vectors = np.linalg.eigh(stiffness)
-        rigid = vectors[:, values <= LIMITS.zero * np.max(values, initial=0.0)]
+        rigid = kernel(stiffness)
         n, k = rigid.shape
         pivots = np.asarray(qr(rigid.T, pivoting=True, mode="r")[1][:k], dtype=np.int64)
         others = np.setdiff1d(np.arange(n), pivots)
@@ -53,6 +52,16 @@ class RigidMotions:
         shapes[pivots] = np.eye(k)
         shapes[others] = -np.linalg.solve(stiffness[np.ix_(others, others)], stiffness[np.ix_(others, pivots)])
         return cls(pivots=pivots, others=others, shapes=shapes)
+
+
+def kernel(stiffness: Array) -> Array:
+    """Orthonormal columns that a stiffness maps to zero, (n, k).
+
+    Args:
+        stiffness: S, (n, n).
+    """
+    values, vectors = np.linalg.eigh(stiffness)
+    return vectors[:, values <= LIMITS.zero * np.max(values, initial=0.0)]
 
 
 def resistance(stiffness: Array, shapes: Array) -> tuple[Array, Array]:

@@ -48,6 +48,11 @@ class ScalarProblem:
         """A displacement far beyond all joints of the chains: the end of what is searched."""
         return min(LIMITS.far * self.reach, self.farthest)
 
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Where the search of each unknown ends: at its bounds, or far away, (n,) each."""
+        return np.maximum(self.lower, -self.far), np.minimum(self.upper, self.far)
+
     @cached_property
     def reach(self) -> float:
         """The largest displacement at which a chain has a joint, and one unit at least."""

@@ -382,6 +382,5 @@ def _loaded(problem: ScalarProblem, programme: Sequence[float], stop: Callable[[
 
 
 def _descended(problem: ScalarProblem, x: Array, stop: Callable[[], bool]) -> Array:
-    far, n = problem.far, problem.size
-    low, high = problem.with_lengths(np.maximum(problem.lower, -far), np.minimum(problem.upper, far))
+    n, (low, high) = problem.size, problem.with_lengths(*problem.ends)
     return descend(problem, low, high, np.clip(x, low[:n], high[:n]), cut=stop)[0]

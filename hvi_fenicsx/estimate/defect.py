@@ -21,7 +21,7 @@ from ..problem.problem import Bounds, Problem
 from ..problem.scaling import DEFAULT as composition
 from ..problem.vectors import nodal_values
 from ..runtime import forms
-from ..typing import Array, Entities
+from ..typing import Array, Entities, together
 from .bubbles import DEFAULT, BubbleStiffness, of_cell
 from .dual_norm import DualNorm
 from .law_traces import ErrorField, LawSprings, LawTraces
@@ -188,7 +188,7 @@ class LeastEnergy:
         self.residual -= self.laws
         self._parts = constraints(problem, u, traces.bubbles)
         self._e = bubbles.x.array[: self.residual.size].reshape(self.residual.shape)
-        self._special = np.unique(np.concatenate([np.empty(0, np.int32), *(part.blocks for part in self._parts)]))
+        self._special = np.unique(together(part.blocks for part in self._parts))
 
     def find(self) -> None:
         """Find them; from the second time on from those that were found before. Collective."""

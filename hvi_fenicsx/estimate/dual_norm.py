@@ -19,7 +19,6 @@ from ..certify.force_attribution import components, on_bounds, on_kink
 from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
-from ..problem.vectors import turn
 from ..runtime.cost import Timer
 from ..runtime.mpi import total
 from ..system.held_solver import HeldPreconditioner, LinearSettings
@@ -103,9 +102,7 @@ class DualNorm:
 
     def _load(self, functional: Array) -> PETSc.Vec:
         system = self.system
-        load = system.load.duplicate()
-        load.array[:] = functional.ravel()
-        turn(load, system.rotation)
+        load = system.turned(functional)
         load.array[self.held] = 0.0
         load.array[system.problem.fixed_here] = 0.0
         return load

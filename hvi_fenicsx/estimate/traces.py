@@ -203,13 +203,9 @@ def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) 
         local: the local facets.
     """
     topology, d = problem.domain.mesh.topology, problem.dimension
-    topology.create_connectivity(d - 1, d)
-    topology.create_connectivity(d, d - 1)
-    of_facet, of_cell = topology.connectivity(d - 1, d), topology.connectivity(d, d - 1)
-    cells = of_facet.array[of_facet.offsets[local]]
+    cells, number = facets.cells_of(problem.domain.mesh, local)
     owned = cells < topology.index_map(d).size_local
-    cells, local = cells[owned], local[owned]
-    number = np.argmax(of_cell.array.reshape(-1, d + 1)[cells] == local[:, None], axis=1)
+    cells, number, local = cells[owned], number[owned], local[owned]
     degree, on = nodes.degree(problem.space), nodes.facet_nodes(problem.space, local)
     table = np.array(_numbers_in_cell(degree, topology.cell_name()), dtype=np.int32)
     found = np.take_along_axis(space.dofmap.list[cells], table[number], axis=1)

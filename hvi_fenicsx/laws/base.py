@@ -384,7 +384,8 @@ class DerivedLaw(Superpotential, register=False):
     @override
     @property
     def growth(self) -> Directional:
-        return self.law.growth.times(1.0 / self.traction)
+        growth = self.law.growth
+        return Directional(growth.minus / self.traction, growth.plus / self.traction)
 
     @override
     @property

@@ -30,7 +30,17 @@ class _PositiveLaw(PolylineLaw):
 
 
 @dataclass(frozen=True)
-class QuadraticLinear(_PositiveLaw):
+class _QuadraticLinearLaw(_PositiveLaw, register=False):
+    """The parameters of the paper's law: γ1, γ2 and δ."""
+
+    units: ClassVar[Units] = {"gamma1": "traction", "gamma2": "traction", "delta": "length"}
+    gamma1: float
+    gamma2: float
+    delta: float
+
+
+@dataclass(frozen=True)
+class QuadraticLinear(_QuadraticLinearLaw):
     """j(x) = min{γ1/(2δ) x², γ2 |x|}: the traction rises to γ1 at δ, drops to γ2 = γ1/2 and stays there.
 
     Ovcharova and Gwinner, section 5.1, read as an even law. The two pieces cross at 2 δ γ2/γ1; only with
@@ -38,10 +48,6 @@ class QuadraticLinear(_PositiveLaw):
     """
 
     name = "quadratic_linear"
-    units: ClassVar[Units] = {"gamma1": "traction", "gamma2": "traction", "delta": "length"}
-    gamma1: float
-    gamma2: float
-    delta: float
 
     @override
     def __post_init__(self) -> None:
@@ -59,7 +65,7 @@ class QuadraticLinear(_PositiveLaw):
 
 
 @dataclass(frozen=True)
-class QuadraticLinearLiteral(_PositiveLaw):
+class QuadraticLinearLiteral(_QuadraticLinearLaw):
     """j(x) = min{γ1/(2δ) x², γ2 x}, the formula of Ovcharova and Gwinner read literally, on the whole line.
 
     For x < 0 the traction is +γ2 and pushes the body on; at 0 it drops to 0 (a concave kink), then rises to
@@ -67,10 +73,6 @@ class QuadraticLinearLiteral(_PositiveLaw):
     """
 
     name = "quadratic_linear_literal"
-    units: ClassVar[Units] = {"gamma1": "traction", "gamma2": "traction", "delta": "length"}
-    gamma1: float
-    gamma2: float
-    delta: float
 
     @override
     def build(self) -> TractionGraph:
@@ -117,7 +119,21 @@ class LinearSpring(_PositiveLaw):
 
 
 @dataclass(frozen=True)
-class Sawtooth(PolylineLaw):
+class _Weakening(Superpotential, register=False):
+    """A law that weakens from a peak to a residual traction over displacements of the size of delta."""
+
+    units: ClassVar[Units] = {"peak_traction": "traction", "residual_traction": "traction", "delta": "length"}
+    peak_traction: float
+    residual_traction: float
+    delta: float
+
+    def __post_init__(self) -> None:
+        require_positive(self._title, delta=self.delta)
+        require_ordered(self._title, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
+
+
+@dataclass(frozen=True)
+class Sawtooth(_Weakening, PolylineLaw):
     """A sawtooth with teeth of width delta: the traction rises to the k-th peak at k delta, then drops to the residual.
 
     The peaks descend evenly from peak_traction, the k-th of n = `drops` being
@@ -126,15 +142,11 @@ class Sawtooth(PolylineLaw):
     """
 
     name = "sawtooth"
-    units: ClassVar[Units] = {"peak_traction": "traction", "residual_traction": "traction", "delta": "length"}
-    peak_traction: float
-    residual_traction: float
-    delta: float
     drops: int
 
+    @override
     def __post_init__(self) -> None:
-        require_positive(self._title, delta=self.delta)
-        require_ordered(self._title, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
+        super().__post_init__()
         if self.residual_traction == self.peak_traction:
             raise InputError(
                 f"{self._title}: residual_traction = peak_traction = {self.peak_traction!r} leaves no "
@@ -209,22 +221,13 @@ def _checked_points(owner: str, points: Sequence[Sequence[float]]) -> tuple[tupl
 
 
 @dataclass(frozen=True)
-class WeakeningLaw(Superpotential):
+class WeakeningLaw(_Weakening):
     """Traction sign(x) [peak - (peak - residual) w(|x|/delta)], weakening from ±peak to ±residual.
 
     A subclass gives a name and the shape w: w(0) = 0, rising monotonically to w(∞) = 1, with its integral W
     and derivative w'. Split: H = peak |x| and G = (peak - residual) delta W(|x|/delta), which is smooth.
     Tractions in N/m², delta in m; InputError unless 0 ≤ residual ≤ peak, peak > 0 and delta > 0.
     """
-
-    units: ClassVar[Units] = {"peak_traction": "traction", "residual_traction": "traction", "delta": "length"}
-    peak_traction: float
-    residual_traction: float
-    delta: float
-
-    def __post_init__(self) -> None:
-        require_positive(self._title, delta=self.delta)
-        require_ordered(self._title, residual_traction=self.residual_traction, peak_traction=self.peak_traction)
 
     @abstractmethod
     def shape(self, z: Array) -> tuple[Array, Array, Array]:

@@ -14,12 +14,30 @@ from typing_extensions import override
 
 from ..errors import InputError
 from ..typing import Array, Integers, magnitude
-from .base import DEFAULT, ConvexPart, Directional, Superpotential
+from .base import DEFAULT, ConvexPart, DerivedLaw, Directional, Superpotential
 from .traction_graph import TractionGraph
 
 
+class _OfGraph:
+    """A function whose derivative is a traction graph. Arrays in and out have shape (m,)."""
+
+    graph: TractionGraph
+
+    def value(self, x: Array) -> Array:
+        """The function."""
+        return self.graph.primitive(x)
+
+    def left(self, x: Array) -> Array:
+        """Left derivative."""
+        return self.graph.traction(x, "left")
+
+    def right(self, x: Array) -> Array:
+        """Right derivative."""
+        return self.graph.traction(x, "right")
+
+
 @dataclass(frozen=True, eq=False)
-class PolylinePart(ConvexPart):
+class PolylinePart(_OfGraph, ConvexPart):
     """A convex function whose derivative is a nondecreasing traction graph."""
 
     graph: TractionGraph
@@ -30,23 +48,11 @@ class PolylinePart(ConvexPart):
         return self.graph.breaks[self.graph.jumps > 0.0]
 
     @override
-    def value(self, x: Array) -> Array:
-        return self.graph.primitive(x)
-
-    @override
-    def left(self, x: Array) -> Array:
-        return self.graph.traction(x, "left")
-
-    @override
-    def right(self, x: Array) -> Array:
-        return self.graph.traction(x, "right")
-
-    @override
     def second(self, x: Array) -> Array:
         return self.graph.slope(x)
 
 
-class PolylineLaw(Superpotential):
+class PolylineLaw(_OfGraph, Superpotential):
     """A law given by a `TractionGraph`. A subclass writes `build`; all else follows.
 
     `reference_slip` (m) is a displacement to be taken as typical where the graph has no break off zero.
@@ -60,7 +66,7 @@ class PolylineLaw(Superpotential):
 
     @override
     @cached_property
-    def graph(self) -> TractionGraph:
+    def graph(self) -> TractionGraph:  # type: ignore[override]
         """The table of the law; read `build` once."""
         return self.build()
 
@@ -73,18 +79,6 @@ class PolylineLaw(Superpotential):
     @cached_property
     def concave(self) -> ConvexPart:
         return PolylinePart(self.graph.split()[1])
-
-    @override
-    def value(self, x: Array) -> Array:
-        return self.graph.primitive(x)
-
-    @override
-    def left(self, x: Array) -> Array:
-        return self.graph.traction(x, "left")
-
-    @override
-    def right(self, x: Array) -> Array:
-        return self.graph.traction(x, "right")
 
     @override
     @cached_property
@@ -182,7 +176,7 @@ class PolylineLaw(Superpotential):
 
 
 @dataclass(frozen=True)
-class PolylineInUnits(PolylineLaw, register=False):
+class PolylineInUnits(DerivedLaw, PolylineLaw, register=False):
     """A polyline law in other units: its table in these.
 
     Attributes:
@@ -199,16 +193,6 @@ class PolylineInUnits(PolylineLaw, register=False):
     @override
     def build(self) -> TractionGraph:
         return self.law.graph.scaled(self.length, self.traction)
-
-    @override
-    def piece(self, x: Array) -> Integers:
-        return self.law.piece(x * self.length)
-
-    @override
-    @cached_property
-    def _scales(self) -> tuple[float, float]:
-        length, energy = self.law.length_scale, self.law.energy_scale
-        return length / self.length, energy / (self.length * self.traction)
 
 
 def _limit(traction: npt.ArrayLike, slope: float) -> float:

@@ -418,10 +418,6 @@ class PaperSmoothedLaw(SmoothedLaw, register=False):
         return np.where(x >= 0.0, 1.0, -1.0) * (rising + share * self.law.gamma2)
 
     @override
-    def derivatives(self, x: Array) -> tuple[Array, Array]:
-        return self.right(x), self.convex.second(x) - self.concave.second(x)
-
-    @override
     def scaled(self, length: float, traction: float) -> Superpotential:
         law = QuadraticLinear(self.law.gamma1 / traction, self.law.gamma2 / traction, self.law.delta / length)
         return PaperSmoothedLaw(law, self.epsilon_absolute / (length * traction))

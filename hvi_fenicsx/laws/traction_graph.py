@@ -114,7 +114,7 @@ class TractionGraph:
             factor: not zero.
         """
         graph, size = self if factor > 0.0 else self.turned(), abs(factor)
-        return TractionGraph(graph.breaks / size, graph.left * size, graph.right * size, graph.slopes * size**2)
+        return graph.scaled(size, 1.0 / size)
 
     def remembering(self, memory: Array) -> TractionGraph:
         """The graph of a bond that has been so far: secants up to there, the graph beyond.

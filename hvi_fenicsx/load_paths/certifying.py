@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
-from petsc4py import PETSc
 
 from ..certify import balance, certificate, contact_state
 from ..certify.certificate import Examination
@@ -27,7 +26,7 @@ from ..paths.distances import Distances, StateOnGraphs
 from ..paths.state import Event, PathState
 from ..problem import references
 from ..problem.problem import FactoredProblem, Problem
-from ..problem.vectors import product, turn
+from ..problem.vectors import product
 from ..reduced.condensation import Condensation
 from ..runtime.mpi import total
 from ..solvers import frozen_mixity
@@ -151,7 +150,7 @@ class Certifier:
         unknowns = condensation.expand(graphs.x, factor)
         for _ in range(_STEPS):
             forces = contact_state.forces(problem, system.displacement(unknowns))
-            left, carried = self._reaction(forces), condensation.spread(-graphs.force)
+            left, carried = self._system.turned(forces.reaction), condensation.spread(-graphs.force)
             left.axpy(-1.0, carried)
             missing = condensation.forces(-left.array_r)
             before = graphs.x
@@ -162,13 +161,6 @@ class Certifier:
         u = system.displacement(unknowns)
         unknowns.destroy()
         return Refined(u=u, x=graphs.x, force=graphs.force, forces=contact_state.forces(problem, u))
-
-    def _reaction(self, forces: Forces) -> PETSc.Vec:
-        """Internal forces minus loads in the components of the unknowns."""
-        found = self._system.load.duplicate()
-        found.array[:] = forces.reaction.ravel()
-        turn(found, self._system.rotation)
-        return found
 
     def _is_certified(self, state: PathState, found: Refined) -> bool:
         """Whether forces by cell balance, and those on Γc are on the graphs. Collective."""
@@ -199,7 +191,7 @@ class Certifier:
         What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
         there, what rounding makes of the stresses is excused, and no net force.
         """
-        acting, spread = self._reaction(forces), self._condensation.spread(carried)
+        acting, spread = self._system.turned(forces.reaction), self._condensation.spread(carried)
         left, given = self._condensation.unbalanced(acting, spread), product(spread, self._system.rotation)
         for vector in (acting, spread):
             vector.destroy()

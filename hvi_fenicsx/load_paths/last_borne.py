@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from ..certify import plausibility
 from ..errors import InputError, SolverError
 from ..model import PathTable
@@ -83,7 +81,7 @@ def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
         return False
     if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.system.thresholds.vertex_unknowns:
         return False
-    system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
+    system.jacobian.clear()
     return True
 
 

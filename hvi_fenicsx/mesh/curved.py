@@ -22,6 +22,7 @@ from ..runtime.mpi import agree, total
 from ..typing import Array, Entities, Integers
 from . import nodes, transfer
 from .domain import DEFAULT, Domain
+from .nodes import edges, lagrange
 
 _SWEEPS = 3
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
@@ -115,8 +116,7 @@ def onto_curves(
 
 def _jacobians(points: Array) -> Array:
     """The Jacobian determinants of cells (c, n, d) at their nodes, (c, n); positive where they are straight."""
-    kind = {6: basix.CellType.triangle, 10: basix.CellType.tetrahedron}[points.shape[1]]
-    element = basix.create_element(basix.ElementFamily.P, kind, 2, basix.LagrangeVariant.gll_warped)
+    element = lagrange(points.shape[2] + 1, 2)
     slopes = np.asarray(element.tabulate(1, np.asarray(element.points)))[1:, :, :, 0]
     straight = np.linalg.det(points[:, 1 : points.shape[2] + 1] - points[:, :1])
     signed = np.linalg.det(np.einsum("iqn,cnd->cqid", slopes, points))
@@ -224,8 +224,7 @@ class CurvedFacets:
     def _middles(self) -> tuple[Array, Array]:
         """The middles of the edges if they were straight, and their nodes, (e, d) both."""
         d = self.points.shape[2]
-        kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[d]
-        ends = np.array(basix.topology(kind)[1])
+        ends = np.array(edges(d))
         return self.points[:, ends].mean(axis=2).reshape(-1, d), self.points[:, d:].reshape(-1, d)
 
     def _pairs(self, x: Array) -> tuple[Integers, Integers]:
@@ -243,8 +242,7 @@ class CurvedFacets:
     def _projected(self, facet: Integers, x: Array) -> tuple[Array, Array]:
         """The points of facets nearest to points (p, d), and how far they are away, (p,)."""
         d = x.shape[1]
-        kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[d]
-        element = basix.create_element(basix.ElementFamily.P, kind, 2, basix.LagrangeVariant.gll_warped)
+        element = lagrange(d, 2)
         nodes = self.points[facet]
         place = transfer.clipped(transfer.barycentric_weights(nodes[:, :d], x))[:, 1:]
         for _ in range(_STEPS):

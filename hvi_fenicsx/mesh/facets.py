@@ -7,7 +7,7 @@ import math
 import numpy as np
 from dolfinx import mesh as dmesh
 
-from ..typing import Array, Entities
+from ..typing import Array, Entities, Integers
 
 
 def cell_facets(mesh: dmesh.Mesh) -> Entities:
@@ -17,6 +17,19 @@ def cell_facets(mesh: dmesh.Mesh) -> Entities:
     mesh.topology.create_connectivity(d, d - 1)
     mesh.topology.create_connectivity(d - 1, d)
     return mesh.topology.connectivity(d, d - 1).array.reshape(-1, d + 1)
+
+
+def cells_of(mesh: dmesh.Mesh, facets: Entities) -> tuple[Entities, Integers]:
+    """The first cell of each of some facets, and the number of the facet in it, (f,) each.
+
+    Args:
+        mesh: of simplices.
+        facets: local facets.
+    """
+    of_cells = cell_facets(mesh)
+    connected = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+    cells = connected.array[connected.offsets[facets]]
+    return cells, np.argmax(of_cells[cells] == facets[:, None], axis=1)
 
 
 def in_copies(facets: Entities, mesh: dmesh.Mesh, cells: Entities, other: dmesh.Mesh, copies: Entities) -> Entities:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry import ROUNDING, spot
-from ..typing import Array, Entities, Integers
+from ..typing import Array, Entities, Integers, together
 
 _SIMPLEX = {1: {1: 1, 2: 2, 3: 4}, 2: {1: 8, 2: 9, 3: 11}}
 """Gmsh's element type of the simplex, by order and dimension."""
@@ -91,7 +91,7 @@ def _grouped(gmsh: Any, dimension: int) -> tuple[Integers, Entities]:
                 tags.append(np.full(len(rows[-1]), group, dtype=np.int32))
     nodes = np.concatenate(rows) if rows else np.empty((0, dimension + 1), dtype=np.int64)
     order = _BASIX[nodes.shape[1]] if nodes.shape[1] > dimension + 1 else slice(None)
-    return nodes[:, order], np.concatenate([np.empty(0, np.int32), *tags])
+    return nodes[:, order], together(tags)
 
 
 def check(gmsh: Any, path: Path, dimension: int) -> MeshArrays:

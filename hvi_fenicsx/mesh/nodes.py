@@ -16,6 +16,7 @@ from dolfinx import mesh as dmesh
 
 from .. import compat
 from ..typing import Array, Entities
+from .facets import cells_of
 
 _SPLIT: dict[int, tuple[tuple[int, ...], ...]] = {
     2: ((0, 2), (2, 1)),
@@ -179,14 +180,8 @@ def facet_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
         space: of degree 1 or 2.
         facets: local facets.
     """
-    topology, d = space.mesh.topology, space.mesh.geometry.dim
-    topology.create_connectivity(d - 1, d)
-    topology.create_connectivity(d, d - 1)
-    to_cells, to_facets = topology.connectivity(d - 1, d), topology.connectivity(d, d - 1)
-    cells = to_cells.array[to_cells.offsets[facets]]
-    of_cells = to_facets.array.reshape(-1, d + 1)[cells]
-    local = np.argmax(of_cells == facets[:, None], axis=1)
-    layout = space.dofmap.dof_layout
+    layout, d = space.dofmap.dof_layout, space.mesh.geometry.dim
+    cells, local = cells_of(space.mesh, facets)
     table = np.array([layout.entity_closure_dofs(d - 1, i) for i in range(d + 1)], dtype=np.int32)
     return np.take_along_axis(space.dofmap.list[cells], table[local], axis=1)
 
@@ -217,3 +212,13 @@ def edges(corners: int) -> list[list[int]]:
     """
     found: list[list[int]] = basix.topology(_KINDS[corners])[1]
     return found
+
+
+def lagrange(corners: int, degree: int) -> basix.finite_element.FiniteElement:
+    """The Lagrange element on a simplex.
+
+    Args:
+        corners: how many it has.
+        degree: of the element.
+    """
+    return basix.create_element(basix.ElementFamily.P, _KINDS[corners], degree, basix.LagrangeVariant.gll_warped)

@@ -19,7 +19,7 @@ from ..formula import SpatialValue
 from ..mesh.boundary_part import BoundaryPart, InterfaceSides
 from ..mesh.domain import Domain
 from ..runtime.mpi import agree
-from ..typing import Entities
+from ..typing import Entities, together
 from . import constraints, domain_forms, elastic_operator, interfaces, law_term, scaling
 from .contact_surface import Surface
 from .domain_forms import DomainForms
@@ -110,7 +110,7 @@ def _problem(
     """All contributions together. Collective."""
     components = constraints.prescribed_components(context, contributions)
     prescribed = constraints.values(context, components)
-    fixed = np.concatenate([np.empty(0, np.int32), *(one.dofs for one in components)])
+    fixed = together(one.dofs for one in components)
     surfaces, found = _surfaces(context, contributions, fixed, model)
     fixed = np.unique(np.concatenate([fixed, *(one.tied for one in found)])).astype(np.int32)
     gaps = {one.name: one.gap for one in found}

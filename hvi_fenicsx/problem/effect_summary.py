@@ -14,6 +14,7 @@ import numpy as np
 
 from ..effects import BoundaryLaw, Contribution, Direction, Effect, Place
 from ..laws import Superpotential, describe
+from ..typing import together
 from .problem import Problem
 from .scaling import PlacedContribution
 
@@ -103,7 +104,7 @@ def _prescribed(problem: Problem, part: str | None, contribution: Contribution) 
     """Displacements that its conditions take away, over all ranks. Collective."""
     own = [one.dofs for one in problem.prescribed if one.part == part] if contribution.conditions else []
     size = problem.space.dofmap.index_map.size_local * problem.space.dofmap.index_map_bs
-    dofs = np.unique(np.concatenate([np.empty(0, np.int32), *own]))
+    dofs = np.unique(together(own))
     return int(problem.comm.allreduce(int(np.count_nonzero(dofs < size))))
 
 

@@ -10,13 +10,11 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from ..effects.elasticity import COMPONENTS
 from ..mesh import nodes
 from ..typing import Array
 from .elastic_operator import Bulk
 from .vectors import LinearForm
-
-COMPONENTS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))}
-"""The components of stress that the energy knows, by dimension."""
 
 
 def linear_field(q: Sequence[Any], x: Any) -> Any:

@@ -18,6 +18,7 @@ from ..certify.contact_state import ContactState
 from ..effects import Direction, SurfaceLoad
 from ..geometry import chains
 from ..mesh import nodes
+from ..mesh.facets import cells_of
 from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.problem import Problem
@@ -195,10 +196,8 @@ def _drops(state: ContactState) -> Array:
 
 def _turned(problem: Problem, surface: Surface, pairs: Entities) -> Entities:
     """The edges of a part (k, 2), at degree 2 halves, with the body to their left."""
-    topology, space, x = problem.domain.mesh.topology, problem.space, problem.points[:, :2]
-    topology.create_connectivity(1, 2)
-    to_cells = topology.connectivity(1, 2)
-    cells = to_cells.array[to_cells.offsets[surface.facets]].repeat(nodes.degree(space))
+    space, x = problem.space, problem.points[:, :2]
+    cells = cells_of(problem.domain.mesh, surface.facets)[0].repeat(nodes.degree(space))
     ahead, inwards = x[pairs[:, 1]] - x[pairs[:, 0]], x[space.dofmap.list[cells, :3]].mean(axis=1) - x[pairs[:, 0]]
     left = ahead[:, 0] * inwards[:, 1] - ahead[:, 1] * inwards[:, 0] > 0
     return np.where(left[:, None], pairs, pairs[:, ::-1])

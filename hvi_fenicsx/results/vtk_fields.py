@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import basix
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem, la
@@ -64,9 +63,8 @@ def _strain_of_parts(problem: Problem, u: Array) -> Array:
         u: a displacement by its values at the nodes, (n, d).
     """
     space, d = problem.space, problem.dimension
-    cell, variant = basix.CellType[space.mesh.topology.cell_name()], basix.LagrangeVariant.gll_warped
-    lagrange = basix.create_element(basix.ElementFamily.P, cell, nodes.degree(space), variant)
-    slopes: Array = np.asarray(lagrange.tabulate(1, nodes.middles_of_parts(space)[:, 1:]))[1:, :, :, 0]
+    element = nodes.lagrange(d + 1, nodes.degree(space))
+    slopes: Array = np.asarray(element.tabulate(1, nodes.middles_of_parts(space)[:, 1:]))[1:, :, :, 0]
     cells = nodes.owned_cells(space)
     found = np.zeros((len(cells), slopes.shape[1], 3, 3))
     positions, rises = (np.einsum("kpn,cni->cpki", slopes, v[cells, :d], optimize=True) for v in (problem.positions, u))

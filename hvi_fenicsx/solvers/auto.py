@@ -250,7 +250,7 @@ def follow(system: System, interrupted: Callable[[], bool]) -> tuple[PETSc.Vec |
     most = system.thresholds.vertex_unknowns if _are_straight(laws) else _most_on_curve(system)
     if system.comm.allreduce(len(system.jacobian.rows.dofs)) > most:
         return None
-    system.jacobian.set_rates([np.zeros_like(rates) for rates in system.jacobian.rates])
+    system.jacobian.clear()
     try:
         condensation = Condensation(system)
     except (InputError, SolverError):

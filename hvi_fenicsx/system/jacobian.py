@@ -181,6 +181,10 @@ class Jacobian:
         else:
             self.hold(np.empty(0, np.int32))
 
+    def clear(self) -> None:
+        """Set no tangent: J is A. Collective."""
+        self.set_rates([np.zeros_like(k) for k in self._rates])
+
     def hold(self, held: Entities) -> None:
         """Hold these unknowns of Γc (local, owned, sorted), and no others, as they are in a solve. Collective."""
         if not all(agree(self._comm, np.array_equal(held, self.held))):

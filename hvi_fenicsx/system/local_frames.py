@@ -18,7 +18,7 @@ from scipy.linalg import null_space
 from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
-from ..typing import Array, Entities, Integers
+from ..typing import Array, Entities, Integers, together
 from .thresholds import DEFAULT
 
 
@@ -97,7 +97,7 @@ def frames_of(problem: Problem) -> LocalFrames:
         problem: the problem.
     """
     d = problem.dimension
-    blocks = np.concatenate([np.empty(0, np.int32), *(s.blocks for s in problem.surfaces)])
+    blocks = together(s.blocks for s in problem.surfaces)
     normals = np.concatenate([np.empty((0, d)), *(s.normals for s in problem.surfaces)])
     here = np.isin(blocks, blocks[np.count_nonzero(normals, axis=1) > 1])
     found: dict[int, list[Array]] = {}

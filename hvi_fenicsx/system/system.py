@@ -115,9 +115,7 @@ class System:
         body, vectors = whole(self.problem.domain), []
         fields = rigid_fields(self.problem.points / self.problem.scales.length, body)
         for number in range(body.motions):
-            vectors.append(self.load.duplicate())
-            vectors[-1].array[:] = self.problem.relative(fields[:, number].ravel())[: self.load.local_size]
-            turn(vectors[-1], self.rotation)
+            vectors.append(self.turned(self.problem.relative(fields[:, number].ravel())[: self.load.local_size]))
         return null_space(vectors)
 
     @cached_property
@@ -161,7 +159,7 @@ class System:
         if all(agree(self.comm, np.array_equal(x.array_r, self.equations.base.x.array_r))):
             return
         internal = self.problem.combined(elastic_forces(self.problem, self.displacement(x)))
-        elastic, residual = (self._turned(forces) for forces in (internal, internal - self._loads))
+        elastic, residual = (self.turned(forces) for forces in (internal, internal - self._loads))
         fixed = self.problem.fixed_here
         residual.array[fixed] = x.array_r[fixed] - self.load.array_r[fixed]
         if self.free_motions is not None:
@@ -179,10 +177,14 @@ class System:
         pull.destroy()
         return Base(x, elastic, residual)
 
-    def _turned(self, forces: Array) -> PETSc.Vec:
-        """Cartesian forces (vertices, d) in the components of the unknowns. Collective."""
-        found = new_vector(self.problem.space)
-        found.array[:] = forces.ravel()
+    def turned(self, vectors: Array) -> PETSc.Vec:
+        """Cartesian vectors in the components of the unknowns. Collective.
+
+        Args:
+            vectors: at the owned nodes, (nodes, d).
+        """
+        found = self.load.duplicate()
+        found.array[:] = vectors.ravel()
         turn(found, self.rotation)
         return found
 
@@ -196,10 +198,7 @@ class System:
 
     def unknowns(self, u: fem.Function) -> PETSc.Vec:
         """The unknowns of a displacement field (in units of u0). Collective."""
-        x = self.load.duplicate()
-        x.array[:] = self.problem.relative(u.x.array)[: x.local_size]
-        turn(x, self.rotation)
-        return x
+        return self.turned(self.problem.relative(u.x.array)[: self.load.local_size])
 
     def prescribe(self, x: PETSc.Vec) -> None:
         """Give the prescribed unknowns of x their values. Local."""
