@@ -182,6 +182,7 @@ def of_solution(problem: Problem, examination: Examination, u: fem.Function) -> 
         warnings += _dips(problem, examination, size)
         for state in examination.states:
             warnings += _distant_obstacle(problem, state, size)
+            warnings += _given_way(problem, state, size)
             for law in state.laws:
                 warnings += _slip_and_kink(problem, law)
                 warnings += _wide_smoothing(problem, law)
@@ -230,6 +231,22 @@ def _distant_obstacle(problem: Problem, state: ContactState, size: float) -> Ite
             f"{_key(problem, state.surface.part)}: the gap is {metres:.3g} m at least and the largest "
             f"displacement {displacement:.3g} m: it is never closed; is it in m?"
         )
+
+
+def _given_way(problem: Problem, state: ContactState, size: float) -> Iterator[str]:
+    """Bonds that are pressed where nothing stops penetration; a foundation that pulls where the body lifts off."""
+    kinds = {law.term.direction for law in state.laws if law.term.direction.normal}
+    if state.bounds is not None or len(kinds) != 1:
+        return
+    (kind,), off = kinds, state.normal_displacement
+    text = "m, and nothing stops penetration; give contact = { gap = 0.0 } too"
+    if kind is Direction.PENETRATION:
+        off, text = np.where(state.pressure > 0.0, -off, 0.0), "m, and is pulled back; make the law one-sided to let go"
+    most = _most(problem.comm, np.maximum(off, 0.0))
+    if most > PLAUSIBILITY.negligible * size:
+        way = "lifts off" if kind is Direction.PENETRATION else "is pressed in"
+        metres = problem.scales.displacement * most
+        yield f"{_key(problem, state.surface.part, kind)}: the side {way} by up to {metres:.3g} {text}"
 
 
 def _slip_and_kink(problem: Problem, law: LawState) -> Iterator[str]:

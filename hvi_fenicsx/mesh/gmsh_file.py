@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import signal
 import subprocess
 from collections.abc import Mapping
@@ -18,6 +19,7 @@ from .. import compat
 from ..errors import InputError
 from ..geometry import Outline
 from ..runtime import cost, processes
+from ..runtime.log import logger
 from ..runtime.mpi import on_root
 from ..schema import LONGEST, SHORTEST
 from ..typing import Entities
@@ -25,6 +27,7 @@ from . import curved, gmsh_process
 from .domain import DEFAULT, Domain, check_affordable
 from .gmsh_arrays import MeshArrays, extract, session
 
+_LOG = logger("mesh")
 _SCRIPTS = (".geo", ".geo_unrolled")
 _HEADER = b"$MeshFormat"
 """How a mesh begins; all else gmsh would take for a script."""
@@ -65,7 +68,9 @@ def _read(path: Path, dimension: int, scale: float, found: list[MeshArrays]) -> 
         The physical groups by dimension and name, and the number of vertices.
     """
     kind = "script" if _is_script(path) else "mesh"
-    words = [str(path.absolute()), kind, str(dimension), str(DEFAULT.gmsh_share * cost.free_memory())]
+    memory = DEFAULT.gmsh_share * cost.free_memory()
+    words = [str(path.absolute()), kind, str(dimension), str(memory)]
+    _LOG.info("gmsh reads or meshes %s", path, extra={"moving": True})
     try:
         done = processes.run(gmsh_process.__name__, words, DEFAULT.gmsh_seconds)
     except subprocess.TimeoutExpired:
@@ -74,6 +79,9 @@ def _read(path: Path, dimension: int, scale: float, found: list[MeshArrays]) -> 
             "the .msh that gmsh saves"
         )
         raise InputError(f"mesh file {path}: {text}") from None
+    if done.returncode == os.EX_OSERR or b"lost sys.stderr" in done.stderr:
+        much = f"more than the {memory / 1024:.2g} GB that it may use"
+        raise InputError(f"mesh file {path}: gmsh wants {much}; look for a count or a size that makes too many cells")
     if done.returncode or not done.stdout:
         raise InputError(f"mesh file {path}: {_end(done)}")
     with np.load(io.BytesIO(done.stdout)) as arrays:

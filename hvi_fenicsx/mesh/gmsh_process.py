@@ -47,6 +47,8 @@ def main() -> None:
         np.savez(buffer, **_wanted(*sys.argv[1:]))
     except InputError as error:
         np.savez(buffer, fault=np.array(str(error)))
+    except MemoryError:
+        sys.exit(os.EX_OSERR)
     result.write(buffer.getvalue())
     result.close()
 
@@ -79,8 +81,8 @@ def _read(gmsh: Any, path: Path, is_script: bool, dimension: int, memory: float)
     except Exception as error:
         # gmsh raises bare Exceptions, whatever is wrong with a file
         reason = str(error).replace(str(opened), str(path))
-        if "Out of memory" in reason:
-            reason = f"it wants more than the {memory / 1024:.2g} GB that it may use; make it smaller"
+        if "Out of memory" in reason or not reason:  # of an allocation that fails nothing is said
+            raise MemoryError from None
         raise InputError(f"mesh file {path}: gmsh cannot read it: {reason}") from None
     found = gmsh_arrays.check(gmsh, path, dimension)
     names = {d: _names(gmsh, path, d) for d in (dimension - 1, dimension)}

@@ -110,8 +110,12 @@ class References:
         return _sums(self.problem, np.ones(owned)) ** (-(d - 1) / (2 * d))
 
     def traction_scale(self, term: LawTerm) -> Array:
-        """What a law's j' is judged by at its vertices: its own size, but at least a share of the body's, (m,)."""
-        return np.maximum(term.exact.traction_scale, DEFAULT.law_scale * self.at(term.surface.blocks) / term.multiplier)
+        """What a law's j' is judged by at its vertices: its own size, but at least a share of the body's, (m,).
+
+        A linear law has no size of its own.
+        """
+        own = 0.0 if term.exact.is_linear else term.exact.traction_scale
+        return np.maximum(own, DEFAULT.law_scale * self.at(term.surface.blocks) / term.multiplier)
 
 
 def of(problem: Problem, load: Array) -> References:

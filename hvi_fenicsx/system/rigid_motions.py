@@ -255,13 +255,13 @@ class NetForces:
 
 
 def capable(problem: Problem) -> list[NodalForces]:
-    """Forces of the laws' own size along each of their directions.
+    """Forces of the laws' own size along each of their directions; linear laws have none.
 
     Args:
         problem: the problem.
     """
     found = []
-    for term in problem.terms:
+    for term in (term for term in problem.terms if not term.exact.is_linear):
         size = term.weights[:, None] * term.exact.traction_scale
         found += [NodalForces(term.surface.blocks, size * along) for along in np.moveaxis(term.directions, 1, 0)]
     return found

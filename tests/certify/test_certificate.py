@@ -57,6 +57,20 @@ def pushed(solution: Solution, block: int, step: tuple[float, float]) -> Certifi
     return certified(solution, u)
 
 
+def test_the_reference_slip_of_a_spring_is_no_scale_of_the_certificate() -> None:
+    """J is ½ k x², whatever slip is called typical: all entries stay, and so does what a false state is refused by."""
+    entries = []
+    for slip in (1e-12, 1e-6, 1e3):
+        table = model(CELLS)
+        law = {"law": "linear_spring", "stiffness": 1e12, "reference_slip": slip}
+        table["boundary"]["floor"] = {"on": "bottom", "support": law}
+        solution = solved(table)
+        false = pushed(solution, vertex(solution, 0.5, 0.0), (0.0, 1e-12))
+        entries.append([getattr(false, name) for name in ENTRIES])
+        assert not false.passed
+    np.testing.assert_allclose(entries, [entries[0]] * len(entries), rtol=1e-6)
+
+
 def test_the_solution_passes_with_a_wide_margin(found: Solution) -> None:
     verdict = certified(found, displacement(found))
     assert verdict.passed

@@ -68,6 +68,37 @@ def test_a_gap_that_never_closes_is_told() -> None:
     assert any("the gap is 3 m at least" in sentence for sentence in warned(table))
 
 
+def on_floor(law: dict[str, Any], traction: str) -> tuple[str, ...]:
+    """What is warned of a block on a law alone, under a traction upwards."""
+    table = block(2, 0.0)
+    table["boundary"]["press"]["traction"] = [0.0, traction]
+    table["boundary"]["push"] = {"on": "left", "displacement": [0.0, "free"]}
+    table["boundary"]["floor"] = {"on": "bottom", **law}
+    return tuple(s for s in warned(table) if "the side " in s)
+
+
+SPRING = {"law": "linear_spring", "stiffness": 1e12}
+RISING = {"law": "graph", "points": [[0, 0], [1.0, 1e12]]}
+
+
+@pytest.mark.parametrize("key", ["cohesion", "adhesion"])
+def test_bonds_that_are_pressed_are_told(key: str) -> None:
+    """Under an even traction every vertex of the floor goes up, or down, with it."""
+    side = {"on": "left", "displacement": [0.0, "free"]}
+    top = {"on": "top", "displacement": ["free", -1e-6]}
+    for pressed, push in (True, -1e-6), (False, 1e-6):
+        table = block(2, 0.0)
+        table["boundary"] = {"push": side, "press": top | {"displacement": ["free", push]}}
+        table["boundary"]["floor"] = {"on": "bottom", key: RISING}
+        assert any("nothing stops penetration" in s for s in warned(table)) == pressed
+
+
+def test_a_foundation_that_pulls_is_told() -> None:
+    """A block that is drawn upwards at one end only lifts off there; pressed evenly it lifts off nowhere."""
+    assert "is pulled back" in on_floor({"support": SPRING}, "1e6*(2*x - 1)")[0]
+    assert not on_floor({"support": SPRING}, "-1e6")
+
+
 @pytest.mark.parametrize("strain", [0.09, 0.11])
 def test_a_strain_is_told_by_its_size(strain: float) -> None:
     """Uniaxial: strain = traction over modulus."""

@@ -126,6 +126,15 @@ def test_a_script_that_fills_the_memory_is_refused(tmp_path: Path, monkeypatch: 
         gmsh_file.read(MPI.COMM_WORLD, script, 2)
 
 
+@pytest.mark.parametrize("count", ["1e8", "1e9"])
+def test_a_count_of_too_many_cells_is_named_as_one(count: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gmsh itself says nothing where an allocation fails."""
+    monkeypatch.setattr(cost, "free_memory", lambda: 1000.0)
+    script = written(tmp_path / "m.geo", TRIANGLE + f"Transfinite Curve {{1, 2}} = {count};")
+    with pytest.raises(InputError, match=r"more than the 0\.78 GB that it may use; look for a count or a size"):
+        read(script)
+
+
 def signalled_while_meshing(temporary: Path) -> None:
     """A signal to this process a second after gmsh's own was given its folder."""
     while not list(temporary.iterdir()):
