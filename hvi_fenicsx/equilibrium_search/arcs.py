@@ -34,11 +34,20 @@ def chain(graph: TractionGraph, weight: float, sign: float) -> Chain:
         weight: lumped area.
         sign: +1 or -1 (or a factor of the argument).
     """
-    first, last, anchor, value, traction, slope = graph.table.T
-    ends = (first, last) if sign > 0 else (last, first)
-    low, high, middle = (place / sign + 0.0 for place in (*ends, anchor))
-    rows = np.column_stack([low, high, middle, weight * value, weight * sign * traction, weight * sign * sign * slope])
-    return tuple(arcs_of(rows if sign > 0 else rows[::-1]))
+    return tuple(arcs_of(graph.along(sign).table * [1.0, 1.0, 1.0, weight, weight, weight]))
+
+
+def graph_of(rows: Array) -> TractionGraph:
+    """The traction of a chain over the whole line, which bends or jumps at 0 if anywhere.
+
+    Args:
+        rows: its arcs, (k, 6).
+    """
+    ends = rows[:-1, 1] if len(rows) > 1 else np.zeros(1)
+    inner = rows if len(rows) > 1 else np.vstack([rows, rows])
+    _, _, anchors, _, tractions, slopes = inner.T
+    left, right = (tractions[at] + slopes[at] * (ends - anchors[at]) for at in (slice(None, -1), slice(1, None)))
+    return TractionGraph(ends, left, right, slopes)
 
 
 def total(chains: Sequence[Chain]) -> Chain:
@@ -155,26 +164,8 @@ class ArcTable:
 
     @cached_property
     def convex_part(self) -> ArcTable:
-        """H of a split φ = h - g into convex parts of laws over the whole line; at zero both have the same energy.
-
-        From zero on h' rises with φ', and does not fall with it.
-        """
-        zero = np.zeros(len(self.low))
-        k, middle = np.arange(self.low.shape[1]), self.at(zero)[:, None]
-        slopes, jumps = np.maximum(self.slopes, 0.0), np.maximum(self.after[:, 1:] - self.before[:, :-1], 0.0)
-        jumps = np.where(self.low[:, 1:] < INF, jumps, 0.0)
-        none, start, energy = zero[:, None], self.rates(zero), self.energy(zero)
-        right = np.column_stack([np.where(k[:-1] >= middle, jumps, 0.0), none])
-        left = np.column_stack([none, np.where(k[1:] <= middle, jumps, 0.0)])[:, ::-1]
-        far, near = np.maximum(self.high, 0.0), np.maximum(self.low, 0.0)
-        values, rates = _onwards(near, far, slopes, right, start, energy)
-        far, near = -np.minimum(self.low, 0.0)[:, ::-1], -np.minimum(self.high, 0.0)[:, ::-1]
-        below, falls = _onwards(near, far, slopes[:, ::-1], left, -start, energy)
-        ahead = k >= middle
-        anchors = np.where(ahead, np.maximum(self.low, 0.0), self.high)
-        anchors = np.where(self.low < INF, anchors, 0.0)
-        values, rates = np.where(ahead, values, below[:, ::-1]), np.where(ahead, rates, -falls[:, ::-1])
-        return ArcTable(self.low, self.high, anchors, values, rates, slopes)
+        """H of a split φ = h - g into convex parts of laws over the whole line, but for a constant and a slope."""
+        return ArcTable.of([chain(graph_of(self.rows(i)).split()[0], 1.0, 1.0) for i in range(len(self.low))])
 
     def states(self, z: Array, scale: Array) -> Integers:
         """The state of each unknown, of convex chains: 2k at the end k, 2k + 1 on arc k.
@@ -274,17 +265,3 @@ class ArcTable:
 
 def _finite(ends: Array, others: Array) -> Array:
     return np.where(np.isfinite(ends), ends, others)
-
-
-def _onwards(near: Array, far: Array, slopes: Array, jumps: Array, rate: Array, value: Array) -> tuple[Array, Array]:
-    """Energies and tractions at the begins of arcs one after the other, of which the last is endless, (n, m) each."""
-    long = np.where(np.isfinite(far), far, near) - np.where(np.isfinite(near), near, 0.0)
-    long = np.where(np.isfinite(long), long, 0.0)
-    rises = slopes * long
-    rates = rate[:, None] + _sums_before(rises + jumps)
-    return value[:, None] + _sums_before((rates + 0.5 * rises) * long), rates
-
-
-def _sums_before(parts: Array) -> Array:
-    """The sum of the parts before each, (n, m)."""
-    return np.cumsum(parts, axis=1) - parts
