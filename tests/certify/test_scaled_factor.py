@@ -1,4 +1,4 @@
-"""A path's certificates do not hang on how its factor is scaled: a thousandth of a load a thousand times is the load."""
+"""Certificates of a path do not hang on its factor's scale: a thousandth of a load a thousand times is the load."""
 
 from __future__ import annotations
 
