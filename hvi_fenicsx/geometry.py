@@ -21,6 +21,11 @@ def in_space(vectors: Array) -> Array:
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
+def units(vectors: Array) -> Array:
+    """The unit vectors along vectors, both (n, d)."""
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
 class Curve(Protocol):
     """What a side that is not straight lies on, in d dimensions."""
 
@@ -51,7 +56,7 @@ class CircularArc:
     def nearest(self, x: Array) -> Array:
         """The points of the circle nearest to the points x, both of shape (n, 2), m."""
         away = x - self.centre
-        return self.centre + self.radius * away / np.linalg.norm(away, axis=1, keepdims=True)
+        return self.centre + self.radius * units(away)
 
     def moved(self, origin: Array, rotation: Array) -> CircularArc:
         """The circle turned about the origin of coordinates, and then moved.
@@ -183,6 +188,17 @@ def _walk(start: int, onwards: dict[int, list[int]]) -> Integers:
     return np.array(chain, dtype=np.int64)
 
 
+def across(slopes: Array) -> Array:
+    """Vectors along the normals, their lengths what a facet has of length or twice its area there, (p, d).
+
+    Args:
+        slopes: in d dimensions, (p, d-1, d).
+    """
+    if slopes.shape[2] == 2:
+        return np.column_stack([slopes[:, 0, 1], -slopes[:, 0, 0]])
+    return np.cross(slopes[:, 0], slopes[:, 1])
+
+
 def tangents(normals: Array) -> Array:
     """The unit tangents of outward normals, (m, d-1, d), that all results refer to.
 
@@ -198,6 +214,5 @@ def tangents(normals: Array) -> Array:
         return (t * np.sign(t[rows, np.argmax(np.abs(t), axis=1)])[:, None])[:, None, :] + 0.0
     steep = np.abs(normals[:, 0]) > np.sqrt(0.5)
     axis = np.where(steep[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    t1 = axis - np.sum(axis * normals, axis=1)[:, None] * normals
-    t1 /= np.linalg.norm(t1, axis=1)[:, None]
+    t1 = units(axis - np.sum(axis * normals, axis=1)[:, None] * normals)
     return np.stack([t1, np.cross(normals, t1)], axis=1) + 0.0

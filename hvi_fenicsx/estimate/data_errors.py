@@ -17,6 +17,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from .. import geometry
 from ..certify.contact_state import ContactState
 from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..formula import SpatialValue
@@ -197,18 +198,14 @@ def surface_compliance(stiffness: Array, corners: Array) -> Array:
     """
     d = corners.shape[1]
     sides = np.asarray((corners[:, 1:] - corners[:, :1])[:, :, :d], dtype=np.float64)
-    along = _unit(sides[:, 0])
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) if d == 2 else _unit(np.cross(along, sides[:, 1]))
+    along = geometry.units(sides[:, 0])
+    normals = geometry.units(geometry.across(sides))
     waves = [along]
     if d == 3:
         across, angles = np.cross(normals, along), np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
         waves = [np.cos(a) * along + np.sin(a) * across for a in angles]
     inverses = np.linalg.inv(np.array([_barnett_lothe(stiffness, wave, normals) for wave in waves]))
     return np.einsum("wfii->fi", inverses) / len(waves)
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def _barnett_lothe(stiffness: Array, wave: Array, normal: Array) -> Array:

@@ -15,6 +15,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
+from ..geometry import units
 from ..mesh import nodes
 from ..problem import spaces
 from ..problem.problem import Bounds, Problem
@@ -138,8 +139,7 @@ def bubble_bounds(problem: Problem, u: fem.Function, bounds: Bounds, space: fem.
         field.x.scatter_forward()
         return points.values(field)
 
-    normals = middle(bounds.surface.normals)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = units(middle(bounds.surface.normals))
     normal = np.sum(bounds.surface.values(u.x.array) * bounds.surface.normals, axis=1)
     lower, upper = middle(np.column_stack([bounds.lower - normal, bounds.upper - normal]))[:, :2].T
     if nodes.degree(problem.space) == 1:  # what is beyond them is rounding; a quadratic function dips

@@ -202,14 +202,13 @@ def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) 
         space: of bubbles.
         local: the local facets.
     """
-    topology, d = problem.domain.mesh.topology, problem.dimension
-    cells, number = facets.cells_of(problem.domain.mesh, local)
-    owned = cells < topology.index_map(d).size_local
-    cells, number, local = cells[owned], number[owned], local[owned]
+    mesh, d = problem.domain.mesh, problem.dimension
+    local = facets.with_cells(mesh, local)[0]
+    cells, number = facets.cells_of(mesh, local)
     degree, on = nodes.degree(problem.space), nodes.facet_nodes(problem.space, local)
-    table = np.array(_numbers_in_cell(degree, topology.cell_name()), dtype=np.int32)
+    table = np.array(_numbers_in_cell(degree, mesh.topology.cell_name()), dtype=np.int32)
     found = np.take_along_axis(space.dofmap.list[cells], table[number], axis=1)
-    points = problem.points[on[:, :d]] / problem.scales.length
+    points = problem.points[on[:, :d], :d] / problem.scales.length
     return ContactFacets(degree, on, found, facets.areas(points), cells, local)
 
 
@@ -355,7 +354,7 @@ def part_points(problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, 
             at=np.searchsorted(known, _numbers(problem.space, on.nodes)),
             kept=kept,
             shares=np.ones((len(own), 1)),
-            carriers=_means(kept),
+            carriers=dual_basis.means(kept),
         ),
     )
 
@@ -429,7 +428,7 @@ def _of_carriers(problem: Problem, interface: Interface) -> Spread:
     own = _numbers(problem.space, interface.surface.blocks)
     known, kept = np.flatnonzero(weights > 0.0), weights[first.nodes] > 0.0
     at = np.where(kept, np.searchsorted(known, first.nodes), 0)
-    carriers = _means(kept)
+    carriers = dual_basis.means(kept)
     for facet, node in dual_basis.adopted(first, interface.overlaps, kept).items():
         at[facet, 0], carriers[facet, :, 0] = np.searchsorted(known, node), 1.0
     return Spread(
@@ -438,13 +437,6 @@ def _of_carriers(problem: Problem, interface: Interface) -> Spread:
         own=np.searchsorted(known, own),
         at=at,
         kept=kept,
-        shares=(weights[own] / interface.rows.first.diagonal()[own])[:, None],
+        shares=1.0 / interface.rows.first.diagonal()[own][:, None],
         carriers=carriers,
     )
-
-
-def _means(kept: Mask) -> Array:
-    """Weights (f, n, n) by which nodes that carry something (f, n) stay as they are, others are the mean of these."""
-    count = kept.shape[1]
-    shares = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
-    return np.where(kept[:, :, None], np.eye(count), shares[:, None, :])

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from dolfinx import mesh as dmesh
 
+from ..geometry import across, units
 from ..typing import Array, Entities, Integers
 
 
@@ -72,15 +71,26 @@ def corners(mesh: dmesh.Mesh, facets: Entities) -> Array:
     return mesh.geometry.x[found][:, :, :d]
 
 
+def with_cells(mesh: dmesh.Mesh, facets: Entities) -> tuple[Entities, Entities]:
+    """Those of some facets of the surface whose cells this rank owns, and these cells.
+
+    Args:
+        mesh: the mesh.
+        facets: local facets (owned and ghost).
+    """
+    d, cells = mesh.topology.dim, cells_of(mesh, facets)[0]
+    alone = np.diff(mesh.topology.connectivity(d - 1, d).offsets)[facets] == 1
+    owned = alone & (cells < mesh.topology.index_map(d).size_local)
+    return facets[owned], cells[owned]
+
+
 def areas(points: Array) -> Array:
-    """Lengths or areas of simplices by Gram's determinant, (f,).
+    """Lengths or areas of segments or triangles, (f,).
 
     Args:
         points: their vertices, (f, d, d).
     """
-    edges = points[:, 1:] - points[:, :1]
-    gram = np.einsum("fki,fli->fkl", edges, edges)
-    return np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / math.factorial(edges.shape[1])
+    return np.linalg.norm(across(points[:, 1:] - points[:, :1]), axis=1) / (points.shape[2] - 1)
 
 
 def turns(mesh: dmesh.Mesh, facets: Entities) -> Array:
@@ -94,9 +104,7 @@ def turns(mesh: dmesh.Mesh, facets: Entities) -> Array:
         Of the vertices that have several of the facets, (n,).
     """
     points, d = corners(mesh, facets), mesh.topology.dim
-    edges = points[:, 1:] - points[:, :1]
-    normals = edges[:, 0, ::-1] * [1.0, -1.0] if d == 2 else np.cross(edges[:, 0], edges[:, 1])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = units(across(points[:, 1:] - points[:, :1]))
     nodes = dmesh.entities_to_geometry(mesh, d - 1, facets).ravel() if len(facets) else np.empty(0, np.int32)
     _, first, vertex, count = np.unique(nodes, return_index=True, return_inverse=True, return_counts=True)
     own = np.repeat(normals, d, axis=0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import dolfinx
@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..formula import SpatialValue
 from ..mesh.boundary_part import BoundaryPart, InterfaceSides
 from ..mesh.domain import Domain
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, largest
 from ..typing import Entities, together
 from . import constraints, domain_forms, elastic_operator, interfaces, law_term, scaling
 from .contact_surface import Surface
@@ -69,10 +69,20 @@ def compose(domain: Domain, model: Formulation) -> Problem:
         return functools.partial(_largest, domain, facets, placed)
 
     scales = scaling.choose(sizes, domain.dimension, effects, evaluate)
-    context = DomainForms(domain, facets, scales, effects, model.degree)
-    contributions = [PlacedContribution(where, effect, effect.contribute(context, where)) for where, effect in effects]
     implausible = [f"{scaling.place(e)}: {text}" for e in effects for text in e[1].implausible(evaluate(e), sizes)]
-    return _problem(context, contributions, model, tuple(implausible))
+    while True:
+        found = _problem(DomainForms(domain, facets, scales, effects, model.degree), model, tuple(implausible))
+        stress = _measured_overlap(found) * scales.modulus / scales.length
+        if not stress > scales.stress:
+            return found
+        scales = replace(scales, stress=stress)  # an overlap that only the mesh knows is the largest load
+
+
+def _measured_overlap(problem: Problem) -> float:
+    """By how much sides overlap of which a gap is measured, m. Collective."""
+    measured = [where for where, _, c in problem.contributions if any(bound.measured for bound in c.bounds)]
+    depths = [float(np.max(-one.gap, initial=0.0)) for one in problem.interfaces if one.name in measured]
+    return largest(problem.comm, max(depths, default=0.0))
 
 
 def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, formula: SpatialValue) -> float:
@@ -101,13 +111,9 @@ def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) ->
     return domain.dimension, np.arange(domain.mesh.topology.index_map(domain.dimension).size_local, dtype=np.int32)
 
 
-def _problem(
-    context: DomainForms,
-    contributions: Sequence[PlacedContribution],
-    model: Formulation,
-    implausible: tuple[str, ...],
-) -> Problem:
+def _problem(context: DomainForms, model: Formulation, implausible: tuple[str, ...]) -> Problem:
     """All contributions together. Collective."""
+    contributions = [PlacedContribution(where, one, one.contribute(context, where)) for where, one in model.effects]
     components = constraints.prescribed_components(context, contributions)
     prescribed = constraints.values(context, components)
     fixed = together(one.dofs for one in components)
@@ -149,7 +155,7 @@ def _surfaces(
     """The parts of Γc by name, those of interfaces too, and the interfaces. Collective."""
     surfaces = constraints.make_surfaces(context, contributions, fixed, model.interfaces)
     occupied = np.concatenate([fixed // context.dimension, *(surface.blocks for surface in surfaces.values())])
-    found = interfaces.find(context, model.interfaces, occupied)
+    found = interfaces.find(context, model.interfaces, occupied, fixed)
     return surfaces | {one.name: one.surface for one in found}, found
 
 

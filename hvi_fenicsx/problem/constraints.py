@@ -61,6 +61,7 @@ def _surface(context: DomainForms, where: str) -> Surface:
             context.space,
             context.points,
             facets,
+            context.gathered(facets),
             context.boundary(where, **contact_rule(context.space)),
             context.length ** (context.dimension - 1),
         ),

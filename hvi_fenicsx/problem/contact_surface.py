@@ -17,11 +17,12 @@ from mpi4py import MPI
 from scipy.spatial import KDTree
 
 from ..errors import InputError
-from ..geometry import spot, tangents
+from ..geometry import spot, tangents, units
 from ..runtime.mpi import agree, largest, refuse
 from ..typing import Array, Entities, Integers
-from .facets import is_curved
+from .facets import Facets, is_curved, quadric_of, turned
 from .scaling import DEFAULT
+from .spaces import coefficients_of
 from .vectors import nodal
 
 
@@ -72,16 +73,18 @@ def make_surface(
     space: fem.FunctionSpace,
     vertices: Array,
     facets: Entities,
+    side: Facets,
     measure: Any,
     area: float,
 ) -> Surface:
-    """The vertices of a part, with the mean normals of the facets there. Collective.
+    """The vertices of a part, with its own normals where it is round, else the mean ones of the facets. Collective.
 
     Args:
         part: its name.
         space: P1 vectors.
         vertices: the local vertices of the mesh, m, (n, 3).
         facets: the part's local facets.
+        side: those of all ranks.
         measure: ds with vertex quadrature over the part, SI.
         area: L^(d-1), what the weights are divided by.
 
@@ -90,10 +93,14 @@ def make_surface(
     """
     blocks, test = own_nodes(space, facets), ufl.TestFunction(space)
     normal = nodal(ufl.inner(ufl.FacetNormal(space.mesh), test) * measure)[blocks]
-    weights: Array = _weights(space, normal, test, measure, blocks) / area
+    ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * normal.shape[1])
+    weights: Array = nodal(ufl.inner(ones, test) * measure)[blocks, 0] / area
     if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
         raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
-    normals = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    lies_on, places = quadric_of(side), coefficients_of(space, vertices)[blocks, : normal.shape[1]]
+    normals = turned(normal if lies_on is None else lies_on.slopes(places), normal)
+    if is_curved(space):  # so a uniform pressure presses along them as its nodal values do, whatever the curve
+        weights = np.sum(normal * normals, axis=1) / area
     return Surface(
         part=part,
         facets=facets,
@@ -115,17 +122,6 @@ def own_nodes(space: fem.FunctionSpace, facets: Entities) -> Entities:
     """
     dofs = fem.locate_dofs_topological(space, space.mesh.geometry.dim - 1, facets)
     return np.unique(dofs[dofs < space.dofmap.index_map.size_local])
-
-
-def _weights(space: fem.FunctionSpace, normal: Array, test: Any, measure: Any, blocks: Entities) -> Any:
-    """The integrals of the basis functions, (m,); of curved cells the sizes of those times the normal.
-
-    With the latter a uniform pressure has exactly the forces of its nodal values, whatever the curve.
-    """
-    if is_curved(space):
-        return np.linalg.norm(normal, axis=1)
-    ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * space.mesh.geometry.dim)
-    return nodal(ufl.inner(ones, test) * measure)[blocks, 0]
 
 
 def component_dofs(blocks: Entities, directions: Array) -> tuple[Integers, Array]:
@@ -186,16 +182,20 @@ def _own(surface: Surface, stated: Array | None, length: float, rounding: float)
         # size of the coordinates over that of the facets: so much larger is rounding of normals
         facet = length * surface.weights ** (1 / (surface.normals.shape[1] - 1))
         refinement = (length + np.linalg.norm(surface.points, axis=1)) / facet
-        normals = _without_rounding(surface.normals, rounding * refinement[:, None])
+        normals = without_rounding(surface.normals, rounding * refinement[:, None])
     else:
-        normals = _without_rounding(stated, rounding)
+        normals = without_rounding(stated, rounding)
     return replace(surface, normals=normals, measured=normals)
 
 
-def _without_rounding(normals: Array, rounding: Array | float) -> Array:
-    """Unit vectors (m, d), with zero for components up to the size of rounding, a number or (m, 1)."""
-    kept = np.where(np.abs(normals) <= rounding, 0.0, normals)
-    return kept / np.linalg.norm(kept, axis=1, keepdims=True)
+def without_rounding(normals: Array, rounding: Array | float) -> Array:
+    """Unit vectors along others, with zero for components that are no larger than rounding.
+
+    Args:
+        normals: of any length near 1, (m, d).
+        rounding: a number, or (m, 1).
+    """
+    return units(np.where(np.abs(normals) <= rounding, 0.0, normals))
 
 
 def _at_shared_vertices(

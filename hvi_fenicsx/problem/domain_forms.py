@@ -23,8 +23,9 @@ from ..mesh.domain import Domain
 from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from . import facets as boundary_facets
+from .facets import Facets
 from .scaling import Placed, Scales
-from .spaces import LOAD_DEGREE, displacement_space, pressure_space
+from .spaces import LOAD_DEGREE, displacement_space, edge_share, global_numbers, pressure_space
 
 
 class DomainForms:
@@ -60,6 +61,27 @@ class DomainForms:
             on = np.unique(nodes.facet_nodes(self.space, self.domain.sides[name]))
             found[on, :d] = curve.nearest(found[on, :d])
         return found
+
+    def gathered(self, local: Entities) -> Facets:
+        """Facets of the surface whose cells this rank owns, and those of all other ranks. Collective.
+
+        Args:
+            local: local facets.
+        """
+        space, d, points = self.space, self.dimension, self.points[:, : self.dimension]
+        local, cells = facet_sizes.with_cells(self.domain.mesh, local)
+        blocks, middles = nodes.facet_nodes(space, local), points[space.dofmap.list[cells][:, : d + 1]].mean(axis=1)
+        normals = boundary_facets.outward(points[blocks[:, :d]], middles)
+        parts = [global_numbers(space, blocks), points[blocks], normals]
+        every = agree(self.mesh.comm, parts)
+        numbers, places, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
+        order = np.lexsort(np.round(places[:, :d].mean(axis=1) / self.length, 12).T)
+        return Facets(
+            nodes=numbers[order].astype(np.int64),
+            points=places[order],
+            normals=normals[order],
+            share=edge_share(space),
+        )
 
     @functools.cached_property
     def scalar_test(self) -> Any:

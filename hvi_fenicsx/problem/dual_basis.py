@@ -14,13 +14,15 @@ second side ends.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
-from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
 
+from ..geometry import ROUNDING
 from ..typing import Array, Integers, Mask
 from .facet_overlaps import OverlapPoints, Overlaps
 from .facets import Facets
@@ -32,8 +34,8 @@ class RelativeRows:
 
     Attributes:
         weights: ∫ψ_i, by node of the mesh, 0 for all others, m^(d-1), (N,).
-        first: ∫ψ_i φ_j on the first side, (N, N).
-        second: ∫ψ_i φ_k on the second, (N, N).
+        first: ∫ψ_i φ_j / ∫ψ_i on the first side, (N, N).
+        second: that on the second, (N, N), or what it is for vectors, (N d, N d).
     """
 
     weights: Array
@@ -60,11 +62,36 @@ def relative_rows(first: Facets, second: Facets, overlaps: Overlaps, kept: Mask,
     values *= points.weights[:, None]
     rows = carriers[points.first]
     weights = np.bincount(rows.ravel(), weights=values.ravel(), minlength=size).astype(np.float64)
+    values *= np.divide(1.0, weights, out=np.zeros(size), where=weights > 0.0)[rows]
     return RelativeRows(
         weights=weights,
         first=_sums(rows, rows, values, functions, size),
         second=_sums(rows, second.nodes[points.second], values, second.functions(points.on_second), size),
     )
+
+
+def rigid_rows(rows: RelativeRows, places: Array, meets: Array) -> RelativeRows:
+    """The rows with the second side's displacement where the nodes of the first meet it, off its facets.
+
+    It is that of the facets, and what the rotation that is nearest to the displacements of their nodes adds: so rigid
+    motions are exact.
+
+    Args:
+        rows: of the nodes' functions.
+        places: the coefficients of the nodes' positions, m, (N, d).
+        meets: where the second side is met by those nodes of the first that carry something, m, (m, d).
+    """
+    own, d = np.flatnonzero(rows.weights), places.shape[1]
+    met, spins = rows.second[own], np.array([np.outer(b, a) - np.outer(a, b) for a, b in combinations(np.eye(d), 2)])
+    shares, row = abs(met), np.repeat(np.arange(len(own)), np.diff(met.indptr))
+    centres = shares @ places / shares.sum(axis=1)[:, None]
+    turns = np.einsum("kd,rde->kre", places[met.indices] - centres[row], spins)
+    moments = shares.data[:, None, None] * turns
+    inertia = np.add.reduceat(moments @ turns.transpose(0, 2, 1), met.indptr[:-1])
+    lever = np.einsum("id,rde->ier", meets - met @ places, spins)
+    entries = (lever @ np.linalg.pinv(inertia, ROUNDING))[row] @ moments + met.data[:, None, None] * np.eye(d)
+    vectors = bsr_array((entries, met.indices, rows.second.indptr), (places.size, places.size))
+    return replace(rows, second=csr_array(vectors))
 
 
 def adopted(first: Facets, overlaps: Overlaps, kept: Mask) -> dict[int, int]:
@@ -88,12 +115,10 @@ def adopted(first: Facets, overlaps: Overlaps, kept: Mask) -> dict[int, int]:
 
 def _sums(rows: Integers, columns: Integers, values: Array, functions: Array, size: int) -> csr_array:
     """Sums of values (p, n) times functions (p, n) at rows and columns."""
-    shape = (*values.shape, functions.shape[1])
-    entries = np.einsum("pi,pk->pik", values, functions)
-    at = np.broadcast_to(rows[:, :, None], shape), np.broadcast_to(columns[:, None, :], shape)
-    nonzero = np.broadcast_to(values[:, :, None] != 0.0, shape)
-    pairs = at[0][nonzero], at[1][nonzero]
-    return csr_array(coo_array((entries[nonzero], pairs), shape=(size, size)))
+    entries, *at = np.broadcast_arrays(np.einsum("pi,pk->pik", values, functions), rows[:, :, None], columns[:, None])
+    found = csr_array((entries.ravel(), [one.ravel() for one in at]), (size, size))
+    found.eliminate_zeros()
+    return found
 
 
 def _coefficients(points: OverlapPoints, functions: Array, kept: Mask) -> Array:
@@ -102,26 +127,17 @@ def _coefficients(points: OverlapPoints, functions: Array, kept: Mask) -> Array:
     mass = np.zeros((count, each, each))
     products = np.einsum("p,pk,pj->pkj", points.weights, functions, functions)
     np.add.at(mass, points.first, products)
-    basis = np.zeros((count, each, each))
-    covered = np.zeros(count, dtype=bool)
-    covered[points.first] = True
-    for pattern in np.unique(kept[covered], axis=0):
-        here, own = np.flatnonzero(covered & np.all(kept == pattern, axis=1)), np.flatnonzero(pattern)
-        if len(own):
-            spread = _shared(pattern)[own]  # φ of the kept nodes, with the shares of the others
-            gram = spread @ mass[here][:, :, own]
-            areas = mass[here].sum(axis=1)[:, own]
-            basis[np.ix_(here, own)] = areas[:, :, None] * np.linalg.solve(
-                gram, np.broadcast_to(spread, (len(here), *spread.shape))
-            )
-    return basis
+    areas, spread = mass.sum(axis=1), means(kept).transpose(0, 2, 1)
+    own = kept & areas.any(axis=1, keepdims=True)
+    gram = np.where(own[:, :, None] & own[:, None], spread @ mass, np.eye(each))
+    return areas[:, :, None] * np.linalg.solve(gram, spread)
 
 
-def _shared(pattern: Mask) -> Array:
-    """Functions that sum up to 1: those of kept nodes take equal shares of the others', (n, n)."""
-    spread = np.eye(len(pattern))
-    spread[:, ~pattern] = 1.0 / max(int(np.count_nonzero(pattern)), 1)
-    return spread
+def means(kept: Mask) -> Array:
+    """Weights (f, n, n) by which nodes that carry something (f, n) stay as they are, others are the mean of these."""
+    count = kept.shape[1]
+    shares = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
+    return np.where(kept[:, :, None], np.eye(count), shares[:, None, :])
 
 
 @dataclass(frozen=True)
@@ -165,25 +181,22 @@ def coupled(space: fem.FunctionSpace, interfaces: Sequence[RelativeRows]) -> Cou
     """
     if not interfaces:
         return None
-    size, (start, end) = space.dofmap.index_map.size_global, space.dofmap.index_map.local_range
-    inverse, forward = (csr_array(eye_array(size, format="csr")[start:end]) for _ in range(2))
+    d, numbers = space.dofmap.index_map_bs, space.dofmap.index_map
+    size, (start, end) = numbers.size_global * d, np.array(numbers.local_range) * d
+    same = inverse = forward = csr_array(eye_array(size, format="csr")[start:end])
     for one in interfaces:
-        over = np.divide(1.0, one.weights, out=np.zeros(size), where=one.weights > 0.0)
-        rows = csr_array((one.first - one.second).multiply(over[:, None]))
-        diagonal = rows.diagonal()
-        own = diags_array(diagonal[start:end], offsets=0) @ eye_array(size, format="csr")[start:end]
-        rest, scale = rows[start:end] - own, diagonal[start:end]
-        unit = diags_array((scale != 0.0).astype(float), offsets=0) @ eye_array(size, format="csr")[start:end]
+        rows = csr_array(kron(one.first, np.eye(d)) - one.second)
+        scale = rows.diagonal()[start:end]
+        change = rows[start:end] - diags_array((scale != 0.0).astype(float)) @ same
+        inverse = inverse + change
         over = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale != 0.0)
-        inverse = inverse + rest + own - unit
-        forward = forward - diags_array(over, offsets=0) @ (rest - unit) - unit
+        forward = forward - diags_array(over) @ change
     return Coupling(space, _petsc_matrix(space, forward), _petsc_matrix(space, inverse))
 
 
 def _petsc_matrix(space: fem.FunctionSpace, rows: csr_array) -> PETSc.Mat:
-    """A matrix over vertices as one over their vectors, component by component. Collective."""
-    d, index_map = space.dofmap.index_map_bs, space.dofmap.index_map
-    whole = csr_array(kron(csr_array(rows), np.eye(d), format="csr"))
+    """This rank's rows of a matrix over the components of all nodes. Collective."""
+    d, index_map, whole = space.dofmap.index_map_bs, space.dofmap.index_map, csr_array(rows)
     whole.eliminate_zeros()
     whole.sort_indices()
     size = index_map.size_local * d, index_map.size_global * d

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..geometry import tangents
+from ..geometry import across, tangents
 from ..typing import Array, Integers, Mask
 from . import facets
-from .facets import Facets, across, places, slopes
+from .facets import Facets, places, slopes
 from .scaling import DEFAULT
 
 _STEPS = 12

@@ -1,9 +1,15 @@
-"""Facets, straight or curved through their nodes: places, slopes and quadrature on them, their own coordinates."""
+"""Facets, straight or curved through their nodes: places, slopes and quadrature on them, their own coordinates.
+
+The vertices of a round side lie on a quadric. Normals that are averaged over unequal facets resist a rotation, or a
+motion along an axis, that the side itself does not; those of its quadric are exactly orthogonal to it.
+"""
 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from typing import Any
 
 import basix
@@ -11,7 +17,9 @@ import numpy as np
 from dolfinx import fem
 
 from .. import compat
-from ..mesh import nodes
+from ..geometry import ROUNDING, across, units
+from ..mesh import facets, nodes
+from ..mesh.domain import DEFAULT
 from ..typing import Array, Entities, Integers
 from . import spaces
 
@@ -94,17 +102,6 @@ def slopes(nodes: Array, barycentric: Array) -> Array:
     return np.einsum("jpn,pnk->pjk", functions, nodes)
 
 
-def across(slopes: Array) -> Array:
-    """Vectors along the normals, their lengths what a facet has of length or twice its area there, (p, d).
-
-    Args:
-        slopes: in d dimensions, (p, d-1, d).
-    """
-    if slopes.shape[2] == 2:
-        return np.column_stack([slopes[:, 0, 1], -slopes[:, 0, 0]])
-    return np.cross(slopes[:, 0], slopes[:, 1])
-
-
 @dataclass(frozen=True, kw_only=True)
 class Facets:
     """The facets of one side, the same on all ranks (f of them).
@@ -168,8 +165,7 @@ class Facets:
     @functools.cached_property
     def areas(self) -> Array:
         """Lengths or areas of the corners' segments or triangles, m^(d-1), (f,)."""
-        sides = self.corners[:, 1:] - self.corners[:, :1]
-        return np.linalg.norm(across(sides), axis=1) / (self.dimension - 1)
+        return facets.areas(self.corners)
 
     @property
     def width(self) -> float:
@@ -198,9 +194,7 @@ class Facets:
             facets: their numbers, (p,).
             barycentric: the point of each, (p, d).
         """
-        found = across(slopes(self.points[facets], barycentric))
-        found /= np.linalg.norm(found, axis=1, keepdims=True)
-        return found * np.sign((found * self.normals[facets]).sum(axis=1, keepdims=True))
+        return turned(across(slopes(self.points[facets], barycentric)), self.normals[facets])
 
 
 def outward(corners: Array, inner: Array) -> Array:
@@ -210,6 +204,65 @@ def outward(corners: Array, inner: Array) -> Array:
         corners: of the facets, (f, d, d).
         inner: points inside, (f, d).
     """
-    normals = across(corners[:, 1:] - corners[:, :1])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals * -np.sign((normals * (inner - corners[:, 0])).sum(axis=1, keepdims=True))
+    return turned(across(corners[:, 1:] - corners[:, :1]), corners[:, 0] - inner)
+
+
+def turned(vectors: Array, towards: Array) -> Array:
+    """The unit vectors along vectors, or against them, that look to the side of others; all (n, d)."""
+    return units(vectors * np.sign(np.sum(vectors * towards, axis=1, keepdims=True)))
+
+
+@dataclass(frozen=True)
+class Quadric:
+    """Where h·Qh = 0; h is the distance from an origin in parts of a length, and 1 as the last component.
+
+    Attributes:
+        origin: m, (d,).
+        length: m.
+        matrix: Q, symmetric, (d+1, d+1).
+    """
+
+    origin: Array
+    length: float
+    matrix: Array
+
+    def _at(self, points: Array) -> tuple[Array, Array]:
+        h = np.pad((points - self.origin) / self.length, ((0, 0), (0, 1)), constant_values=1.0)
+        return h, h @ self.matrix
+
+    def slopes(self, points: Array) -> Array:
+        """Vectors along the normals through points, both (p, d)."""
+        return self._at(points)[1][:, :-1]
+
+    def distances(self, points: Array, directions: Array) -> Array:
+        """How far it is from points along directions, unit vectors; both (p, d), m, (p,)."""
+        (h, slopes), ahead = self._at(points), np.pad(directions, ((0, 0), (0, 1)))
+        value, steep, bend = np.sum([h * slopes, ahead * slopes, ahead @ self.matrix * ahead], axis=2)
+        root = np.sqrt(np.maximum(steep**2 - bend * value, 0.0))
+        return -self.length * value / (steep + np.copysign(root, steep))
+
+
+def quadric_of(side: Facets) -> Quadric | None:
+    """The quadric that all vertices of a side lie on: a circle, or a cylinder along which its facets are, else any.
+
+    Args:
+        side: its facets.
+
+    Returns:
+        None where there is none or several, or where facets turn from one to the next as at an edge.
+    """
+    d, corners = side.dimension, side.corners.reshape(-1, side.dimension)
+    facing, places = np.repeat(side.normals, d, axis=0), np.unique(corners, axis=0)
+    axis = np.linalg.eigh(np.cov(facing.T))[1][:, : d - 2]
+    products = np.array([np.outer(a, b) + np.outer(b, a) for a, b in combinations_with_replacement(np.eye(d + 1), 2)])
+    linear = products[products[:, -1].any(axis=1)]
+    across = np.pad(np.eye(d) - axis @ axis.T, (0, 1))
+    for kinds in (np.concatenate([across[None], linear]), products):
+        one = Quadric(places.mean(axis=0), float(np.ptp(places)), kinds[0])
+        h, _ = one._at(places)
+        _, sizes, fits = np.linalg.svd(np.einsum("pi,kij,pj->pk", h, kinds, h), full_matrices=False)
+        if len(places) >= len(kinds) and sizes[-1] <= ROUNDING * sizes[0] < sizes[-2]:
+            one = replace(one, matrix=np.tensordot(fits[-1], kinds, 1))
+            if np.all(np.sum(turned(one.slopes(corners), facing) * facing, axis=1) > math.cos(DEFAULT.outline_turn)):
+                return one
+    return None

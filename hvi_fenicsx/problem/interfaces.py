@@ -11,22 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 
 from ..errors import InputError
-from ..geometry import tangents
+from ..geometry import spot, tangents
 from ..mesh import curved as curved_cells
-from ..mesh import nodes
 from ..mesh.boundary_part import InterfaceSides
-from ..mesh.facets import cell_facets
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers, Mask
 from . import dual_basis, facet_overlaps, spaces
-from .contact_surface import Surface
+from .contact_surface import Surface, without_rounding
 from .domain_forms import DomainForms
 from .dual_basis import RelativeRows
 from .facet_overlaps import Overlaps
-from .facets import Facets, is_curved, outward
+from .facets import Facets, is_curved, quadric_of, turned
 from .scaling import DEFAULT
 
 
@@ -56,39 +53,12 @@ def _pair(context: DomainForms, name: str, sides: InterfaceSides) -> Pair:
     """The facets of both sides on all ranks; refuses a side without facets. Collective."""
     found = []
     for side in (sides.first, sides.second):
-        facets = _gathered(context, context.domain.facets([side]))
+        facets = context.gathered(context.domain.facets([side]))
         if not len(facets.nodes):
             raise InputError(f"interface.{name}.between: no facet lies on {side!r}")
         found.append(facets)
     curved = is_curved(context.space) and any(curved_cells.is_curved(facets.points) for facets in found)
     return Pair(name, sides, *(replace(facets, curved=curved) for facets in found))
-
-
-def _gathered(context: DomainForms, local: Entities) -> Facets:
-    """Facets whose cells this rank owns, and those of all other ranks. Collective."""
-    space, d = context.space, context.dimension
-    of_cell, topology = cell_facets(context.domain.mesh), context.domain.mesh.topology
-    connected = topology.connectivity(d - 1, d)
-    local = local[np.diff(connected.offsets)[local] == 1]
-    cells = connected.array[connected.offsets[local]]
-    owned = cells < topology.index_map(d).size_local
-    local, cells = local[owned], cells[owned]
-    blocks = nodes.facet_nodes(space, local)
-    inner = space.dofmap.list[cells][:, : d + 1][of_cell[cells] == local[:, None]]
-    parts = [
-        spaces.global_numbers(space, blocks),
-        (context.points if is_curved(space) else context.points_on_curves)[blocks][:, :, :d],
-        outward(context.points[blocks[:, :d]][:, :, :d], context.points[inner][:, :d]),
-    ]
-    every = agree(context.mesh.comm, parts)
-    numbers, points, normals = (np.concatenate([part[i] for part in every]) for i in range(3))
-    order = np.lexsort(np.round(points[:, :d].mean(axis=1) / context.length, 12).T)
-    return Facets(
-        nodes=numbers[order].astype(np.int64),
-        points=points[order],
-        normals=normals[order],
-        share=spaces.edge_share(space),
-    )
 
 
 def check_carried(pair: Pair, overlaps: Overlaps, kept: Mask, busy: Mask) -> None:
@@ -112,30 +82,28 @@ def check_carried(pair: Pair, overlaps: Overlaps, kept: Mask, busy: Mask) -> Non
     lost = np.setdiff1d(overlaps.first, np.flatnonzero(kept.any(axis=1) | ~busy.any(axis=1)))
     lost = np.setdiff1d(lost, list(dual_basis.adopted(pair.first, overlaps, kept)))
     if len(lost):
-        at = tuple(float(f"{c:.6g}") for c in pair.first.corners[lost[0]].mean(axis=0))
+        at = spot(pair.first.corners[lost[0]].mean(axis=0))
         raise InputError(
             f"interface.{pair.name}: nothing carries the facet at {at}: its vertices and those near it are prescribed "
             "or on other parts; make the mesh there finer"
         )
 
 
-def check_apart(comm: MPI.Comm, pair: Pair, surface: Surface, gap: Array) -> None:
-    """Refuse bodies that overlap by more than the facets of their curved sides do. Collective.
+def check_apart(pair: Pair, points: Array, gaps: Array) -> None:
+    """Refuse bodies that overlap by more than the facets of their curved sides do.
 
     Args:
-        comm: the ranks.
         pair: the sides.
-        surface: the nodes of the first side that carry something.
-        gap: the distance of the sides there, m, (m,).
+        points: the nodes of the first side that carry something, m, (m, d).
+        gaps: the distance of the sides there, m, (m,).
 
     Raises:
-        InputError: on all ranks alike, with the place where they overlap most.
+        InputError: with the place where they overlap most.
     """
-    deepest = [(float(gap[i]), surface.spot(i)) for i in np.argsort(gap)[:1]]
-    depth, at = min((place for rank in agree(comm, deepest) for place in rank), default=(0.0, ""))
-    if depth < -DEFAULT.overlap * pair.first.width:
+    depth, at = -gaps.min(), spot(points[np.argmin(gaps)])
+    if depth > DEFAULT.overlap * pair.first.width:
         raise InputError(
-            f'interface.{pair.name}.between: at {at} "{pair.sides.second}" lies {-depth:.3g} m inside of the body '
+            f'interface.{pair.name}.between: at {at} "{pair.sides.second}" lies {depth:.3g} m inside of the body '
             f'of "{pair.sides.first}": move one of the bodies, name the sides that face each other, or mesh '
             "curved sides more finely"
         )
@@ -162,13 +130,16 @@ class Interface(Pair):
     members: Entities
 
 
-def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: Entities) -> tuple[Interface, ...]:
+def find(
+    context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: Entities, fixed: Entities
+) -> tuple[Interface, ...]:
     """The interfaces of a problem. Collective.
 
     Args:
         context: spaces, parts and vertices.
         wanted: what the scene says of each, by name.
         occupied: local vertices that are prescribed, or on a part with contact or laws.
+        fixed: local scalar dofs that are prescribed.
 
     Raises:
         InputError: on all ranks alike: sides that do not face each other or overlap, or what is not supported.
@@ -176,11 +147,15 @@ def find(context: DomainForms, wanted: Mapping[str, InterfaceSides], occupied: E
     if not wanted:
         return ()
     pairs = {name: _pair(context, name, sides) for name, sides in wanted.items()}
-    taken = np.concatenate(agree(context.mesh.comm, spaces.global_numbers(context.space, occupied)))
-    return tuple(_interface(context, name, pairs, taken) for name in wanted)
+    nodes_of, times = np.unique(fixed // context.dimension, return_counts=True)
+    known = [spaces.global_numbers(context.space, some) for some in (occupied, nodes_of[times == context.dimension])]
+    taken, held = map(np.concatenate, zip(*agree(context.mesh.comm, known), strict=True))
+    return tuple(_interface(context, name, pairs, taken, held) for name in wanted)
 
 
-def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken: Integers) -> Interface:
+def _interface(
+    context: DomainForms, name: str, pairs: Mapping[str, Pair], taken: Integers, held: Integers
+) -> Interface:
     """One interface: its intersections, which nodes of its first side carry something, normals, gaps. Collective.
 
     Nodes that are taken, by other interfaces too, or that the second side does not cover, carry nothing.
@@ -199,30 +174,28 @@ def _interface(context: DomainForms, name: str, pairs: Mapping[str, Pair], taken
     check_carried(pair, overlaps, kept, covered & busy)
     size = context.space.dofmap.index_map.size_global
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)
-    surface = _surface(context, pair, overlaps, rows)
-    gap = _gaps(context, surface, pair, rows)
-    check_apart(context.mesh.comm, pair, surface, gap)
+    places = np.zeros((size, context.dimension))
+    for side in (pair.first, pair.second):
+        places[side.nodes.ravel()] = side.positions.reshape(-1, context.dimension)
+    normals, weights, gaps, meets = _directions(pair, overlaps, rows, places, held)
     start, end = context.space.dofmap.index_map.local_range
+    own = np.flatnonzero(rows.weights)
+    here = (own >= start) & (own < end)
+    surface = _surface(context, pair, (own[here] - start).astype(np.int32), normals[here], weights[here])
     both = np.union1d(pair.first.nodes, pair.second.nodes)
     return Interface(
         **vars(pair),
         tied=_dofs(context, surface) if pair.sides.tied else np.empty(0, np.int32),
         surface=surface,
-        gap=gap,
-        rows=rows,
+        gap=gaps[here],
+        rows=dual_basis.rigid_rows(rows, places, meets),
         overlaps=overlaps,
         members=(both[(both >= start) & (both < end)] - start).astype(np.int32),
     )
 
 
-def _surface(context: DomainForms, pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> Surface:
-    d, (start, end) = context.dimension, context.space.dofmap.index_map.local_range
-    blocks = np.flatnonzero(rows.weights[start:end] > 0.0).astype(np.int32)
-    sums, weights = _summed_normals(pair, overlaps, rows)
-    mean = sums[start + blocks]
-    normals = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    rounded = np.round(normals)
-    normals = np.where(np.abs(normals - rounded) < DEFAULT.rounding * 10, rounded, normals)
+def _surface(context: DomainForms, pair: Pair, blocks: Entities, normals: Array, weights: Array) -> Surface:
+    """The nodes of this rank that carry something."""
     return Surface(
         part=pair.name,
         facets=context.part_facets[pair.name],
@@ -231,39 +204,51 @@ def _surface(context: DomainForms, pair: Pair, overlaps: Overlaps, rows: Relativ
         normals=normals,
         measured=normals,
         tangents=tangents(normals),
-        weights=weights[start + blocks] / context.length ** (d - 1),
+        weights=weights / context.length ** (context.dimension - 1),
         tied=pair.sides.tied,
     )
 
 
-def _summed_normals(pair: Pair, overlaps: Overlaps, rows: RelativeRows) -> tuple[Array, Array]:
-    """Vectors along the normals of all nodes (N, d), and the nodes' weights (N,).
+def _directions(
+    pair: Pair, overlaps: Overlaps, rows: RelativeRows, places: Array, held: Integers
+) -> tuple[Array, Array, Array, Array]:
+    """Normals, weights, distances of the sides along normals, and where the second is met, of nodes with a row.
 
-    On curved facets these are ∫φ_i n, and ∫ψ_i times the size of that over ∫φ_i: so a uniform pressure has the forces
-    of its nodal values, whatever the curve (as of :func:`.contact_surface.make_surface`).
+    A normal of a round side is that of where the nodes that a row consists of are on average, but for those held.
     """
-    sums = np.zeros((len(rows.weights), pair.first.points.shape[2]))
-    if not pair.first.curved:
-        for node in range(pair.first.nodes.shape[1]):
-            np.add.at(sums, pair.first.nodes[:, node], pair.first.areas[:, None] * pair.first.normals)
-        return sums, rows.weights
-    points, sizes = overlaps.points(pair.first.degree), np.zeros(len(sums))
-    functions = points.weights[:, None] * pair.first.functions(points.on_first)
-    normals = pair.first.normals_at(points.first, points.on_first)
-    np.add.at(sums, pair.first.nodes[points.first], functions[:, :, None] * normals[:, None])
-    np.add.at(sizes, pair.first.nodes[points.first], functions)
-    ratio = np.divide(np.linalg.norm(sums, axis=1), sizes, out=np.ones_like(sizes), where=sizes > 0.0)
-    return sums, rows.weights * ratio
+    own, surfaces = np.flatnonzero(rows.weights), (quadric_of(pair.first), quadric_of(pair.second))
+    sums, sizes = (found[own] for found in _summed_normals(pair, overlaps, len(places)))
+    moving = np.isin(np.arange(len(places)), held, invert=True)[:, None]
+    middles = (rows.first[own] @ (moving * places)) / (rows.first[own] @ moving)
+    normals = turned(sums if surfaces[0] is None else surfaces[0].slopes(middles), sums)
+    normals = without_rounding(normals, DEFAULT.rounding * 10)
+    at, met = (matrix[own] @ places for matrix in (rows.first, rows.second))
+    far = pair.first.share != 0.0  # coefficients are no places
+    low, high = (
+        np.sum((end - at) * normals, axis=1) if one is None or far else one.distances(at, normals)
+        for one, end in zip(surfaces, (at, met), strict=True)
+    )
+    gaps = high - low
+    check_apart(pair, at, gaps)
+    weights = rows.weights[own] * np.sum(sums * normals, axis=1) / sizes
+    return normals, weights, gaps, at + gaps[:, None] * normals
 
 
-def _gaps(context: DomainForms, surface: Surface, pair: Pair, rows: RelativeRows) -> Array:
-    """The distance of the sides along the normals, m, (m,): the relative displacement of the positions."""
-    d, own = context.dimension, context.space.dofmap.index_map.local_range[0] + surface.blocks
-    places = np.zeros((len(rows.weights), d))
-    for side in (pair.first, pair.second):
-        places[side.nodes.ravel()] = side.positions.reshape(-1, d)
-    apart = (rows.second[own] @ places - rows.first[own] @ places) / rows.weights[own, None]
-    return np.sum(apart * surface.normals, axis=1)
+def _summed_normals(pair: Pair, overlaps: Overlaps, size: int) -> tuple[Array, Array]:
+    """Vectors along the normals of all nodes, on curved facets ∫φ_i n (N, d); and ∫φ_i there (N,).
+
+    A pressure along ∫φ_i n has weights ∫ψ_i times its size over ∫φ_i: so a uniform one has the forces of its nodal
+    values, whatever the curve (as of :func:`.contact_surface.make_surface`).
+    """
+    side, sums, sizes = pair.first, np.zeros((size, pair.first.dimension)), np.zeros(size)
+    if not side.curved:
+        np.add.at(sums, side.nodes, (side.areas[:, None] * side.normals)[:, None])
+        return sums, np.linalg.norm(sums, axis=1)
+    points = overlaps.points(side.degree)
+    functions, nodes_of = points.weights[:, None] * side.functions(points.on_first), side.nodes[points.first]
+    np.add.at(sums, nodes_of, functions[:, :, None] * side.normals_at(points.first, points.on_first)[:, None])
+    np.add.at(sizes, nodes_of, functions)
+    return sums, sizes
 
 
 def _dofs(context: DomainForms, surface: Surface) -> Entities:

@@ -78,8 +78,8 @@ def test_a_ring_under_pressure_converges_as_straight_bodies_do(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.long)])
-def test_a_uniform_pressure_on_a_curved_side_is_exact(dimension: int, tmp_path: Path) -> None:
-    """A body that is heated between walls has the same pressure everywhere, and a normal of its own at each node."""
+def test_a_uniform_pressure_on_a_curved_side_is_exact_where_facets_are_even(dimension: int, tmp_path: Path) -> None:
+    """A body that is heated between walls has the same pressure everywhere, and its sphere's normal at each node."""
     held = [hvi.Displacement(name, [0.0] * dimension) for name in FLAT[dimension]]
     effects = [rubber(dimension, 1e-2), *held, hvi.Contact("outer"), hvi.Contact("inner"), hvi.Temperature(1.0)]
     found = hvi.solve(hvi.Model(body(tmp_path, dimension, 0.5), effects), degree=2)
@@ -88,12 +88,12 @@ def test_a_uniform_pressure_on_a_curved_side_is_exact(dimension: int, tmp_path: 
         inside = np.all(surface.points[:, :dimension] > 1e-6, axis=1)
         radial = surface.points[:, :dimension] / np.linalg.norm(surface.points[:, :dimension], axis=1, keepdims=True)
         sign = 1.0 if surface.part == "outer" else -1.0
-        assert np.abs(surface.normals - sign * radial)[inside].max() < (0.02, 0.05)[dimension - 2]
+        assert np.abs(surface.normals - sign * radial)[inside].max() < (1e-9, 0.05)[dimension - 2]
     for name in ("outer", "inner"):
         part = found.contact[name]
         inside = np.all(part.x > 1e-6, axis=1)
         assert inside.any()
-        np.testing.assert_allclose(part.pressure[inside], 3 * BULK * 1e-2, rtol=1e-10)
+        np.testing.assert_allclose(part.pressure[inside], 3 * BULK * 1e-2, rtol=(1e-10, 1.5e-2)[dimension - 2])
 
 
 def test_a_force_on_a_curved_side_is_the_whole_force(tmp_path: Path) -> None:
