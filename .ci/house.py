@@ -29,7 +29,7 @@ LIMITS = {
     "class names used twice": 4,
     "lines of the longest function": 45,
     "floors": 15,
-    "lines of tests": 21700,  # heaps of free bodies, jumps, links and objects of programs each came with a truth
+    "lines of tests": 22000,  # what is promised; round sides, jumps and scaled factors each came with a truth
     "lines of benchmarks": 2600,
 }
 """They go down with the house, never up without a reason that is written beside."""
