@@ -208,7 +208,12 @@ def outward(corners: Array, inner: Array) -> Array:
 
 
 def turned(vectors: Array, towards: Array) -> Array:
-    """The unit vectors along vectors, or against them, that look to the side of others; all (n, d)."""
+    """The unit vectors along vectors, or against them, that look to the side of others, (n, d).
+
+    Args:
+        vectors: not zero, (n, d).
+        towards: the others, (n, d).
+    """
     return units(vectors * np.sign(np.sum(vectors * towards, axis=1, keepdims=True)))
 
 
@@ -235,7 +240,12 @@ class Quadric:
         return self._at(points)[1][:, :-1]
 
     def distances(self, points: Array, directions: Array) -> Array:
-        """How far it is from points along directions, unit vectors; both (p, d), m, (p,)."""
+        """How far the surface is from points, m, (p,).
+
+        Args:
+            points: m, (p, d).
+            directions: unit vectors along which it is looked for, (p, d).
+        """
         (h, slopes), ahead = self._at(points), np.pad(directions, ((0, 0), (0, 1)))
         value, steep, bend = np.sum([h * slopes, ahead * slopes, ahead @ self.matrix * ahead], axis=2)
         root = np.sqrt(np.maximum(steep**2 - bend * value, 0.0))
