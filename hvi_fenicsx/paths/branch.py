@@ -9,7 +9,7 @@ from enum import Enum
 
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
-from .relations import ContactPoints, Values
+from .contact_points import ContactPoints, Values
 from .segments import Segment, SegmentKind
 from .state import Event, Position
 from .thresholds import DEFAULT

@@ -1,260 +1,352 @@
-"""Which unknowns and laws each contact point has: one unknown, or the vector of a law on a length."""
+"""Displacements and forces of all points as functions of the coordinates along their graphs, and their derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..errors import InputError
-from ..laws import Mixity
-from ..reduced.condensed_problem import CondensedProblem
-from ..typing import Array, Integers, Mask, magnitude
-from .thresholds import ROUNDING
-from .vertex_laws import VertexLaw, is_straight, vertex_laws
+from ..reduced.condensed_stiffness import ZERO, negative_directions, rounding_of
+from ..typing import Array, Mask
+from .point_laws import PointLaws
+from .rigid_motions import Unresisted, without
+from .statuses import PointStatuses
+from .thresholds import DEFAULT, ROUNDING
 
 
-class PointLaws:
-    """The unknowns and laws of all m points.
-
-    Args:
-        problem: the problem.
-        remember: numbers of the problem's bonds that remember.
+@dataclass(frozen=True, kw_only=True)
+class Values:
+    """What a cell gives at its coordinates.
 
     Attributes:
-        check: is called before each step and passage; it may raise an error to end them.
-        vertices: the laws at all vertices.
-        one: the unknowns of points of one unknown, which come first, (m1,).
-        vectors: the p points of laws on a length, which come next; then come the points of their openings, (q,).
-        unknowns: of each point.
-        laws: of each point; those of openings have none.
-        of_lengths: which of the points are those of lengths,
-        of_openings: and of openings.
-        point_of: the point of each unknown, of an opening that of its length, (n,).
-        straight: whether the graphs of all are straight between their ends; coordinates then have units.
-        order: of the points, random numbers from 0.5 to 1.5, (m,): the same on any number of ranks.
-        places: the number of each point of one unknown, and of each pair of unknowns of a length, in a matrix, (n, n).
-        scale: the size of displacements.
-        length: the unit of displacements along graphs; 1 where all are straight.
-        forces: the units of forces by unknown, (n,).
-
-    Raises:
-        InputError: a law on a length shares an unknown with another law or a bound.
+        x: displacements, (n,).
+        force: of laws and bounds, (n,).
+        lengths: of the displacements by point, (m,).
+        tractions: forces along them by point, (m,).
+        moves: derivatives of the lengths by s, (m,).
+        rises: derivatives of the tractions by s, (m,).
+        s: by point, (m,).
+        directions: of the points of lengths, (N,).
+        energies: by what the mode mixity multiplies the tractions, (m,).
     """
 
-    def __init__(self, problem: CondensedProblem, remember: Collection[int] = ()) -> None:
-        laws = vertex_laws(problem, remember)
-        self.check: Callable[[], None] = lambda: None
-        self._problem, self.vertices = problem, laws
-        kinds = {law.unknowns: (law.bonds.opens, law.bonds.mixity) for law in laws if law.bonds.radial}
-        lengths = sorted(kinds)
-        self.vectors = VectorPoints(
-            lengths, [kinds[group][0] for group in lengths], [kinds[group][1] for group in lengths]
+    x: Array
+    force: Array
+    lengths: Array
+    tractions: Array
+    moves: Array
+    rises: Array
+    s: Array
+    directions: Array
+    energies: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeMotions:
+    """The displacements that can change at a point, q of them.
+
+    Attributes:
+        ways: they as orthonormal rows, (q, n).
+        elastic: the stiffness S along them, (q, q).
+        slopes: those of the forces of laws and bounds, (q,).
+    """
+
+    ways: csr_array
+    elastic: Array
+    slopes: Array
+
+    @property
+    def matrix(self) -> Array:
+        """How all forces change with them, (q, q)."""
+        return self.elastic + np.diag(self.slopes)
+
+
+class ContactPoints(PointStatuses):
+    """All points, each on one segment of its graph, and what these give at its coordinates."""
+
+    def values(self, z: Array) -> Values:
+        """Displacements, forces and their derivatives.
+
+        Args:
+            z: the coordinates, (n,).
+        """
+        s, e = (z, np.empty(0)) if self.straight else self.polar(z)
+        tau = s - self._base
+        x, force = self._x + self._moves * tau, self._force + self._rises * tau
+        found = Values(
+            x=x,
+            force=force,
+            lengths=x,
+            tractions=force,
+            moves=self._moves,
+            rises=self._rises,
+            s=s,
+            directions=e,
+            energies=np.ones(len(s)),
         )
-        self.one = np.setdiff1d(np.arange(problem.size), self.vectors.flat)
-        by_unknowns: dict[tuple[int, ...], list[VertexLaw]] = {}
-        for law in laws:
-            by_unknowns.setdefault(law.unknowns, []).append(law)
-        openings = self.vectors.opening_unknowns
-        self.unknowns: list[Integers] = [*self.one[:, None], *self.vectors.groups, *openings[:, None]]
-        self.laws = [by_unknowns.get(tuple(group), []) for group in self.unknowns]
-        refuse_shared(problem, self.vectors, laws)
-        self.straight = is_straight(problem)
-        self.scale, forces = units(problem, laws, self.vectors.groups)
-        self.length, self.forces = (1.0, np.ones_like(forces)) if self.straight else (self.scale, forces)
-        firsts = [group[0] for group in self.unknowns]
-        self._force_units = self.forces[firsts]
-        m1, last = len(self.one), len(self.one) + len(self.vectors)
-        self.of_lengths, self.of_openings = slice(m1, last), slice(last, None)
-        self.order = np.empty(len(self))
-        self.order[np.lexsort(problem.points[firsts].T)] = np.random.default_rng(0).uniform(0.5, 1.5, len(self))
-        self.point_of = np.empty(problem.size, dtype=np.int64)
-        self.point_of[self.one], self.point_of[self.vectors.flat] = np.arange(m1), m1 + self.vectors.owner
-        rows, columns = (np.concatenate([self.one, self.vectors.flat[pair]]) for pair in self.vectors.pairs)
-        self.places = csr_array((np.arange(len(rows)), (rows, columns)), shape=(problem.size, problem.size))
+        return found if self.straight else self._of_curves(found)
 
-    def __len__(self) -> int:
-        return len(self.laws)
+    def _of_curves(self, chords: Values) -> Values:
+        """The values with what chords of curved laws lack, and of vectors."""
+        lengths, e, energies = chords.lengths, chords.directions, chords.energies
+        more, slopes = self._deviations.values(lengths)
+        energies[self.of_lengths] = self.vectors.energies(e)
+        tractions = chords.tractions + more
+        forces, spread = tractions * energies, self.point_of[self.vectors.flat]
+        x, force = self._by_unknown(lengths, lengths[spread] * e), self._by_unknown(forces, forces[spread] * e)
+        return replace(chords, x=x, force=force, tractions=tractions, rises=chords.rises + slopes * chords.moves)
 
-    def owner(self, k: int) -> int:
-        """The point whose laws act on a point: itself; of an opening, that of its length."""
-        return int(self.point_of[self.unknowns[k][0]])
+    def setting_out(self, values: Values, direction: Array) -> Values | None:
+        """The values with the mode in which lengths of 0, but for rounding, grow; None where no mode matters.
 
-    def radial(self, k: int) -> int | None:
-        """The number among the points of lengths of a point; None: it is none of these."""
-        p = k - len(self.one)
-        return p if 0 <= p < len(self.vectors) else None
+        Args:
+            values: at the point.
+            direction: of the coordinates, (n,).
+        """
+        vectors, p = self.vectors, self.of_lengths
+        rest = values.s[p] <= ROUNDING
+        if not vectors.differ or not np.any(rest):
+            return None
+        e = np.where(rest[vectors.owner], vectors.polar(direction)[1], values.directions)
+        energies = values.energies.copy()
+        energies[p] = vectors.energies(e)
+        return replace(values, directions=e, energies=energies)
 
-    def is_opening(self, k: int) -> bool:
-        """Whether a point is an opening."""
-        return k >= self.of_openings.start
+    def unmoved(self, values: Values) -> Mask:
+        """Which points have not left 0 but for rounding, (m,): there is nothing to remember.
+
+        Args:
+            values: of the points.
+        """
+        return np.abs(values.lengths) <= DEFAULT.reached * self.length
+
+    def allowances(self, values: Values, rates: Array, fastest: float) -> Array:
+        """How near to an end of its segment a point is there, (m,): on a steep segment a short way is a large force.
+
+        Of a point that stands but for rounding the way says nothing.
+
+        Args:
+            values: of the points.
+            rates: how fast s changes, (m,).
+            fastest: how fast the fastest coordinate does.
+        """
+        size = 1.0 + np.abs(values.s)
+        steep = np.maximum(np.abs(values.rises) / self._force_units, 1.0)
+        steep[np.abs(rates) * steep <= DEFAULT.reached * fastest] = 1.0
+        return np.maximum(DEFAULT.reached / steep, DEFAULT.digits) * size
+
+    def turning_back(self, values: Values, rates: Array) -> Mask:
+        """Which bonds with memory go back, (m,); a vector that has not left 0 passes it instead.
+
+        Args:
+            values: of the points.
+            rates: how fast the points go along their graphs, (m,).
+        """
+        passes = np.isinf(self.low) & (self.outward > 0.0) & self.unmoved(values)
+        return (rates * self.outward < 0.0) & ~passes
+
+    def _by_unknown(self, values: Array, parts: Array) -> Array:
+        """What points have by unknown, (n,).
+
+        Args:
+            values: of the points, (m,).
+            parts: of the unknowns of points of lengths, (N,).
+        """
+        found = np.empty(len(self.forces))
+        found[self.one], found[self.vectors.flat] = values[: len(self.one)], self._beside(values, parts)
+        return found
+
+    def _beside(self, values: Array, parts: Array) -> Array:
+        """Parts of the unknowns of lengths; of an opening that does not count, what its own point has, (N,)."""
+        openings, counts = self.vectors.openings, self.vectors.counts
+        parts[openings] = np.where(counts[openings], parts[openings], values[self.of_openings])
+        return parts
+
+    def moved(self, values: Values) -> Blocks:
+        """The derivatives of the displacements by the coordinates.
+
+        Args:
+            values: at the point.
+        """
+        return self._of_vectors(values, values.lengths, values.moves)
+
+    def risen(self, values: Values) -> Blocks:
+        """The derivatives of the forces of laws and bounds by the coordinates.
+
+        Args:
+            values: at the point.
+        """
+        vectors, e, p = self.vectors, values.directions, self.of_lengths
+        found = self._of_vectors(values, values.energies * values.tractions, values.energies * values.rises)
+        turned = values.tractions[p][vectors.owner] * vectors.energy_rates(e, values.s[p])
+        return replace(found, right=found.right + turned)
+
+    def _of_vectors(self, values: Values, sizes: Array, rates: Array) -> Blocks:
+        """The derivatives of vectors that have the directions of z.
+
+        Args:
+            values: of the points.
+            sizes: of the vectors by point, (m,).
+            rates: their derivatives by s, (m,).
+        """
+        p, owner, e = self.of_lengths, self.vectors.owner, values.directions
+        across = np.divide(sizes[p], values.s[p], out=rates[p].copy(), where=values.s[p] > 0.0)
+        return Blocks(
+            points=self,
+            ones=rates[: len(self.one)],
+            diagonal=self._beside(rates, across[owner]),
+            left=e,
+            right=(rates[p] - across)[owner] * e,
+        )
+
+    def resisting(self, values: Values) -> Mask:
+        """The axes along which displacements are resisted; all of them while something else holds the body back, (n,).
+
+        A length whose traction vanishes resists its own turning less and less: that is nothing before it is rounding.
+
+        Args:
+            values: at the point.
+        """
+        held_back = self.elastic is not self._problem.elastic
+        return held_back | ~(np.abs(self._slopes(values)) <= DEFAULT.none * self.stiffest)  # nan: it stands
+
+    def unresisted(self, values: Values, rate: Array) -> Unresisted:
+        """The rigid motions that nothing resists.
+
+        Args:
+            values: at the point.
+            rate: the load that grows, (n,).
+        """
+        if not len(self.rigid):
+            return Unresisted(motions=self.rigid, rate=rate)
+        axes = self._axes(values.directions)
+        parts = np.array([axes @ motion for motion in self.rigid])[:, self.resisting(values)]
+        return Unresisted(motions=without(self.rigid, parts, DEFAULT.none), rate=rate)
+
+    def held_stiffness(self, held: Array | None) -> Array:
+        """The stiffness with springs against motions that are as stiff as the body, (n, n).
+
+        Args:
+            held: the motions, as orthonormal rows, (d, n); None for none.
+        """
+        if held is None or not len(held):
+            return self.stiffness
+        return self.stiffness + held.T @ held * self.stiffest
+
+    def jacobian(self, values: Values, held: Array | None = None) -> Array:
+        """The derivative of S x + r by the coordinates, (n, n).
+
+        Args:
+            values: at the point.
+            held: motions that springs hold, as orthonormal rows, (d, n); None for none.
+        """
+        moved = self.moved(values).sparse @ self.held_stiffness(held)
+        return moved.T + self.risen(values).sparse.toarray()  # S and the first blocks are symmetric
+
+    def bond_forces(self, values: Values) -> Array:
+        """The forces of the laws of each point alone, without those of bounds, (m,).
+
+        Args:
+            values: of the points.
+        """
+        return np.where(self._bound, self._force, values.tractions)
+
+    def unstable_directions(self, values: Values, negligible: float = 1e-12) -> int:
+        """The number of directions in which the energy falls at constant loads.
+
+        Args:
+            values: of the points.
+            negligible: an eigenvalue that is zero, relative to the greatest.
+        """
+        if self.straight:
+            return self.elastic.negative_directions(self.moving, self.slope, negligible) + len(self.on_drops())
+        motions = self.motions(values)
+        stiff = np.diag(motions.elastic) + np.abs(motions.slopes)
+        stiff = np.where(stiff > rounding_of(self.stiffness), stiff, np.max(stiff, initial=1e-300))
+        sizes = np.sqrt(stiff)  # else what is stiff, as a length that has just left 0 is across, would hide the rest
+        return negative_directions(motions.matrix / np.outer(sizes, sizes), negligible) + len(self.on_drops())
+
+    def is_held(self, values: Values) -> bool:
+        """Whether no displacement that can change meets no stiffness, or a negative one.
+
+        Args:
+            values: of the points.
+        """
+        if self.straight:
+            return not self.elastic.is_singular(self.moving, self.slope)
+        return not negative_directions(self.motions(values).matrix, -ZERO, rounding_of(self.stiffness))
+
+    def motions(self, values: Values) -> FreeMotions:
+        """The displacements that can change.
+
+        Args:
+            values: of the points.
+        """
+        slopes = self._slopes(values)
+        free = np.flatnonzero(~np.isnan(slopes))
+        ways = self._axes(values.directions).sparse[free]
+        return FreeMotions(ways=ways, elastic=ways @ (ways @ self.stiffness).T, slopes=slopes[free])
+
+    def _axes(self, directions: Array) -> Blocks:
+        """Orthonormal axes of each point, the first that counts along its vector.
+
+        They are those of its unknowns, reflected as Householder (1958) does; what does not count keeps its own.
+        """
+        mirror, halves = self.vectors.mirrors(directions)
+        ones, left = np.ones(len(self.one)), -mirror / halves[self.vectors.owner]
+        return Blocks(points=self, ones=ones, diagonal=np.ones(len(mirror)), left=left, right=mirror)
+
+    def _slopes(self, values: Values) -> Array:
+        """How forces change with displacements along the axes of all points, (n,); nan where these do not move."""
+        vectors, p, lengths = self.vectors, self.of_lengths, values.lengths[self.of_lengths]
+        rises, moves = values.energies * values.rises, values.moves
+        along = np.divide(rises, moves, out=np.full(len(self), np.nan), where=moves != 0.0)
+        tractions = values.energies[p] * values.tractions[p]
+        across = np.where(values.s[p] > 0.0, np.nan, along[p])  # what rests at 0 is held across the way it sets out
+        np.divide(tractions, lengths, out=across, where=lengths > 0.0)
+        return self._by_unknown(along, np.where(vectors.leads(), along[p][vectors.owner], across[vectors.owner]))
+
+    @property
+    def bent(self) -> bool:
+        """Whether the equations of the present cell are not linear."""
+        return bool(np.any(self._bent))
+
+    def reach(self, values: Values) -> Array:
+        """How far the curved points may move in one step, in units of s, (m,); infinite for the others."""
+        return self._deviations.reach(values.lengths, DEFAULT.reach) / self.length
 
 
-def units(problem: CondensedProblem, laws: Sequence[VertexLaw], groups: Sequence[Integers]) -> tuple[float, Array]:
-    """The unit of displacements, and those of forces by unknown, (n,).
-
-    Args:
-        problem: the problem.
-        laws: at its vertices.
-        groups: unknowns that share one unit.
-    """
-    diagonal = problem.elastic.diagonal.copy()
-    largest = float(np.max(diagonal, initial=0.0)) or 1.0
-    diagonal[diagonal <= ROUNDING * largest] = largest
-    lengths = {law.group: law.law.length_scale for law in laws}.values()
-    bounds = np.abs(np.concatenate([problem.lower, problem.upper]))
-    elastic = magnitude(problem.force_rate / diagonal)
-    length = max(lengths, default=max(elastic, float(np.max(bounds[np.isfinite(bounds)], initial=0.0))) or 1.0)
-    for group in groups:
-        diagonal[group] = diagonal[group].mean()
-    return float(length), diagonal * float(length)
-
-
-class VectorPoints:
-    """The p points of laws on a length, with N unknowns together, of which q are openings.
-
-    Args:
-        groups: the unknowns of each point, an opening first.
-        opens: of each point, whether its first unknown is an opening.
-        mixities: of each point, how the energy of separation depends on the mode; None: it does not.
+@dataclass(frozen=True, kw_only=True)
+class Blocks:
+    """A number for each point of one unknown, and for each point of a length a diagonal and the product of two vectors.
 
     Attributes:
-        groups: the unknowns of each point.
-        flat: all of them, one point after the other, (N,).
-        owner: number of the point of each, (N,).
-        pairs: the numbers among the N of each two unknowns of one point, and of each with itself.
-        openings: numbers among the N of the openings, (q,).
-        counts: which of the N count, (N,).
+        points: the points; those of lengths have N unknowns together.
+        ones: the numbers, (m1,).
+        diagonal: by unknown of a length, (N,).
+        left: the first of the two vectors, likewise.
+        right: the second one.
     """
 
-    def __init__(
-        self, groups: Sequence[tuple[int, ...]], opens: Sequence[bool], mixities: Sequence[Mixity | None]
-    ) -> None:
-        self.groups = [np.array(group, dtype=np.int64) for group in groups]
-        self.flat = np.concatenate([np.empty(0, np.int64), *self.groups])
-        self.owner = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
-        self._firsts = np.cumsum([0, *[len(group) for group in groups]])[:-1]
-        self.pairs = np.nonzero(self.owner[:, None] == self.owner)
-        self.openings = self._firsts[np.array(opens, dtype=bool)] if groups else np.empty(0, np.int64)
-        self.counts: Mask = np.ones(len(self.flat), dtype=bool)
-        self._slips = np.ones(len(self.flat))
-        self._slips[self.openings] = 0.0
-        criteria = [c for number, c in enumerate(mixities) if c is not None and c not in mixities[:number]]
-        self._criteria = [(c, np.array([p for p, own in enumerate(mixities) if own == c])) for c in criteria]
+    points: PointLaws
+    ones: Array
+    diagonal: Array
+    left: Array
+    right: Array
 
-    def __len__(self) -> int:
-        return len(self.groups)
-
-    @property
-    def opening_unknowns(self) -> Integers:
-        """The unknowns that are openings, (q,)."""
-        return self.flat[self.openings]
-
-    @property
-    def differ(self) -> bool:
-        """Whether any energy of separation depends on the mode."""
-        return bool(self._criteria)
-
-    def counted(self, p: int) -> int:
-        """How many unknowns of a point count."""
-        return int(np.count_nonzero(self.counts[self.owner == p]))
-
-    def polar(self, z: Array) -> tuple[Array, Array]:
-        """The lengths of the vectors, (p,), and unit vectors, (N,): of the length 0 the first unknown that counts.
-
-        Args:
-            z: all coordinates, (n,) or more.
-        """
-        if not self.groups:
-            return np.zeros(0), np.zeros(0)
-        vectors = np.where(self.counts, z[self.flat], 0.0)
-        lengths = np.sqrt(self._sums(vectors**2))
-        if np.all(lengths > 0.0):
-            return lengths, vectors / lengths[self.owner]
-        spread = lengths[self.owner]
-        found = np.divide(vectors, spread, out=np.zeros_like(vectors), where=spread > 0.0)
-        found[self.leads() & (spread == 0.0)] = 1.0
-        return lengths, found
-
-    def leads(self) -> Mask:
-        """Which of the N are the first of their point that counts, (N,)."""
-        found = np.zeros(len(self.flat), dtype=bool)
-        counted = np.flatnonzero(self.counts)
-        found[counted[np.unique(self.owner[counted], return_index=True)[1]]] = True
+    def __matmul__(self, x: Array) -> Array:
+        """The product with a vector, (n,)."""
+        vectors, found = self.points.vectors, np.empty_like(x)
+        found[self.points.one] = self.ones * x[self.points.one]
+        products = vectors.along(self.right, x)[vectors.owner]
+        found[vectors.flat] = self.diagonal * x[vectors.flat] + self.left * products
         return found
 
-    def mirrors(self, directions: Array) -> tuple[Array, Array]:
-        """What the first unknown that counts is reflected at onto the unit vector, (N,), and half its square, (p,).
-
-        Args:
-            directions: the unit vectors, (N,).
-        """
-        found = directions + self.leads() * np.where(directions < 0.0, -1.0, 1.0)
-        return found, np.maximum(0.5 * self._sums(found**2), 0.5)  # at least 1 but where nothing counts
-
-    def along(self, directions: Array, change: Array) -> Array:
-        """The products of unit vectors with a change of the coordinates, (p,).
-
-        Args:
-            directions: the unit vectors, (N,).
-            change: of all coordinates, (n,) or more.
-        """
-        return self._sums(directions * change[self.flat])
-
-    def energies(self, directions: Array) -> Array:
-        """By what the mode mixity multiplies the forces of each point, (p,).
-
-        Args:
-            directions: the unit vectors, (N,).
-        """
-        found = np.ones(len(self))
-        for criterion, points in self._criteria:
-            found[points] = criterion.energy(self._shares(directions)[points])
-        return found
-
-    def energy_rates(self, directions: Array, lengths: Array) -> Array:
-        """The derivatives of these by the coordinates, (N,).
-
-        Args:
-            directions: the unit vectors, (N,).
-            lengths: of the vectors, (p,).
-        """
-        share, slopes = self._shares(directions), np.zeros(len(self))
-        for criterion, points in self._criteria:
-            slopes[points] = criterion.slope(share[points])
-        per_length = np.divide(2.0 * slopes, lengths, out=np.zeros_like(slopes), where=lengths > 0.0)
-        return per_length[self.owner] * directions * (self._slips - share[self.owner])
-
-    def _shares(self, directions: Array) -> Array:
-        """The share of the slip in the square of each length, (p,)."""
-        return np.minimum(self._sums(self._slips * directions**2), 1.0)
-
-    def _sums(self, values: Array) -> Array:
-        return np.asarray(np.bincount(self.owner, values, minlength=len(self)), dtype=np.float64)
-
-
-def refuse_shared(problem: CondensedProblem, vectors: VectorPoints, laws: Sequence[VertexLaw]) -> None:
-    """Refuse what has no graph of its own: unknowns that a law on a length shares with another law or a bound.
-
-    Args:
-        problem: the problem.
-        vectors: the points of laws on a length.
-        laws: at all vertices.
-
-    Raises:
-        InputError: there are such unknowns, or openings with a bound above 0.
-    """
-    seen, openings = vectors.flat, vectors.opening_unknowns
-    with_one = [i for law in laws if not law.bonds.radial for i in law.unknowns]
-    low = np.isfinite(problem.lower)
-    low[openings] = problem.lower[openings] > 0.0
-    bounded = np.flatnonzero(low | np.isfinite(problem.upper))
-    shared = np.intersect1d(seen, np.concatenate([np.array(with_one, dtype=np.int64), bounded]))
-    if len(np.unique(seen)) == len(seen) and not shared.size:
-        return
-    raise InputError(
-        "path: at a vertex a law acts on |u_t| or on opening and slip, and contact or another law on a component of "
-        "it; such an edge has no path yet. Leave one of them away there, or let the parts not meet. Cohesion beside "
-        "contact has a path where nothing bounds the opening from above, and the gap is not negative"
-    )
+    @property
+    def sparse(self) -> csr_array:
+        """The matrix, (n, n)."""
+        (rows, others), places = self.points.vectors.pairs, self.points.places
+        blocks = self.left[rows] * self.right[others] + np.where(rows == others, self.diagonal[rows], 0.0)
+        entries = np.concatenate([self.ones, blocks])[places.data]
+        return csr_array((entries, places.indices, places.indptr), shape=places.shape)

@@ -3,8 +3,8 @@
 The predictor goes along the tangent of the equations in coordinates and factor; the corrector is Newton's method in the
 plane across it (Riks 1979; Wempner 1971), or with the condition of an event instead of the plane: that a coordinate is
 at the end of its segment, or that the factor has a wanted value. The equations on given segments are smooth
-(:mod:`.relations`), so Newton's method converges quadratically there. A step is refused and halved where the corrector
-does not converge or goes far, or where the tangent turns by more than some degrees.
+(:mod:`.contact_points`), so Newton's method converges quadratically there. A step is refused and halved where the
+corrector does not converge or goes far, or where the tangent turns by more than some degrees.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from typing_extensions import override
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, magnitude
 from .branch import Branch, Move, Passage, Refused, StepEnd
+from .contact_points import ContactPoints, FreeMotions
 from .equations import CurvePoint
 from .events import Crossing, CurveStep, Events, displacement_rate
 from .pivoting import StraightBranch
-from .relations import ContactPoints, FreeMotions
 from .state import Position
 from .thresholds import DEFAULT
 

@@ -11,7 +11,7 @@ from ..laws import VertexLaws
 from ..reduced.condensed_problem import Bonds, CondensedProblem
 from ..reduced.condensed_stiffness import CellColumns
 from ..typing import Array, magnitude
-from .relations import ContactPoints
+from .contact_points import ContactPoints
 from .state import PathState
 from .thresholds import DEFAULT, ROUNDING
 from .vertex_laws import multiplied

@@ -11,9 +11,9 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers
 from .branch import Branch, Move
+from .contact_points import ContactPoints, Values
 from .curve import CurvedBranch
 from .events import CurveStep, displacement_rate
-from .relations import ContactPoints, Values
 from .vertex_laws import VertexLaw, shares
 
 

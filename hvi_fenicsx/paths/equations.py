@@ -11,7 +11,7 @@ from typing_extensions import override
 from ..reduced.condensed_stiffness import by_factors
 from ..typing import Array, Integers, magnitude
 from .branch import Branch, Refused
-from .relations import ContactPoints, Values
+from .contact_points import ContactPoints, Values
 from .rigid_motions import are_same
 from .thresholds import DEFAULT
 

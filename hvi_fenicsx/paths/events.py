@@ -15,8 +15,8 @@ from scipy.optimize import toms748
 
 from ..typing import Array, magnitude
 from .branch import Move, Passage, Refused, StepEnd, event_between
+from .contact_points import ContactPoints
 from .equations import CurveEquations, CurvePoint
-from .relations import ContactPoints
 from .segments import piece_at
 from .thresholds import DEFAULT
 

@@ -11,11 +11,11 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, magnitude
 from .branch import Branch, Move, Passage, Refused, StepEnd
+from .contact_points import ContactPoints
 from .curve import branch_from
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
 from .jumps import WAYS, Jump
-from .relations import ContactPoints
 from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped
 from .thresholds import DEFAULT
 from .vertex_laws import multiplied

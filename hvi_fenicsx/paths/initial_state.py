@@ -13,9 +13,9 @@ import numpy as np
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, magnitude
 from .branch import Refused, StepEnd, advancing
+from .contact_points import ContactPoints
 from .curve import branch_from
 from .motion import OverdampedMotion
-from .relations import ContactPoints
 from .segments import Segment, SegmentKind
 from .thresholds import DEFAULT
 

@@ -20,9 +20,9 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array, magnitude
 from .branch import Branch, Refused, StepEnd, advancing
+from .contact_points import ContactPoints
 from .curve import branch_from
 from .motion import OverdampedMotion
-from .relations import ContactPoints
 from .thresholds import DEFAULT
 
 WAYS = "along the curve", "held back", "in motion"

@@ -16,8 +16,8 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..reduced.condensed_stiffness import CondensedStiffness, DenseStiffness
 from ..typing import Array, magnitude
 from .branch import Branch, Refused, StepEnd, advancing
+from .contact_points import ContactPoints
 from .curve import branch_from
-from .relations import ContactPoints
 from .thresholds import DEFAULT
 
 

@@ -3,8 +3,9 @@
 A point is an unknown with its laws and bounds, or the unknowns of a law on a length (:class:`.VectorPoints`). Its graph
 of force over displacement is one continuous line, vertical where a law jumps and at a bound (:mod:`.segments`); s runs
 along it, nondimensional. The coordinate of a point of a length is a vector z of length s: displacement and force have
-its direction. So sticking, sliding, a drop at a fixed length and what is remembered all have smooth equations. An
-opening has a point of its own beside, without a law: what it does where it is not positive.
+its direction. A point's status is the number of the segment on which it is. So sticking, sliding, a drop at a fixed
+length and what is remembered all have smooth equations. An opening has a point of its own beside, without a law: what
+it does where it is not positive.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ import numpy as np
 
 from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
-from .contact_points import PointLaws
 from .curved_laws import Deviations
+from .point_laws import PointLaws
 from .segments import Segment, SegmentKind, beside_opening, chain, from_zero
 from .state import PathState
 from .thresholds import ROUNDING

@@ -8,7 +8,7 @@ from typing_extensions import override
 from ..reduced.condensed_stiffness import CellColumns, CellInverse
 from ..typing import Array, Mask, magnitude
 from .branch import Branch
-from .relations import ContactPoints
+from .contact_points import ContactPoints
 from .rigid_motions import are_same, pins
 from .thresholds import DEFAULT
 

@@ -29,7 +29,7 @@ from hvi_fenicsx.reduced.condensed_problem import Bonds, CondensedProblem
 
 Array = npt.NDArray[np.float64]
 DROP = [(0, 0), (1, 1), (1, 0.4)]
-FINER = patch("hvi_fenicsx.paths.relations.DEFAULT", FollowingThresholds(reach=0.025))
+FINER = patch("hvi_fenicsx.paths.contact_points.DEFAULT", FollowingThresholds(reach=0.025))
 SMOOTHED = create("quadratic", graph(DROP), epsilon=1e-2)
 
 

@@ -12,7 +12,7 @@ class CurvedFollower(Follower):
     """Takes no graph as straight."""
 
     def __init__(self, *given: Any, **options: Any) -> None:
-        rooms = ("contact_points", "vertex_laws")
+        rooms = ("point_laws", "vertex_laws")
         first, second = (patch(f"hvi_fenicsx.paths.{room}.is_straight", lambda problem: False) for room in rooms)
         with first, second:
             super().__init__(*given, **options)
