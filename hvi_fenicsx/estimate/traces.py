@@ -203,8 +203,7 @@ def contact_facets(problem: Problem, space: fem.FunctionSpace, local: Entities) 
         local: the local facets.
     """
     mesh, d = problem.domain.mesh, problem.dimension
-    local = facets.with_cells(mesh, local)[0]
-    cells, number = facets.cells_of(mesh, local)
+    local, cells, number = facets.with_cells(mesh, local)
     degree, on = nodes.degree(problem.space), nodes.facet_nodes(problem.space, local)
     table = np.array(_numbers_in_cell(degree, mesh.topology.cell_name()), dtype=np.int32)
     found = np.take_along_axis(space.dofmap.list[cells], table[number], axis=1)

@@ -71,17 +71,17 @@ def corners(mesh: dmesh.Mesh, facets: Entities) -> Array:
     return mesh.geometry.x[found][:, :, :d]
 
 
-def with_cells(mesh: dmesh.Mesh, facets: Entities) -> tuple[Entities, Entities]:
-    """Those of some facets of the surface whose cells this rank owns, and these cells.
+def with_cells(mesh: dmesh.Mesh, facets: Entities) -> tuple[Entities, Entities, Integers]:
+    """Those of some facets of the surface whose cells this rank owns, these cells, and the facets' numbers in them.
 
     Args:
         mesh: the mesh.
         facets: local facets (owned and ghost).
     """
-    d, cells = mesh.topology.dim, cells_of(mesh, facets)[0]
+    d, (cells, number) = mesh.topology.dim, cells_of(mesh, facets)
     alone = np.diff(mesh.topology.connectivity(d - 1, d).offsets)[facets] == 1
     owned = alone & (cells < mesh.topology.index_map(d).size_local)
-    return facets[owned], cells[owned]
+    return facets[owned], cells[owned], number[owned]
 
 
 def areas(points: Array) -> Array:

@@ -69,7 +69,7 @@ class DomainForms:
             local: local facets.
         """
         space, d, points = self.space, self.dimension, self.points[:, : self.dimension]
-        local, cells = facet_sizes.with_cells(self.domain.mesh, local)
+        local, cells, _ = facet_sizes.with_cells(self.domain.mesh, local)
         blocks, middles = nodes.facet_nodes(space, local), points[space.dofmap.list[cells][:, : d + 1]].mean(axis=1)
         normals = boundary_facets.outward(points[blocks[:, :d]], middles)
         parts = [global_numbers(space, blocks), points[blocks], normals]

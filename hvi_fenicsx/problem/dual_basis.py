@@ -26,6 +26,7 @@ from ..geometry import ROUNDING
 from ..typing import Array, Integers, Mask
 from .facet_overlaps import OverlapPoints, Overlaps
 from .facets import Facets
+from .scaling import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +89,9 @@ def rigid_rows(rows: RelativeRows, places: Array, meets: Array) -> RelativeRows:
     turns = np.einsum("kd,rde->kre", places[met.indices] - centres[row], spins)
     moments = shares.data[:, None, None] * turns
     inertia = np.add.reduceat(moments @ turns.transpose(0, 2, 1), met.indptr[:-1])
-    lever = np.einsum("id,rde->ier", meets - met @ places, spins)
+    way = meets - met @ places
+    way[np.abs(way) <= 10.0 * DEFAULT.rounding * np.abs(places).max()] = 0.0  # where sides are flat
+    lever = np.einsum("id,rde->ier", way, spins)
     entries = (lever @ np.linalg.pinv(inertia, ROUNDING))[row] @ moments + met.data[:, None, None] * np.eye(d)
     vectors = bsr_array((entries, met.indices, rows.second.indptr), (places.size, places.size))
     return replace(rows, second=csr_array(vectors))

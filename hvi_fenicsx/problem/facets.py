@@ -259,8 +259,11 @@ def quadric_of(side: Facets) -> Quadric | None:
         side: its facets.
 
     Returns:
-        None where there is none or several, or where facets turn from one to the next as at an edge.
+        None where there is none or several, where facets turn from one to the next as at an edge, or of a plane, whose
+        facets have its normal.
     """
+    if np.all(np.ptp(side.normals, axis=0) <= ROUNDING):
+        return None
     d, corners = side.dimension, side.corners.reshape(-1, side.dimension)
     facing, places = np.repeat(side.normals, d, axis=0), np.unique(corners, axis=0)
     axis = np.linalg.eigh(np.cov(facing.T))[1][:, : d - 2]

@@ -167,10 +167,7 @@ def test_a_path_that_was_lost_ends_where_the_body_comes_off(name: str) -> None:
     assert record["end"] == "escapes"
 
 
-CREEPS = pytest.mark.xfail(
-    reason="jumps lead on by 1e-6 of the load, and release no energy: the path is lost", strict=True
-)
-STOOD = ("c8e5a9caa4", pytest.param("ba3ba6f79c", marks=CREEPS))
+STOOD = ("c8e5a9caa4", "ba3ba6f79c")
 """Smoothed laws: a body that leans far, and events near to each other."""
 PATIENCE = 200.0
 """Seconds."""
