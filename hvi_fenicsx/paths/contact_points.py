@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..reduced.condensed_stiffness import ZERO, negative_directions, rounding_of
-from ..typing import Array, Mask, magnitude
+from ..typing import Array, Mask
 from .point_laws import PointLaws
 from .rigid_motions import Unresisted, without
 from .statuses import PointStatuses
@@ -223,19 +223,6 @@ class ContactPoints(PointStatuses):
         axes = self._axes(values.directions)
         parts = np.array([axes @ motion for motion in self.rigid])[:, self.resisting(values)]
         return Unresisted(motions=without(self.rigid, parts, DEFAULT.none), rate=rate)
-
-    def are_outdone(self, load: Array, motion: Array) -> bool:
-        """Whether laws and bounds, as they remember, can nowhere balance a load along the rigid part of a motion.
-
-        Args:
-            load: the load, (n,).
-            motion: displacements, (n,); each unknown is a point.
-        """
-        along = self.rigid.T @ (self.rigid @ motion)
-        along *= np.sign(load @ along)
-        moved = np.abs(along) > DEFAULT.none * magnitude(along)
-        most = np.where(along > 0.0, self.greatest, self.least)[moved] @ along[moved]
-        return bool(load @ along > most + DEFAULT.none * np.abs(load) @ np.abs(along))
 
     def held_stiffness(self, held: Array | None) -> Array:
         """The stiffness with springs against motions that are as stiff as the body, (n, n).

@@ -218,8 +218,8 @@ class CurvedBranch(Events):
         return found - free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (self.points.stiffness @ found))[0]
 
     @property
-    @override
     def motion(self) -> Array:
+        """How fast the displacements change along the branch, (n,)."""
         return displacement_rate(self.points, self.here)
 
     @override

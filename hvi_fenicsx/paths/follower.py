@@ -310,8 +310,7 @@ class Follower(LoadHistory):
         if landing is None:
             self._lose(factor, f"no stable state was found at the factor {factor:.6g} ({', '.join(WAYS)})")
         else:
-            told = "no equilibrium is left" if landing.proven else f"no motion rests ({landing.way})"
-            self._come_off(factor, f"at the factor {factor:.6g} {told}: a body comes off")
+            self._come_off(factor, f"at the factor {factor:.6g} no motion rests ({landing.way}): a body comes off")
         yield replace(self._last, event=Event.END, place=None, released=0.0, way="")
 
     def _goes_on(self, landed: PathState) -> Iterator[PathState]:

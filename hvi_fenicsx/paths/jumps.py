@@ -3,9 +3,9 @@
 It is looked for along the curve of equilibria first: where that turns, falls, and comes back to the loads, with one
 unstable direction on its way, and bears more. Else a force t c holds the body back, against the way in which it leaves,
 while it goes: the loads f(λ) + t c, t < 0, give a branch of equilibria that begins at the state with t = 0. The energy
-falls along it, dE = t cᵀdx, and where t is 0 again is an equilibrium of the loads alone. Where bonds have broken until
-the rest cannot bear the load, or such branches of two forces go on for ever with t < 0, a body comes off; with t = 0 it
-is in equilibrium wherever it goes. Else the body moves as an overdamped one (:mod:`.motion`). Bonds remember on the way.
+falls along it, dE = t cᵀdx, and where t is 0 again is an equilibrium of the loads alone. Where such branches of two
+forces go on for ever with t < 0 a body comes off; with t = 0 it is in equilibrium wherever it goes. Else the body moves
+as an overdamped one (:mod:`.motion`). Bonds remember on the way.
 """
 
 from __future__ import annotations
@@ -37,13 +37,11 @@ class Landing:
         z: the coordinates of a stable equilibrium, (n,); None: the body comes off.
         inverse: of its equations; None where it is not known.
         way: how it was found.
-        proven: whether what bonds still bear is less than the load: there is no equilibrium.
     """
 
     z: Array | None
     inverse: CellInverse | None = None
     way: str = ""
-    proven: bool = False
 
 
 class Jump:
@@ -97,13 +95,13 @@ class Jump:
         return None
 
     def _held_back(self) -> Landing | None:
-        """The landing of the first restraint whose branch leads to one soon; off where it is proven, or two lead off."""
+        """The landing of the first restraint whose branch leads to one soon; off where those of two lead off."""
         kept, off = self._points.kept(), None
         for restraint, k in _restraints(self._branch):
             found = None
             with suppress(Refused, np.linalg.LinAlgError):
                 found = self._restrained(restraint, k)
-            if found is not None and (found.z is not None or found.proven or off is not None):
+            if found is not None and (found.z is not None or off is not None):
                 return found
             off = found or off
             self._points.restore(kept)
@@ -127,8 +125,6 @@ class Jump:
         standing, x = 0, self._values.x
         most = DEFAULT.waits * (2 + len(self._points) * self._points.straight)
         for move in advancing(branch, 0.0, most):
-            if self._points.straight and self._points.are_outdone(self._load, branch.motion):
-                return Landing(z=None, proven=True)
             stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
             standing, x = standing + 1 if stands else 0, branch.values.x
             anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none

@@ -95,8 +95,8 @@ class StraightBranch(StraightEquations):
         yield found, k
 
     @property
-    @override
     def motion(self) -> Array:
+        """How fast the displacements change along the branch, (n,)."""
         return np.where(self.points.moving, self.directions, 0.0)
 
     @override
