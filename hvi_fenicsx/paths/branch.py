@@ -176,6 +176,10 @@ class Branch(ABC):
         """
 
     @abstractmethod
+    def beyond(self) -> Array:
+        """The coordinates a little farther on, (n,)."""
+
+    @abstractmethod
     def balanced(self, factor: float) -> Array:
         """The coordinates in equilibrium at a factor nearby, on the segments as they are, (n,).
 

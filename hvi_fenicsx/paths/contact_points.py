@@ -244,6 +244,16 @@ class ContactPoints(PointStatuses):
         moved = self.moved(values).sparse @ self.held_stiffness(held)
         return moved.T + self.risen(values).sparse.toarray()  # S and the first blocks are symmetric
 
+    def along(self, values: Values, motion: Array) -> Array:
+        """What a motion is along the displacements of the points, (m,).
+
+        Args:
+            values: at the point.
+            motion: by unknown, (n,).
+        """
+        along = self.vectors.along(values.directions, motion)
+        return np.concatenate([motion[self.one], along, motion[self.vectors.opening_unknowns]])
+
     def bond_forces(self, values: Values) -> Array:
         """The forces of the laws of each point alone, without those of bounds, (m,).
 

@@ -15,7 +15,7 @@ from .contact_points import ContactPoints
 from .curve import branch_from
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
-from .jumps import WAYS, Jump
+from .jumps import Jump
 from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped
 from .thresholds import DEFAULT
 from .vertex_laws import multiplied
@@ -305,13 +305,13 @@ class Follower(LoadHistory):
         heading, held = (1 if aim > factor else -1), self._is_held(factor)
         landing = Jump(self._problem, self._branch, heading, held=held).landing()
         if landing is not None and landing.z is not None:
-            yield from self._goes_on(replace(self._landed(landing.z, factor, aim, landing.inverse), way=landing.way))
+            yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
             return
         if landing is None:
-            self._lose(factor, f"no stable state was found at the factor {factor:.6g} ({', '.join(WAYS)})")
+            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
         else:
-            self._come_off(factor, f"at the factor {factor:.6g} no motion rests ({landing.way}): a body comes off")
-        yield replace(self._last, event=Event.END, place=None, released=0.0, way="")
+            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
+        yield replace(self._last, event=Event.END, place=None, released=0.0)
 
     def _goes_on(self, landed: PathState) -> Iterator[PathState]:
         """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""

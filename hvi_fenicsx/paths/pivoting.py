@@ -277,6 +277,12 @@ class StraightBranch(StraightEquations):
         return abs(self.rates[FACTOR]) * self._live < DEFAULT.reached * size
 
     @override
+    def beyond(self) -> Array:
+        found = self._first_end(self.factor)
+        length = self.points.scale / (magnitude(self.directions) or 1.0) if found is None else found[1]
+        return self.z + DEFAULT.near * length * self.directions
+
+    @override
     def must_leave(self, aim: float) -> bool:
         """Unstable, and no other point is at the end of its segment already."""
         if self.unstable == 0:
