@@ -23,7 +23,7 @@ from petsc4py import PETSc
 from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
 
 from ..geometry import ROUNDING
-from ..typing import Array, Integers, Mask
+from ..typing import Array, Integers, Mask, magnitude
 from .facet_overlaps import OverlapPoints, Overlaps
 from .facets import Facets
 from .scaling import DEFAULT
@@ -90,7 +90,7 @@ def rigid_rows(rows: RelativeRows, places: Array, meets: Array) -> RelativeRows:
     moments = shares.data[:, None, None] * turns
     inertia = np.add.reduceat(moments @ turns.transpose(0, 2, 1), met.indptr[:-1])
     way = meets - met @ places
-    way[np.abs(way) <= 10.0 * DEFAULT.rounding * np.abs(places).max()] = 0.0  # where sides are flat
+    way[np.abs(way) <= 10.0 * DEFAULT.rounding * magnitude(places)] = 0.0  # where sides are flat
     lever = np.einsum("id,rde->ier", way, spins)
     entries = (lever @ np.linalg.pinv(inertia, ROUNDING))[row] @ moments + met.data[:, None, None] * np.eye(d)
     vectors = bsr_array((entries, met.indices, rows.second.indptr), (places.size, places.size))
