@@ -156,6 +156,7 @@ class PathRun:
             work=state.work * scales.energy,
             dissipated=state.dissipated * scales.energy,
             released=state.released * scales.energy,
+            way=state.way,
             unstable=state.unstable,
             forces=self._measures.forces(state.x, state.factor, self._reached),
             displacements=self._measures.displacements(state.x, state.factor),

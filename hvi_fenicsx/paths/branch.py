@@ -101,6 +101,11 @@ class Branch(ABC):
     def directions(self) -> Array:
         """How fast the points go along their graphs, (m,)."""
 
+    @property
+    @abstractmethod
+    def motion(self) -> Array:
+        """How fast the displacements change along the branch, (n,)."""
+
     @abstractmethod
     def leaving(self) -> Iterator[tuple[Array, int]]:
         """Motions in which the energy may fall, (n,) each, and the point that leads it."""
@@ -174,10 +179,6 @@ class Branch(ABC):
         Args:
             aim: the factor that is wanted.
         """
-
-    @abstractmethod
-    def beyond(self) -> Array:
-        """The coordinates a little farther on, (n,)."""
 
     @abstractmethod
     def balanced(self, factor: float) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..reduced.condensed_stiffness import ZERO, negative_directions, rounding_of
-from ..typing import Array, Mask
+from ..typing import Array, Mask, magnitude
 from .point_laws import PointLaws
 from .rigid_motions import Unresisted, without
 from .statuses import PointStatuses
@@ -224,6 +224,19 @@ class ContactPoints(PointStatuses):
         parts = np.array([axes @ motion for motion in self.rigid])[:, self.resisting(values)]
         return Unresisted(motions=without(self.rigid, parts, DEFAULT.none), rate=rate)
 
+    def are_outdone(self, load: Array, motion: Array) -> bool:
+        """Whether laws and bounds, as they remember, can nowhere balance a load along the rigid part of a motion.
+
+        Args:
+            load: the load, (n,).
+            motion: displacements, (n,); each unknown is a point.
+        """
+        along = self.rigid.T @ (self.rigid @ motion)
+        along *= np.sign(load @ along)
+        moved = np.abs(along) > DEFAULT.none * magnitude(along)
+        most = np.where(along > 0.0, self.greatest, self.least)[moved] @ along[moved]
+        return bool(load @ along > most + DEFAULT.none * np.abs(load) @ np.abs(along))
+
     def held_stiffness(self, held: Array | None) -> Array:
         """The stiffness with springs against motions that are as stiff as the body, (n, n).
 
@@ -243,16 +256,6 @@ class ContactPoints(PointStatuses):
         """
         moved = self.moved(values).sparse @ self.held_stiffness(held)
         return moved.T + self.risen(values).sparse.toarray()  # S and the first blocks are symmetric
-
-    def along(self, values: Values, motion: Array) -> Array:
-        """What a motion is along the displacements of the points, (m,).
-
-        Args:
-            values: at the point.
-            motion: by unknown, (n,).
-        """
-        along = self.vectors.along(values.directions, motion)
-        return np.concatenate([motion[self.one], along, motion[self.vectors.opening_unknowns]])
 
     def bond_forces(self, values: Values) -> Array:
         """The forces of the laws of each point alone, without those of bounds, (m,).

@@ -204,7 +204,7 @@ class CurvedBranch(Events):
             found = [self._after_drops(drops, free), motion]
         else:
             lowest = free.ways.T @ np.linalg.eigh(free.matrix)[1][:, 0] if len(free.slopes) else np.zeros_like(motion)
-            lowest *= np.sign(self._into_cell(lowest) or float(lowest @ motion)) or 1.0
+            lowest *= np.sign(float(lowest @ motion)) or 1.0
             found = [lowest, motion, -lowest]
         for one in found:
             for k in drops or [int(np.argmax([magnitude(one[group]) for group in groups]))]:
@@ -217,22 +217,10 @@ class CurvedBranch(Events):
             found += (np.sign(directions[k]) or 1.0) * self.row(k, self.here.y)[:-1]
         return found - free.ways.T @ np.linalg.lstsq(free.matrix, free.ways @ (self.points.stiffness @ found))[0]
 
-    def _into_cell(self, motion: Array) -> float:
-        """How far a motion takes points at ends of their segments into these: many may be there at once."""
-        points, values = self.points, self.here.values
-        allowed = points.allowances(values, self.directions, magnitude(self.here.tangent))
-        low, high = (values.s <= points.low + allowed), (values.s >= points.high - allowed)
-        return float((values.moves > 0.0) * (low * 1.0 - high) @ points.along(values, motion))
-
     @property
-    def motion(self) -> Array:
-        """How fast the displacements change along the branch, (n,)."""
-        return displacement_rate(self.points, self.here)
-
     @override
-    def beyond(self) -> Array:
-        ways, _ = self._ends()
-        return self.z + min(DEFAULT.near, float(np.min(ways, initial=np.inf))) * self.here.tangent[:-1]
+    def motion(self) -> Array:
+        return displacement_rate(self.points, self.here)
 
     @override
     def balanced(self, factor: float) -> Array:

@@ -15,7 +15,7 @@ from .contact_points import ContactPoints
 from .curve import branch_from
 from .energy_balance import EnergyBalance
 from .initial_state import Nowhere, at_rest, settled
-from .jumps import Jump
+from .jumps import WAYS, Jump
 from .state import Cycle, Cycles, End, Event, EventPlace, Follow, LoadHistory, PathOptions, PathState, Stopped
 from .thresholds import DEFAULT
 from .vertex_laws import multiplied
@@ -305,13 +305,14 @@ class Follower(LoadHistory):
         heading, held = (1 if aim > factor else -1), self._is_held(factor)
         landing = Jump(self._problem, self._branch, heading, held=held).landing()
         if landing is not None and landing.z is not None:
-            yield from self._goes_on(self._landed(landing.z, factor, aim, landing.inverse))
+            yield from self._goes_on(replace(self._landed(landing.z, factor, aim, landing.inverse), way=landing.way))
             return
         if landing is None:
-            self._lose(factor, f"no stable equilibrium found at the factor {factor:.6g}")
+            self._lose(factor, f"no stable state was found at the factor {factor:.6g} ({', '.join(WAYS)})")
         else:
-            self._come_off(factor, f"at the factor {factor:.6g} no equilibrium is left: a body comes off")
-        yield replace(self._last, event=Event.END, place=None, released=0.0)
+            told = "no equilibrium is left" if landing.proven else f"no motion rests ({landing.way})"
+            self._come_off(factor, f"at the factor {factor:.6g} {told}: a body comes off")
+        yield replace(self._last, event=Event.END, place=None, released=0.0, way="")
 
     def _goes_on(self, landed: PathState) -> Iterator[PathState]:
         """A jump's state, and the end where jumps in a row have released nothing: their causes were rounding."""

@@ -1,17 +1,18 @@
 """From a state that is not stable to the next stable equilibrium at the same loads.
 
-A force t c holds the body back, against the way in which it leaves, while it goes: the loads f(λ) + t c, t < 0, give a
-branch of equilibria that begins at the state with t = 0. The energy falls along it, dE = t cᵀdx, and where t is 0 again
-is an equilibrium of the loads alone. Where the branch goes on for ever with t < 0 a body comes off; with t = 0 it is in
-equilibrium wherever it goes. Where no such branch leads to an end soon, the body moves as an overdamped one
-(:mod:`.motion`). Bonds remember on the way.
+It is looked for along the curve of equilibria first: where that turns, falls, and comes back to the loads, with one
+unstable direction on its way, and bears more. Else a force t c holds the body back, against the way in which it leaves,
+while it goes: the loads f(λ) + t c, t < 0, give a branch of equilibria that begins at the state with t = 0. The energy
+falls along it, dE = t cᵀdx, and where t is 0 again is an equilibrium of the loads alone. Where bonds have broken until
+the rest cannot bear the load, or such branches of two forces go on for ever with t < 0, a body comes off; with t = 0 it
+is in equilibrium wherever it goes. Else the body moves as an overdamped one (:mod:`.motion`). Bonds remember on the way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from .curve import branch_from
 from .motion import OverdampedMotion
 from .thresholds import DEFAULT
 
+WAYS = "along the curve", "held back", "in motion"
+"""How the next state is looked for, one after the other."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Landing:
@@ -32,10 +36,14 @@ class Landing:
     Attributes:
         z: the coordinates of a stable equilibrium, (n,); None: the body comes off.
         inverse: of its equations; None where it is not known.
+        way: how it was found.
+        proven: whether what bonds still bear is less than the load: there is no equilibrium.
     """
 
     z: Array | None
     inverse: CellInverse | None = None
+    way: str = ""
+    proven: bool = False
 
 
 class Jump:
@@ -56,21 +64,48 @@ class Jump:
     def landing(self) -> Landing | None:
         """Where it leads; None where this was not found, with the points where they were."""
         kept = self._points.kept()
-        for way in (self._held_back, self._released, self._pushed_off):
-            found = way()
-            if found is not None:
-                return found
+        for way, found_by in zip(WAYS, (self._along, self._held_back, self._moved), strict=True):
+            if (found := found_by()) is not None:
+                return replace(found, way=way)
             self._points.restore(kept)
         return None
 
+    def _along(self) -> Landing | None:
+        """The next state along the curve that bears more than these loads, if one unstable direction leads there."""
+        points, rate, factor = self._points, self._problem.force_rate, self._branch.factor
+        branch = branch_from(points, self._problem.force, rate, self._z, factor, self._branch.inverse())
+        branch.resume(self._branch.position(0))
+        branch.trend, branch.unstable = self._branch.trend, self._branch.unstable
+        beyond, released = factor + self._heading * DEFAULT.slow * abs(factor), 0.0
+        found, kept = None, points.kept()
+        with suppress(Refused, np.linalg.LinAlgError):
+            for _ in range(DEFAULT.waits**2):
+                before, x = branch.factor, branch.values.x
+                move = next(advancing(branch, beyond if found else factor, 1))
+                branch.note(move)
+                released += (factor - 0.5 * (before + branch.factor)) * float(rate @ (branch.values.x - x))
+                rises, there = self._heading * branch.rising > 0.0, move.outcome is StepEnd.FACTOR
+                if found and there:
+                    points.restore(kept)
+                    return found
+                if rises and there and released > 0.0:
+                    found, kept = self._landed(branch.z.copy(), branch.inverse()), points.kept()
+                found = found if rises else None
+                lost = move.outcome in (StepEnd.AWAY, StepEnd.STUCK) or branch.unstable > 1
+                if lost or self._heading * (branch.factor - beyond) > 0.0:
+                    break
+        return None
+
     def _held_back(self) -> Landing | None:
-        """The landing of the first restraint whose branch leads to an end soon."""
-        kept = self._points.kept()
+        """The landing of the first restraint whose branch leads to one soon; off where it is proven, or two lead off."""
+        kept, off = self._points.kept(), None
         for restraint, k in _restraints(self._branch):
+            found = None
             with suppress(Refused, np.linalg.LinAlgError):
                 found = self._restrained(restraint, k)
-                if found is not None:
-                    return found
+            if found is not None and (found.z is not None or found.proven or off is not None):
+                return found
+            off = found or off
             self._points.restore(kept)
         return None
 
@@ -92,6 +127,8 @@ class Jump:
         standing, x = 0, self._values.x
         most = DEFAULT.waits * (2 + len(self._points) * self._points.straight)
         for move in advancing(branch, 0.0, most):
+            if self._points.straight and self._points.are_outdone(self._load, branch.motion):
+                return Landing(z=None, proven=True)
             stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
             standing, x = standing + 1 if stands else 0, branch.values.x
             anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
@@ -124,20 +161,11 @@ class Jump:
         self._points.restore(kept)
         return leads_on
 
-    def _released(self) -> Landing | None:
-        """The landing of an overdamped motion, from a little farther along the path: there smaller loads are borne."""
-        return self._relaxed(self._z if self._points.on_drops() else self._branch.beyond(), self._load)
-
-    def _pushed_off(self) -> Landing | None:
-        """The landing under loads that are larger at first: where many bonds reach an end together, the body rests."""
-        rate = self._problem.force_rate
-        push = DEFAULT.slow * self._heading
-        push = push * magnitude(self._load) / np.max(np.abs(rate), initial=1e-300)
-        return self._relaxed(self._z, self._load + push * rate, self._load)
-
-    def _relaxed(self, z: Array, *loads: Array) -> Landing | None:
-        """The landing of overdamped motions under one load after the other."""
-        for load in loads:
+    def _moved(self) -> Landing | None:
+        """The landing of overdamped motions, under loads that are larger at first: many bonds may end together."""
+        rate, z = self._problem.force_rate, self._z
+        push = DEFAULT.slow * self._heading * magnitude(self._load) / np.max(np.abs(rate), initial=1e-300) * rate
+        for load in (self._load + push, self._load):
             motion = OverdampedMotion(self._problem, self._points, z, load, held=self._held)
             if not motion.run(self._directions):
                 return None

@@ -27,6 +27,7 @@ class PathRow:
         work: done by loads and supports since the start.
         dissipated: since the start.
         released: by a jump to this state.
+        way: how a jump was found.
         unstable: number of unstable directions.
         forces: the resultant of what acts on the body, by part, N/m or N, (d,) each.
         displacements: the mean displacement, by part, m, (d,) each.
@@ -41,6 +42,7 @@ class PathRow:
     work: float
     dissipated: float
     released: float
+    way: str
     unstable: int
     forces: Mapping[str, Array]
     displacements: Mapping[str, Array]
@@ -164,7 +166,7 @@ class LoadPath:
             "peak_factor": peak and peak.factor,
             "peak_row": peak and self.peak,
             "folds": len(self.folds),
-            "jumps": [{"factor": self.rows[n].factor, "released": self.rows[n].released} for n in self.jumps],
+            "jumps": [{key: getattr(self.rows[n], key) for key in ("factor", "released", "way")} for n in self.jumps],
             "work": last and last.work,
             "dissipated": last and last.dissipated,
             "end": self.end,

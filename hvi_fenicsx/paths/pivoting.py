@@ -95,8 +95,8 @@ class StraightBranch(StraightEquations):
         yield found, k
 
     @property
+    @override
     def motion(self) -> Array:
-        """How fast the displacements change along the branch, (n,)."""
         return np.where(self.points.moving, self.directions, 0.0)
 
     @override
@@ -275,12 +275,6 @@ class StraightBranch(StraightEquations):
         forces = magnitude(np.where(points.moving, points.slope, points.rise) * self.directions)
         size = self._stiffest * magnitude(self.motion) + forces
         return abs(self.rates[FACTOR]) * self._live < DEFAULT.reached * size
-
-    @override
-    def beyond(self) -> Array:
-        found = self._first_end(self.factor)
-        length = self.points.scale / (magnitude(self.directions) or 1.0) if found is None else found[1]
-        return self.z + DEFAULT.near * length * self.directions
 
     @override
     def must_leave(self, aim: float) -> bool:

@@ -84,6 +84,17 @@ class Segment:
         return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
 
 
+def extremes(chain: Sequence[Segment]) -> tuple[float, float]:
+    """The least and the greatest force of a graph.
+
+    Args:
+        chain: its segments.
+    """
+    rates = ((s, s.rise or s.slope) for s in chain)
+    forces = [s.force + (rate * end if rate else 0.0) for s, rate in rates for end in (s.low, s.high)]
+    return min(forces), max(forces)
+
+
 def piece_at(chain: Sequence[Segment], x: float, rounding: float, *, forward: bool) -> int:
     """The number of the piece on which a displacement is or, but for rounding, at an end; of two the next one.
 

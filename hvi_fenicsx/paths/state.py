@@ -100,6 +100,7 @@ class PathState:
         work: of loads and of what moves prescribed displacements, since the start.
         dissipated: lost in bonds with memory.
         released: at a jump, what the body has lost in motion.
+        way: how a jump was found.
         unstable: number of directions in which the energy falls.
         memory: what the bonds remember, (bonds, 4) as :attr:`.VertexLaws.memory`; None without memory.
         position: where on its curve the path is.
@@ -113,6 +114,7 @@ class PathState:
     work: float
     dissipated: float
     released: float = 0.0
+    way: str = ""
     unstable: int
     memory: Array | None
     position: Position

@@ -18,7 +18,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
 from .curved_laws import Deviations
 from .point_laws import PointLaws
-from .segments import Segment, SegmentKind, beside_opening, chain, from_zero
+from .segments import Segment, SegmentKind, beside_opening, chain, extremes, from_zero
 from .state import PathState
 from .thresholds import ROUNDING
 from .vertex_laws import shares
@@ -39,6 +39,8 @@ class PointStatuses(PointLaws):
         low: least s, (m,).
         high: greatest s, (m,).
         outward: where bonds with memory go on, 1 or -1; else 0, (m,).
+        least: force of each point's graph, (m,).
+        greatest: likewise.
         elastic: S, or another one while a body moves.
         rigid: the displacements that S does not resist, as orthonormal rows, (k, n).
 
@@ -55,6 +57,7 @@ class PointStatuses(PointLaws):
         m = len(self.laws)
         self.numbers = np.zeros(m, dtype=np.int64)
         self.low, self.high, self.outward = np.zeros(m), np.zeros(m), np.zeros(m)
+        self.least, self.greatest = np.zeros(m), np.zeros(m)
         self._base, self._x, self._force = np.zeros(m), np.zeros(m), np.zeros(m)
         self._moves, self._rises = np.zeros(m), np.zeros(m)
         self._bound, self._curved, self._bent = (np.zeros(m, dtype=bool) for _ in range(3))
@@ -73,6 +76,7 @@ class PointStatuses(PointLaws):
         """
         self._chains[k] = self._segments(k)
         self._bases[k] = self._based(k)
+        self.least[k], self.greatest[k] = extremes(self._chains[k])
 
     @property
     def stiffness(self) -> Array:

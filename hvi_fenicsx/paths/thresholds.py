@@ -22,7 +22,7 @@ class FollowingThresholds:
             by so much loads are larger that push a body off; a factor this near to the largest that is borne is it.
         small: a pivot or row this small costs digits; the part of a load that takes a body to where something holds it;
             the shortest step in a motion in time.
-        near: factors of a point nearby serve while corrections fall by this; a step beyond a state along the path.
+        near: factors of a point nearby serve while corrections fall by this.
         digits: the last digits of coordinates, and what they make of forces.
         least_turn: least cosine of the angle between the tangents at both ends of a step.
         reach: a step changes the argument of a curved law by this part of its length scale and of the argument at most.
