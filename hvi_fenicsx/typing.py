@@ -32,4 +32,4 @@ def magnitude(values: npt.ArrayLike) -> float:
     Args:
         values: numbers.
     """
-    return float(np.max(np.abs(values), initial=0.0))
+    return float(np.abs(values).max(initial=0.0))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -165,37 +166,51 @@ class Carrier:
     radius: Array
     at_rest: Mask
 
-    def nearest(self, wanted: Array) -> tuple[Array, Array]:
-        """The force of its set that is nearest to a wanted one, and its derivative, both in visible components.
+    def nearest(self, wanted: Array) -> Array:
+        """The force of its set that is nearest to a wanted one in visible components, (k, d).
 
         Args:
             wanted: (k, d).
-
-        Returns:
-            The force (k, d), on a segment with its hidden components, and the derivative (k, d, d).
         """
-        seen, rest = wanted * self.visible, self.at_rest
-        found, slope = self._on_segment(seen)
-        if np.any(rest):
-            disc, turns = self._in_disc(seen)
-            found, slope = np.where(rest, disc, found), np.where(rest[:, :, None], turns, slope)
-        return found, slope * (self.visible[:, :, None] & self.visible[:, None, :])
+        found = np.clip(self._size(wanted), self.low, self.high) * self.along
+        if not np.any(self.at_rest):
+            return found
+        disc, _ = self.length.nearest(self._inside(wanted), self.radius[:, 0])
+        return np.where(self.at_rest, np.einsum("mk,mkd->md", disc, self.axes), found)
 
-    def _on_segment(self, wanted: Array) -> tuple[Array, Array]:
-        shown = self.along * self.visible
-        squares = np.sum(shown**2, axis=1, keepdims=True)
-        middle = np.clip(0.0, self.low, self.high)
-        size = np.divide(np.sum(wanted * shown, axis=1, keepdims=True), squares, out=middle, where=squares > 0.0)
+    def derivative(self, wanted: Array) -> Array:
+        """The derivative of :meth:`nearest`, (k, d, d).
+
+        Args:
+            wanted: (k, d).
+        """
+        size, squares = self._size(wanted), self._squares
         inside = (self.low < size) & (size < self.high) & (squares > 0.0)
         share = np.divide(1.0, squares, out=np.zeros_like(squares), where=inside)
-        return np.clip(size, self.low, self.high) * self.along, share[:, :, None] * (shown[:, :, None] * shown[:, None])
-
-    def _in_disc(self, wanted: Array) -> tuple[Array, Array]:
-        inside = np.einsum("mkd,md->mk", self.axes, wanted) * self.counts
-        found, slope = self.length.nearest(inside, self.radius[:, 0])
+        found = share[:, :, None] * (self._shown[:, :, None] * self._shown[:, None])
+        _, slope = self.length.nearest(self._inside(wanted), self.radius[:, 0])
         slope = slope * (self.counts[:, :, None] & self.counts[:, None, :])
         turned = np.einsum("mkd,mkl,mle->mde", self.axes, slope, self.axes)
-        return np.einsum("mk,mkd->md", found, self.axes), turned
+        found = np.where(self.at_rest[:, :, None], turned, found)
+        return found * (self.visible[:, :, None] & self.visible[:, None, :])
+
+    @cached_property
+    def _shown(self) -> Array:
+        return self.along * self.visible
+
+    @cached_property
+    def _squares(self) -> Array:
+        return np.sum(self._shown**2, axis=1, keepdims=True)
+
+    def _size(self, wanted: Array) -> Array:
+        """Where on the line of the segment a wanted force is, (k, 1)."""
+        middle = np.clip(0.0, self.low, self.high)
+        along = np.sum(wanted * self._shown, axis=1, keepdims=True)
+        return np.divide(along, self._squares, out=middle, where=self._squares > 0.0)
+
+    def _inside(self, wanted: Array) -> Array:
+        """A wanted force along the axes of the disc, (k, q)."""
+        return np.einsum("mkd,md->mk", self.axes, wanted * self.visible) * self.counts
 
 
 def components(term: LawTerm) -> Iterator[tuple[Integers, Array]]:
@@ -265,41 +280,41 @@ def nearest_sum(carriers: Sequence[Carrier], wanted: Array) -> tuple[list[Array]
     for carrier, part in zip(carriers, parts, strict=True):
         every[carrier.rows] += part
     asked = [wanted[c.rows] * part / every[c.rows] for c, part in zip(carriers, parts, strict=True)]
-    settled = float(np.finfo(np.float64).eps) * magnitude(wanted)
-    _sweep(carriers, asked, wanted, settled)
+    forces = [c.nearest(a) for c, a in zip(carriers, asked, strict=True)]
+    left, settled = _left(carriers, forces, wanted), float(np.finfo(np.float64).eps) * magnitude(wanted)
+    _sweep(carriers, asked, forces, left, settled)
     for _ in range(DEFAULT.shared_steps if any(np.any(c.at_rest) for c in carriers) else 0):
-        left = _left(carriers, asked, wanted)
-        if np.all(np.abs(left) <= settled) or not _newton(carriers, asked, wanted, left):
+        left = _left(carriers, forces, wanted)
+        if np.all(np.abs(left) <= settled) or not _newton(carriers, asked, forces, wanted, left):
             break
-    return [c.nearest(a)[0] for c, a in zip(carriers, asked, strict=True)], _left(carriers, asked, wanted)
+    return forces, _left(carriers, forces, wanted)
 
 
-def _left(carriers: Sequence[Carrier], asked: Sequence[Array], wanted: Array) -> Array:
-    """What the carriers leave of the wanted forces, (vertices, d)."""
+def _left(carriers: Sequence[Carrier], forces: Sequence[Array], wanted: Array) -> Array:
+    """What the carriers' forces leave of the wanted ones, (vertices, d)."""
     left = wanted.copy()
-    for carrier, a in zip(carriers, asked, strict=True):
-        left[carrier.rows] -= carrier.nearest(a)[0] * carrier.visible
+    for carrier, force in zip(carriers, forces, strict=True):
+        left[carrier.rows] -= force * carrier.visible
     return left
 
 
-def _sweep(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, settled: float) -> None:
+def _sweep(carriers: Sequence[Carrier], asked: list[Array], forces: list[Array], left: Array, settled: float) -> None:
     """Ask each carrier in turn for its force and what is left, until that stays."""
-    left, moved = _left(carriers, asked, wanted), np.inf
     for _ in range(DEFAULT.shared_steps):
-        if moved <= settled:
-            break
         old = left.copy()
         for i, carrier in enumerate(carriers):
-            before = carrier.nearest(asked[i])[0] * carrier.visible
+            before = forces[i] * carrier.visible
             asked[i] = left[carrier.rows] + before
-            left[carrier.rows] += before - carrier.nearest(asked[i])[0] * carrier.visible
-        moved = magnitude(left - old)
+            forces[i] = carrier.nearest(asked[i])
+            left[carrier.rows] += before - forces[i] * carrier.visible
+        if magnitude(left - old) <= settled:
+            break
 
 
-def _newton(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left: Array) -> bool:
+def _newton(carriers: Sequence[Carrier], asked: list[Array], forces: list[Array], wanted: Array, left: Array) -> bool:
     """One Newton step at each vertex where it leaves less; whether there was any."""
     d = wanted.shape[1]
-    slopes = [c.nearest(a)[1] for c, a in zip(carriers, asked, strict=True)]
+    slopes = [c.derivative(a) for c, a in zip(carriers, asked, strict=True)]
     matrix = np.tile(SUMMATION * np.eye(d), (len(wanted), 1, 1))
     for carrier, slope in zip(carriers, slopes, strict=True):
         matrix[carrier.rows] += slope @ slope
@@ -308,8 +323,10 @@ def _newton(carriers: Sequence[Carrier], asked: list[Array], wanted: Array, left
     size, pending, length = np.linalg.norm(left, axis=1), np.ones(len(wanted), dtype=bool), 1.0
     for _ in range(DEFAULT.shared_steps):
         trial = [a + length * s for a, s in zip(asked, steps, strict=True)]
-        better = pending & (np.linalg.norm(_left(carriers, trial, wanted), axis=1) < (1 - 1e-3 * length) * size)
+        given = [c.nearest(a) for c, a in zip(carriers, trial, strict=True)]
+        better = pending & (np.linalg.norm(_left(carriers, given, wanted), axis=1) < (1 - 1e-3 * length) * size)
         for i, carrier in enumerate(carriers):
-            asked[i] = np.where(better[carrier.rows, None], trial[i], asked[i])
+            here = better[carrier.rows, None]
+            asked[i], forces[i] = np.where(here, trial[i], asked[i]), np.where(here, given[i], forces[i])
         pending, length = pending & ~better, length / 2
     return not np.all(pending)

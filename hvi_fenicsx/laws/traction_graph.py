@@ -162,6 +162,16 @@ class TractionGraph:
         return np.append(np.arange(self.zero + 1), np.arange(self.zero, len(self.breaks)))
 
     @cached_property
+    def _places(self) -> Array:
+        """Displacement of each anchor."""
+        return self.breaks[self._anchor]
+
+    @cached_property
+    def _next(self) -> tuple[Array, Array, Array]:
+        """For each piece the break at its high end, and both limits there; not a number where it has none."""
+        return np.append(self.breaks, np.nan), np.append(self.left, np.nan), np.append(self.right, np.nan)
+
+    @cached_property
     def _start(self) -> Array:
         """Traction of each piece at its anchor."""
         return np.append(self.left[: self.zero + 1], self.right[self.zero :])
@@ -182,11 +192,12 @@ class TractionGraph:
             x: displacements (m,).
             side: "left" or "right".
         """
-        next_break, passed = self._pieces(x)
-        piece, limits = (next_break, self.left) if side == "left" else (passed, self.right)
+        before = self.breaks.searchsorted(x)
+        at_break = self._next[0][before] == x
+        piece, limits = (before, self._next[1]) if side == "left" else (before + at_break, self._next[2])
         with np.errstate(over="ignore"):
-            inside = self._start[piece] + self.slopes[piece] * (x - self.breaks[self._anchor[piece]])
-        return np.where(passed > next_break, limits[np.minimum(next_break, len(limits) - 1)], inside)
+            inside = self._start[piece] + self.slopes[piece] * (x - self._places[piece])
+        return np.where(at_break, limits[before], inside)
 
     def _pieces(self, x: Array) -> tuple[Integers, Integers]:
         """The pieces before and behind x, (m,) each; off the breaks they are one."""
@@ -203,7 +214,7 @@ class TractionGraph:
         ahead, behind = self._pieces(x)
         piece = np.where(x < 0.0, behind, ahead)
         anchor = self._anchor[piece]
-        d, half = x - self.breaks[anchor], 0.5 * self.slopes[piece]
+        d, half = x - self._places[piece], 0.5 * self.slopes[piece]
         with np.errstate(over="ignore"):
             return self._energy[anchor] + (self._start[piece] + half * d) * d
 
@@ -211,8 +222,7 @@ class TractionGraph:
     def table(self) -> Array:
         """The pieces of the primitive as rows of an :class:`Arc`, (k+1, 6)."""
         ends = np.concatenate([[-np.inf], self.breaks, [np.inf]])
-        anchors = self.breaks[self._anchor]
-        columns = (ends[:-1], ends[1:], anchors, self.primitive(anchors), self._start, self.slopes)
+        columns = (ends[:-1], ends[1:], self._places, self.primitive(self._places), self._start, self.slopes)
         return np.column_stack(columns)
 
     def split(self) -> tuple[TractionGraph, TractionGraph]:

@@ -49,20 +49,17 @@ class VertexLaws:
         memory = None if self.memory is None else self.memory[rows]
         return replace(self, factors=self.factors[rows], weights=self.weights[rows], memory=memory)
 
-    def traction(self, x: Array, side: str) -> Array:
-        """The limit of the traction along the coordinate.
+    def limits(self, x: Array) -> tuple[Array, Array]:
+        """The limits of the traction along the coordinate from the left and from the right, (..., m) each.
 
         Args:
-            x: coordinates.
-            side: "left" or "right".
+            x: coordinates, one or more of each vertex, (..., m).
         """
-        left, right = self._limits(x)
-        found = left if side == "left" else right
+        left, right = self._limits_at_first(x)
         if self.memory is None:
-            return found
-        low, high = self.memory[:, 0], self.memory[:, 1]
-        inside = (x > low) & (x <= high) if side == "left" else (x >= low) & (x < high)
-        return np.where(inside, self._secants(x) * x, found)
+            return left, right
+        low, high, back = self.memory[:, 0], self.memory[:, 1], self._secants(x) * x
+        return np.where((x > low) & (x <= high), back, left), np.where((x >= low) & (x < high), back, right)
 
     def recoverable(self, x: Array, traction: Array) -> Array:
         """What the vertices give back on the way to zero: w j, or the triangle under the secant with memory.
@@ -113,9 +110,9 @@ class VertexLaws:
         known = np.union1d(self.law.breaks, self.factors[number] * np.append(ends, self._memory[number, :2]))
         return TractionGraph.chords(known, self.law.left(known), self.law.right(known))
 
-    def _limits(self, x: Array) -> tuple[Array, Array]:
+    def _limits_at_first(self, x: Array) -> tuple[Array, Array]:
         at, forward = self.factors * x, self.factors > 0.0
-        left, right = self.law.left(at), self.law.right(at)
+        left, right = (limit(at.ravel()).reshape(at.shape) for limit in (self.law.left, self.law.right))
         return self.factors * np.where(forward, left, right), self.factors * np.where(forward, right, left)
 
     def _secants(self, x: Array) -> Array:

@@ -205,7 +205,7 @@ class HeldLaw:
     def _at(self, laws: VertexLaws, factor: float) -> tuple[Array, Array]:
         """What the laws act on at a factor, and their tractions, at a jump the mean of both limits."""
         x = self.arguments[0] + factor * self.arguments[1]
-        return x, 0.5 * (laws.traction(x, "left") + laws.traction(x, "right"))
+        return x, 0.5 * np.add(*laws.limits(x))
 
 
 def find(problem: Problem, parts: Mapping[int, int], prescribed: Array, *, remember: bool) -> list[HeldLaw]:

@@ -224,17 +224,20 @@ class ContactPoints(PointStatuses):
         parts = np.array([axes @ motion for motion in self.rigid])[:, self.resisting(values)]
         return Unresisted(motions=without(self.rigid, parts, DEFAULT.none), rate=rate)
 
-    def are_outdone(self, load: Array, motion: Array) -> bool:
+    def are_outdone(self, values: Values, load: Array, motion: Array) -> bool:
         """Whether laws and bounds, as they remember, can nowhere balance a load along the rigid part of a motion.
 
         Args:
+            values: of the points, each of which is an unknown.
             load: the load, (n,).
-            motion: displacements, (n,); each unknown is a point.
+            motion: displacements, (n,).
         """
         along = self.rigid.T @ (self.rigid @ motion)
         along *= np.sign(load @ along)
         moved = np.abs(along) > DEFAULT.none * magnitude(along)
-        most = np.where(along > 0.0, self.greatest, self.least)[moved] @ along[moved]
+        forces = values.tractions
+        ends = np.where(along > 0.0, np.maximum(self.greatest, forces), np.minimum(self.least, forces))
+        most = ends[moved] @ along[moved]
         return bool(load @ along > most + DEFAULT.none * np.abs(load) @ np.abs(along))
 
     def held_stiffness(self, held: Array | None) -> Array:

@@ -82,7 +82,7 @@ class Distances:
 def _interval(laws: VertexLaws, x: Array, near: Array) -> tuple[Array, Array]:
     """The least and the greatest forces at coordinates, but for their rounding, (r,) each."""
     # at a peak the law gives less at both ends
-    found = [laws.traction(x + way, side) for way in (-near, 0.0, near) for side in ("left", "right")]
+    found = np.concatenate(laws.limits(np.stack([x - near, x, x + near])))
     return laws.weights * np.min(found, axis=0), laws.weights * np.max(found, axis=0)
 
 

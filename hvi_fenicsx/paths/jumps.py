@@ -127,7 +127,7 @@ class Jump:
         standing, x = 0, self._values.x
         most = DEFAULT.waits * (2 + len(self._points) * self._points.straight)
         for move in advancing(branch, 0.0, most):
-            if self._points.straight and self._points.are_outdone(self._load, branch.motion):
+            if self._points.straight and self._points.are_outdone(branch.values, self._load, branch.motion):
                 return Landing(z=None, proven=True)
             stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
             standing, x = standing + 1 if stands else 0, branch.values.x

@@ -84,15 +84,35 @@ class Segment:
         return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
 
 
-def extremes(chain: Sequence[Segment]) -> tuple[float, float]:
-    """The least and the greatest force of a graph.
+def extremes(chain: Sequence[Segment], *, remembers: bool) -> list[tuple[float, float]]:
+    """The least and the greatest force that a point may yet have from each segment on, beside the one that it has.
+
+    Where bonds that remember have been is a secant from there to 0 afterwards.
 
     Args:
-        chain: its segments.
+        chain: the segments.
+        remembers: whether all laws of the point do.
     """
-    rates = ((s, s.rise or s.slope) for s in chain)
-    forces = [s.force + (rate * end if rate else 0.0) for s, rate in rates for end in (s.low, s.high)]
-    return min(forces), max(forces)
+    nodes = [_end(s, s.low) for s in chain] + [_end(chain[-1], chain[-1].high)]
+    found = []
+    for n in range(len(chain)):
+        side = any(s.outward > 0 for s in chain[: n + 1]) - any(s.outward < 0 for s in chain[n:])
+        forces = _forces_left(nodes, n, side) if side and remembers else [f for _, f in nodes]
+        found.append((min(forces), max(forces)))
+    return found
+
+
+def _forces_left(nodes: Sequence[tuple[float, float]], number: int, side: int) -> list[float]:
+    """The forces at ends of segments from one on that is beyond 0 on a side, of the other side, and at rest."""
+    ahead = nodes[number + 1 :] if side > 0 else nodes[: number + 1]
+    other = [f for x, f in nodes if x * side < 0.0 or (x == 0.0 and f * side <= 0.0)]
+    return [0.0, *other, *(f for _, f in ahead)]
+
+
+def _end(segment: Segment, coordinate: float) -> tuple[float, float]:
+    """Displacement and force at an end."""
+    rate = segment.rise or segment.slope
+    return segment.displacement(coordinate), segment.force + (rate * coordinate if rate else 0.0)
 
 
 def piece_at(chain: Sequence[Segment], x: float, rounding: float, *, forward: bool) -> int:

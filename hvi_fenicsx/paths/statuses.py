@@ -39,7 +39,7 @@ class PointStatuses(PointLaws):
         low: least s, (m,).
         high: greatest s, (m,).
         outward: where bonds with memory go on, 1 or -1; else 0, (m,).
-        least: force of each point's graph, (m,).
+        least: force that each point may yet have, beside the one that it has, (m,).
         greatest: likewise.
         elastic: S, or another one while a body moves.
         rigid: the displacements that S does not resist, as orthonormal rows, (k, n).
@@ -63,6 +63,7 @@ class PointStatuses(PointLaws):
         self._bound, self._curved, self._bent = (np.zeros(m, dtype=bool) for _ in range(3))
         self._chains: list[tuple[Segment, ...]] = [()] * m
         self._bases: list[Array] = [np.zeros(0)] * m
+        self._extremes: list[list[tuple[float, float]]] = [[]] * m
         for k in range(m):
             self.rebuild(k)
 
@@ -76,7 +77,8 @@ class PointStatuses(PointLaws):
         """
         self._chains[k] = self._segments(k)
         self._bases[k] = self._based(k)
-        self.least[k], self.greatest[k] = extremes(self._chains[k])
+        remembers = all(law.passed is not None for law in self.laws[k])
+        self._extremes[k] = extremes(self._chains[k], remembers=remembers)
 
     @property
     def stiffness(self) -> Array:
@@ -139,6 +141,7 @@ class PointStatuses(PointLaws):
         self._rises[k] = (segment.rise or segment.slope) * unit
         self._bound[k] = segment.kind is SegmentKind.BOUND
         self.outward[k] = segment.outward
+        self.least[k], self.greatest[k] = self._extremes[k][number]
         self._curved[k] = self._deviations.enter(k, segment)
         self._bent[k] = self._curved[k] or self._turns(k)
         if self.is_opening(k):  # it counts in its length, or not

@@ -141,7 +141,8 @@ class StraightEquations(Branch):
         Args:
             values: of the basis, (n,).
         """
-        found = np.append(values, 0.0)
+        found = np.zeros(len(values) + 1)
+        found[:-1] = values
         found[FACTOR], found[self.driver] = found[self.driver], 0.0
         return found
 

@@ -115,14 +115,14 @@ class VertexLaw:
             return True
         return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
 
-    def traction(self, x: float, side: str) -> float:
-        """The limit of the traction along the coordinate, with memory.
+    def limits(self, x: float) -> tuple[float, float]:
+        """The limits of the traction along the coordinate from the left and from the right, with memory.
 
         Args:
             x: the coordinate.
-            side: "left" or "right".
         """
-        return float(self._one.traction(np.array([x]), side)[0])
+        left, right = self._one.limits(np.array([x]))
+        return float(left[0]), float(right[0])
 
     def has_moved(self, x: float) -> bool:
         """Whether a coordinate is not rounding; where the traction jumps at 0 none is: no side is like the other.
@@ -201,7 +201,7 @@ def shares(laws: Sequence[VertexLaw], x: float, force: float) -> list[float]:
     breaks = np.concatenate([law.graph.breaks for law in laws])
     nearest = float(breaks[np.argmin(np.abs(breaks - x))])
     at = nearest if abs(nearest - x) <= ROUNDING * abs(nearest) else x
-    left, right = (np.array([law.traction(at, side) for law in laws]) for side in ("left", "right"))
+    left, right = np.array([law.limits(at) for law in laws]).T
     weights = np.array([law.weight for law in laws])
     jump = float(weights @ (right - left))
     share = 0.0 if jump == 0.0 else min(max((force - float(weights @ left)) / jump, 0.0), 1.0)
