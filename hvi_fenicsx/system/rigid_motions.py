@@ -145,7 +145,7 @@ class Motions:
             if unseen.shape[1] < len(fields):
                 combined = np.linalg.pinv(coefficients) @ unseen
                 fields = np.concatenate([fields, np.tensordot(combined, fields, (0, 0))])
-        return cls(body.index, fields)
+        return cls(body.index, np.where(np.abs(fields) > NOTHING, fields, 0.0))
 
     @cached_property
     def squares(self) -> Array:

@@ -104,6 +104,18 @@ def test_a_cooled_shaft_is_loose_and_does_not_spin(tmp_path: Path) -> None:
     assert np.abs(part.pressure).max() < 1e-9 * E
 
 
+def test_a_press_fit_without_supports_has_the_pressure_of_its_overlap(tmp_path: Path) -> None:
+    """Lame: two rings; they may move as a whole and turn in one another."""
+    found = solved(rings(tmp_path, DAY, {"contact": {"gap": GAP}}))
+    assert found.exit_code == 0
+    assert len(found.solvability.free) == 4
+    inner, outer = (
+        (large**2 + small**2) / (large**2 - small**2) for small, large in ((INNER, BETWEEN), (BETWEEN, OUTER))
+    )
+    part = found.contact["fit"]
+    assert part.pressure.mean() == pytest.approx(-GAP * E / BETWEEN / (inner + outer), rel=0.02)
+
+
 def test_a_clearance_is_that_of_the_circles(tmp_path: Path) -> None:
     table = rings(tmp_path, DAY, {"contact": {"gap": "measured"}}, wide=BETWEEN + 0.05)
     np.testing.assert_allclose(prepare(read_tables(table)).problem.interfaces[0].gap, 0.05, rtol=1e-10)
