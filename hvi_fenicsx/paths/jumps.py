@@ -3,9 +3,9 @@
 It is looked for along the curve of equilibria first: where that turns, falls, and comes back to the loads, with one
 unstable direction on its way, and bears more. Else a force t c holds the body back, against the way in which it leaves,
 while it goes: the loads f(λ) + t c, t < 0, give a branch of equilibria that begins at the state with t = 0. The energy
-falls along it, dE = t cᵀdx, and where t is 0 again is an equilibrium of the loads alone. Where bonds have broken until
-the rest cannot bear the load, or such branches of two forces go on for ever with t < 0, a body comes off; with t = 0 it
-is in equilibrium wherever it goes. Else the body moves as an overdamped one (:mod:`.motion`). Bonds remember on the way.
+falls along it, dE = t cᵀdx, and where t is 0 again is an equilibrium of the loads alone. Where the bonds that are left
+cannot bear the load, or such branches of two forces go on for ever with t < 0, a body comes off; with t = 0 it is in
+equilibrium wherever it goes. Else the body moves as an overdamped one (:mod:`.motion`). Bonds remember on the way.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Jump:
         return None
 
     def _held_back(self) -> Landing | None:
-        """The landing of the first restraint whose branch leads to one soon; off where it is proven, or two lead off."""
+        """The landing of the first restraint whose branch leads to one; off where it is proven, or two lead off."""
         kept, off = self._points.kept(), None
         for restraint, k in _restraints(self._branch):
             found = None
