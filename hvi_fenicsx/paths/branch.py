@@ -10,7 +10,7 @@ from enum import Enum
 from ..reduced.condensed_stiffness import CellInverse
 from ..typing import Array
 from .contact_points import ContactPoints, Values
-from .segments import Segment, SegmentKind
+from .segments import Segment
 from .state import Event, Position
 from .thresholds import DEFAULT
 
@@ -51,9 +51,9 @@ def event_between(before: Segment, after: Segment) -> Event:
         before: the segment that it leaves.
         after: the one on which it goes on.
     """
-    if after.kind is SegmentKind.BOUND:
+    if after.bound:
         return Event.CONTACT
-    return Event.RELEASE if before.kind is SegmentKind.BOUND else Event.KINK
+    return Event.RELEASE if before.bound else Event.KINK
 
 
 class Refused(Exception):

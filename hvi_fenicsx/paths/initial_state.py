@@ -16,7 +16,7 @@ from .branch import Refused, StepEnd, advancing
 from .contact_points import ContactPoints
 from .curve import branch_from
 from .motion import OverdampedMotion
-from .segments import Segment, SegmentKind
+from .segments import Segment
 from .thresholds import DEFAULT
 
 
@@ -43,7 +43,7 @@ def at_rest(problem: CondensedProblem, points: ContactPoints) -> tuple[Array, Co
         i = int(points.one[k]) if k < len(points.one) else None
         at, wanted = (0.0, 0.0) if i is None else (float(x[i]), float(free[i]))
         number, s_force = _standing(points.chain(k), at, wanted)
-        if points.is_opening(k) and points.chain(k)[number].kind is SegmentKind.PIECE:
+        if points.is_opening(k) and not points.chain(k)[number].rise:
             number = len(points.chain(k)) - 1
         points.enter(k, number)
         if i is not None:
@@ -53,7 +53,7 @@ def at_rest(problem: CondensedProblem, points: ContactPoints) -> tuple[Array, Co
 
 def _standing(chain: tuple[Segment, ...], x: float, wanted: float) -> tuple[int, float]:
     """The segment of a displacement that holds best, and its least force; of a fixed unknown the wanted one."""
-    if len(chain) == 1 and chain[0].kind is SegmentKind.BOUND:
+    if len(chain) == 1 and chain[0].bound:
         return 0, wanted
     on = [n for n, segment in enumerate(chain) if segment.displacement(segment.coordinate(x, segment.force)) == x]
     forces = {n: chain[n].force_at(x) for n in on}

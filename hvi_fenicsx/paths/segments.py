@@ -10,7 +10,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
@@ -20,38 +19,27 @@ from .vertex_laws import VertexLaw
 _SIDES = ("left", "right")
 
 
-class SegmentKind(Enum):
-    """What moves on a segment."""
-
-    PIECE = "piece"
-    """The displacement, and the force with it."""
-    JUMP = "jump"
-    """The force, at a jump of a law."""
-    BOUND = "bound"
-    """The force, at a bound."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
     """A straight part of the graph; its coordinate τ grows along the graph, the displacement never falls.
 
     Attributes:
-        kind: what moves.
         x: displacement at τ = 0.
         force: at τ = 0.
         slope: of the force over the displacement; of a piece.
-        rise: of the force over τ where the displacement stands: 1, or -1 at a drop; 0 on a piece.
+        rise: of the force over τ where the displacement stands, as at a jump: 1, or -1 at a drop; 0 on a piece.
+        bound: whether it is a bound.
         low: least τ.
         high: greatest τ.
         outward: on a piece or jump that a bond with memory has not passed yet, the direction in which it does, 1 or -1;
             else 0.
     """
 
-    kind: SegmentKind
     x: float
     force: float
     slope: float = 0.0
     rise: float = 0.0
+    bound: bool = False
     low: float
     high: float
     outward: int = 0
@@ -77,9 +65,9 @@ class Segment:
     @property
     def hold(self) -> tuple[int, float]:
         """How well a segment holds, for comparison: bounds, rising jumps, pieces by their slope, drops."""
-        if self.kind is SegmentKind.PIECE:
+        if not self.rise:
             return 0, self.slope
-        if self.kind is SegmentKind.BOUND:
+        if self.bound:
             return 2, 0.0
         return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
 
@@ -140,7 +128,7 @@ def chain(laws: Sequence[VertexLaw], lower: float, upper: float) -> tuple[Segmen
         upper: its upper bound, or inf.
     """
     if lower == upper:
-        return (Segment(kind=SegmentKind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=math.inf),)
+        return (Segment(x=lower, force=0.0, rise=1.0, bound=True, low=-math.inf, high=math.inf),)
     every = sorted({float(b) for law in laws for b in law.graph.breaks if lower < b < upper})
     ends = [lower, *(b for b in every if any(law.changes(b) for law in laws)), upper]
     places = np.unique([x for x in (*ends, 0.0) if math.isfinite(x)])
@@ -151,21 +139,21 @@ def chain(laws: Sequence[VertexLaw], lower: float, upper: float) -> tuple[Segmen
     )
     found: list[Segment] = []
     if math.isfinite(lower):
-        found.append(Segment(kind=SegmentKind.BOUND, x=lower, force=right[lower], rise=1.0, low=-math.inf, high=0.0))
+        found.append(Segment(x=lower, force=right[lower], rise=1.0, bound=True, low=-math.inf, high=0.0))
     for start, end in itertools.pairwise(ends):
         if start > lower and abs(right[start] - left[start]) > ROUNDING * size[start]:
             found.append(_jump(laws, start, left[start], right[start]))
         anchor = 0.0 if start < 0.0 < end else start if math.isfinite(start) else end
         found.append(_piece(laws, start, end, anchor, (left if anchor == end else right)[anchor]))
     if math.isfinite(upper):
-        found.append(Segment(kind=SegmentKind.BOUND, x=upper, force=left[upper], rise=1.0, low=0.0, high=math.inf))
+        found.append(Segment(x=upper, force=left[upper], rise=1.0, bound=True, low=0.0, high=math.inf))
     return tuple(found)
 
 
 def _jump(laws: Sequence[VertexLaw], at: float, left: float, right: float) -> Segment:
     fresh = at != 0.0 and not all(law.has_passed(at) for law in laws)
     rise, outward = math.copysign(1.0, right - left), int(np.sign(at)) if fresh else 0
-    return Segment(kind=SegmentKind.JUMP, x=at, force=left, rise=rise, low=0.0, high=abs(right - left), outward=outward)
+    return Segment(x=at, force=left, rise=rise, low=0.0, high=abs(right - left), outward=outward)
 
 
 def _piece(laws: Sequence[VertexLaw], start: float, end: float, anchor: float, force: float) -> Segment:
@@ -175,7 +163,6 @@ def _piece(laws: Sequence[VertexLaw], start: float, end: float, anchor: float, f
         for law in laws
     )
     return Segment(
-        kind=SegmentKind.PIECE,
         x=anchor,
         force=force,
         slope=math.fsum(law.slope(middle) for law in laws),
@@ -208,7 +195,7 @@ def from_zero(found: tuple[Segment, ...]) -> tuple[Segment, ...]:
     rest = found[0].force
     if rest == 0.0:
         return found[1:]
-    jump = Segment(kind=SegmentKind.JUMP, x=0.0, force=0.0, rise=float(np.sign(rest)), low=0.0, high=abs(rest))
+    jump = Segment(x=0.0, force=0.0, rise=float(np.sign(rest)), low=0.0, high=abs(rest))
     return (jump, *found[1:])
 
 
@@ -218,9 +205,9 @@ def beside_opening(lower: float) -> tuple[Segment, ...]:
     Args:
         lower: the bound, at most 0; or -inf.
     """
-    found = [Segment(kind=SegmentKind.PIECE, x=0.0, force=0.0, low=0.0, high=math.inf)]
+    found = [Segment(x=0.0, force=0.0, low=0.0, high=math.inf)]
     if lower < 0.0:
-        found.insert(0, Segment(kind=SegmentKind.PIECE, x=0.0, force=0.0, low=lower, high=0.0))
+        found.insert(0, Segment(x=0.0, force=0.0, low=lower, high=0.0))
     if math.isfinite(lower):
-        found.insert(0, Segment(kind=SegmentKind.BOUND, x=lower, force=0.0, rise=1.0, low=-math.inf, high=0.0))
+        found.insert(0, Segment(x=lower, force=0.0, rise=1.0, bound=True, low=-math.inf, high=0.0))
     return tuple(found)

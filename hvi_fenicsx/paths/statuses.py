@@ -18,7 +18,7 @@ from ..reduced.condensed_problem import CondensedProblem
 from ..typing import Array, Integers, Mask
 from .curved_laws import Deviations
 from .point_laws import PointLaws
-from .segments import Segment, SegmentKind, beside_opening, chain, extremes, from_zero
+from .segments import Segment, beside_opening, chain, extremes, from_zero
 from .state import PathState
 from .thresholds import ROUNDING
 from .vertex_laws import shares
@@ -139,7 +139,7 @@ class PointStatuses(PointLaws):
         self._x[k], self._force[k] = segment.x, segment.force
         self._moves[k] = 0.0 if segment.rise else unit
         self._rises[k] = (segment.rise or segment.slope) * unit
-        self._bound[k] = segment.kind is SegmentKind.BOUND
+        self._bound[k] = segment.bound
         self.outward[k] = segment.outward
         self.least[k], self.greatest[k] = self._extremes[k][number]
         self._curved[k] = self._deviations.enter(k, segment)
