@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..typing import Array
 from .thresholds import ROUNDING
 from .vertex_laws import VertexLaw
 
@@ -72,29 +73,28 @@ class Segment:
         return (1, 0.0) if self.rise > 0.0 else (-1, 0.0)
 
 
-def extremes(chain: Sequence[Segment], *, remembers: bool) -> list[tuple[float, float]]:
+def extremes(chain: Sequence[Segment], *, remembers: bool) -> Array:
     """The least and the greatest force that a point may yet have from each segment on, beside the one that it has.
 
     Where bonds that remember have been is a secant from there to 0 afterwards.
 
     Args:
-        chain: the segments.
+        chain: the k segments.
         remembers: whether all laws of the point do.
+
+    Returns:
+        The forces, (k, 2).
     """
-    nodes = [_end(s, s.low) for s in chain] + [_end(chain[-1], chain[-1].high)]
-    found = []
-    for n in range(len(chain)):
-        side = any(s.outward > 0 for s in chain[: n + 1]) - any(s.outward < 0 for s in chain[n:])
-        forces = _forces_left(nodes, n, side) if side and remembers else [f for _, f in nodes]
-        found.append((min(forces), max(forces)))
+    x, forces = np.array([_end(s, s.low) for s in chain] + [_end(chain[-1], chain[-1].high)]).T
+    found = np.tile([forces.min(), forces.max()], (len(chain), 1))
+    for side in (1, -1) if remembers else ():
+        beyond = np.maximum.accumulate([s.outward * side for s in chain[::side]])[::side] > 0
+        rest = forces[(x * side < 0.0) | ((x == 0.0) & (forces * side <= 0.0))]
+        for column, end in enumerate((np.minimum, np.maximum)):
+            ahead = end.accumulate(forces[::-side])[::-side]
+            left = ahead[1:] if side > 0 else ahead[:-1]
+            found[beyond, column] = end(left, end.reduce(rest, initial=0.0))[beyond]
     return found
-
-
-def _forces_left(nodes: Sequence[tuple[float, float]], number: int, side: int) -> list[float]:
-    """The forces at ends of segments from one on that is beyond 0 on a side, of the other side, and at rest."""
-    ahead = nodes[number + 1 :] if side > 0 else nodes[: number + 1]
-    other = [f for x, f in nodes if x * side < 0.0 or (x == 0.0 and f * side <= 0.0)]
-    return [0.0, *other, *(f for _, f in ahead)]
 
 
 def _end(segment: Segment, coordinate: float) -> tuple[float, float]:

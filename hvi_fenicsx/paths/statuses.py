@@ -63,7 +63,7 @@ class PointStatuses(PointLaws):
         self._bound, self._curved, self._bent = (np.zeros(m, dtype=bool) for _ in range(3))
         self._chains: list[tuple[Segment, ...]] = [()] * m
         self._bases: list[Array] = [np.zeros(0)] * m
-        self._extremes: list[list[tuple[float, float]]] = [[]] * m
+        self._extremes: list[Array] = [np.zeros((0, 2))] * m
         for k in range(m):
             self.rebuild(k)
 
