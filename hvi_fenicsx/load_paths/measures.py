@@ -124,6 +124,7 @@ class Measures:
         problem = self._system.problem
         weights, areas = new_vector(problem.space), references.lumped(problem, problem.part_facets[part])
         weights.array[component :: self._scales.dimension] = areas / self._system.comm.allreduce(areas.sum())
+        weights.array[:] = problem.combined(weights.array_r)
         turn(weights, self._system.rotation)
         found = np.array(weights.array_r)
         weights.destroy()

@@ -136,7 +136,7 @@ class Condensation:
         )
 
     def _loads(self) -> tuple[Array, Array, Array, Array]:
-        """Condensed forces (n, 2), applied loads (2, n), and the constants of the energy and of <g, u>. Collective."""
+        """Condensed forces (n, 2), loads that do work (2, n), constants of the energy and of these. Collective."""
         interior, load, total = self._interior, self._loading, self._system.comm.allreduce
         fixed = self._system.problem.fixed_here
         inside = interior.solve(load.lifted)
@@ -148,7 +148,7 @@ class Condensation:
         constant = total(held - 0.5 * lifted.T @ inside[: len(lifted)]) - 0.5 * self._elimination.works(
             self._force, self._force
         )
-        product, outer = self.products(load.applied)
+        product, outer = self.products(load.working)
         return self._elimination.reduced(self._force), outer, _quadratic(constant), _quadratic(product)
 
     def products(self, vectors: Array) -> tuple[Array, Array]:

@@ -109,7 +109,7 @@ class CondensedProblem:
         bonds: the laws.
         prescribed_bonds: those at prescribed displacements.
         constant: c0, c1, c2: the energy has the constant c0 + c1 λ + c2 λ², (3,).
-        applied: loads without the forces of prescribed displacements, constant and scaled; with
+        applied: loads without thermal strain and the forces of prescribed displacements, constant and scaled; with
             ``applied_constant`` the product <g, u> = (applied[0] + λ applied[1])ᵀx + constant, (2, n).
         applied_constant: c0, c1, c2 likewise, (3,).
         points: the vertices of the unknowns, m, (n, 3).

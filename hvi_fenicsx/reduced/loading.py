@@ -22,18 +22,20 @@ from ..typing import Array, Integers, Mask
 from .condensed_problem import Bonds, PrescribedBonds
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Loading:
     """This rank's part of loads g + λ g' and prescribed displacements: columns for constant ones and for scaled ones.
 
     Attributes:
         applied: loads in the components of the unknowns, (local unknowns, 2).
+        working: those without thermal strain, which does no work, (local unknowns, 2).
         prescribed: prescribed displacements, zero at other unknowns, (local unknowns, 2).
         lifted: what the unknowns that are not prescribed feel of both; else as ``prescribed``, (local unknowns, 2).
         pulled: elastic forces of the prescribed displacements alone at the prescribed unknowns, (local unknowns, 2).
     """
 
     applied: Array
+    working: Array
     prescribed: Array
     lifted: Array
     pulled: Array
@@ -93,26 +95,28 @@ def loading_of(system: System, scaled: Collection[str] | None) -> Loading:
     for name in sorted(chosen - set(known)):
         raise InputError(f"path.scaled: there is no load {name!r}; there are: {', '.join(known) or 'none'}")
     columns = [_column(system, [n for n in known if (n in chosen) == with_factor]) for with_factor in (False, True)]
-    applied, prescribed, lifted, pulled = (np.column_stack(parts) for parts in zip(*columns, strict=True))
-    _check_overlap(system, prescribed, chosen)
-    return Loading(applied=applied, prescribed=prescribed, lifted=lifted, pulled=pulled)
+    found = Loading(*(np.column_stack(parts) for parts in zip(*columns, strict=True)))
+    _check_overlap(system, found.prescribed, chosen)
+    return found
 
 
-def _column(system: System, chosen: Collection[str]) -> tuple[Array, Array, Array, Array]:
-    """Applied, prescribed, lifted and pulled of these loads and conditions. Collective."""
+def _column(system: System, chosen: Collection[str]) -> tuple[Array, ...]:
+    """What a loading consists of, of these loads and conditions. Collective."""
     problem, fixed = system.problem, system.problem.fixed_here
-    applied, prescribed = new_vector(problem.space), new_vector(problem.space)
+    applied, working, prescribed = (new_vector(problem.space) for _ in range(3))
     for name in system.forces.keys() & set(chosen):
         applied.axpy(1.0, system.forces[name])
-    applied.array[:] = problem.combined(applied.array_r)
+        working.axpy(float(name not in problem.bulk.strains), system.forces[name])
+    for vector in (applied, working):
+        vector.array[:] = problem.combined(vector.array_r)
     set_bc(prescribed, [one.condition for one in problem.prescribed if one.name in chosen])
     pull = system.holding.pull(prescribed)
-    for vector in (applied, pull):
+    for vector in (applied, working, pull):
         turn(vector, system.rotation)
     lifted, pulled = applied.array_r - pull.array_r, np.zeros(applied.local_size)
     lifted[fixed], pulled[fixed] = prescribed.array_r[fixed], pull.array_r[fixed]
-    own = np.array(applied.array_r), np.array(prescribed.array_r)
-    for vector in (applied, prescribed, pull):
+    own = [np.array(vector.array_r) for vector in (applied, working, prescribed)]
+    for vector in (applied, working, prescribed, pull):
         vector.destroy()
     return *own, lifted, pulled
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -71,6 +72,26 @@ def test_bodies_that_no_load_moves_are_borne_as_far_as_friction_holds() -> None:
     )
     assert path.end == "escapes"
     assert path.peak_factor == pytest.approx(1e6 / 3e5, rel=1e-6)
+
+
+def test_heat_that_a_path_does_not_scale_does_no_work() -> None:
+    """The rest: pulls times displacements, over a path that is straight from row to row."""
+    softening = {"law": "graph", "points": [[0, 0], [1e-6, 1e6], [1e-5, 0]]}
+    heat = {"one": {"region": "upper", "temperature": 0.1}}
+    seam = {"contact": {"gap": 0.0}, "friction": softening}
+    path = hvi.follow(
+        on_rails(seam, push=PUSH, back=BACK, body=heat, press=_pressed()),
+        scaled=["push.traction", "back.traction"],
+        to=[1.5, 0.0, 5.0],
+    )
+    rows = [row for row in path.rows if row.event != "end"]
+    work = sum(
+        0.5 * (a.forces[part] + b.forces[part]) @ (b.displacements[part] - a.displacements[part])
+        for a, b in pairwise(rows)
+        for part in ("push", "back", "press")
+    )
+    assert len(rows) > 3
+    assert rows[-1].work == pytest.approx(work, rel=1e-9)
 
 
 def _pressed() -> dict[str, Any]:
