@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dolfinx import fem
-from domains import BODIES, half_disk, lost, measure, towards, volume
+from domains import BODIES, COMM, half_disk, lost, measure, towards, volume
 from runs import LONG_RANKS
 
 from hvi_fenicsx.mesh import refinement
+from hvi_fenicsx.mesh.blocks import block
 from hvi_fenicsx.mesh.domain import Domain
 
 
@@ -78,7 +79,14 @@ def test_ten_steps_do_not_spoil_the_cells(make: Callable[[], Domain]) -> None:
     assert angles[9] > 0.9 * angles[5]
 
 
-@pytest.mark.parametrize("ranks", LONG_RANKS[1:])
+def test_in_space_the_diagonals_are_cut_and_no_shorter_edges() -> None:
+    """Of n³ cubes cut into six: n³ diagonals of the cubes, 3 n² (n + 1) of their faces."""
+    n, body = 6, block(COMM, [1.0, 1.0, 1.0], [6, 6, 6])
+    fine = refinement.marked(body, np.arange(body.mesh.topology.index_map(3).size_local, dtype=np.int32)).domain
+    assert fine.mesh.topology.index_map(0).size_global == (n + 1) ** 3 + n**3 + 3 * n**2 * (n + 1)
+
+
+@pytest.mark.parametrize("ranks", [2, LONG_RANKS[2]])
 def test_ranks_agree(ranks: int) -> None:
     """The same lengths, vertices and transferred field, however the mesh is split; ghosts are where owners are."""
     parallel = _run(ranks)

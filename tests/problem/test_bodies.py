@@ -134,6 +134,14 @@ def test_bodies_without_regions_of_their_own_are_numbered_from_the_left(folder: 
     assert verdict.kernel[2].name == "rotation about (0.5, 0.5) of body 1 at (0.5, 0.5)"
 
 
+def test_bodies_are_numbered_from_the_left_though_the_right_one_lies_lower() -> None:
+    one = {"shape": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]}
+    domain = {"right": one | {"origin": [2.0, -0.5]}, "left": one}
+    table = {"domain": domain, "material": {"model": "plane_stress", "youngs_modulus": E, "poisson_ratio": NU}}
+    motions = [mode.name for mode in prepare(read_tables(table)).solvability.kernel]
+    assert [name.partition(" of ")[2] for name in motions] == 3 * ['body "left"'] + 3 * ['body "right"']
+
+
 def test_a_body_of_a_file_is_called_by_its_table(tmp_path: Path) -> None:
     """The regions of its file are regions of it."""
     meshes.make(tmp_path / "square.msh", meshes.GOOD)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from runs import command, write_scene
 from scenes import model, quadratic_linear
 
 from hvi_fenicsx import read_tables, solve
+from hvi_fenicsx.runtime.cost import Timer
 from hvi_fenicsx.system.thresholds import Thresholds
 
 NESTED = Thresholds(nested_from=500)
@@ -59,8 +62,17 @@ def test_the_log_has_the_lines_of_the_terminal_and_every_newton_step(scene: Path
     told = [line.partition(" s  ")[2] for line in kept]
     assert [line for line in told if line in lines] == lines[:-1]  # the last one tells where the folder is
     assert any("iteration 0, residual" in line for line in told)
+    assert [line for line in told if ", iteration " in line][-1].endswith(", 9 vertices in contact")
     seconds = [float(line.partition(" s  ")[0]) for line in kept]
     assert seconds == sorted(seconds)
+
+
+def test_an_inner_phase_does_not_count_for_the_outer_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time, "perf_counter", itertools.count().__next__)
+    timer = Timer()
+    with timer("solve"), timer("setup"):
+        pass
+    assert (timer.seconds["setup"], timer.seconds["solve"]) == (1, 2)
 
 
 def solve_from_python(caplog: pytest.LogCaptureFixture, level: int, **keys: object) -> list[logging.LogRecord]:
