@@ -24,7 +24,7 @@ KNOWN = {
     "ranks: two cylinders, 3 ranks": "the same",
     "states: two cylinders, degree 2": "the same: the energy differs by 1.4e-8",
     "curved: glued plates, opening and slip": "two kinks at the place where one of seven jumps ends are gone",
-    "curved: glued plates in space": "mean displacements of sides that end at the interface counted what is relative there",
+    "curved: glued plates in space": "mean displacements of sides at the interface counted what is relative there",
     "curved: energies that differ by mode": "a path that was lost after a jump at a fold is lost at this fold",
     "curved: energies that differ by mode, unloaded, power law": "work differs by 3e-6: its quadrature followed steps",
     "ranks: energies that differ by mode, 3 ranks": "dissipated differs by 3e-4, as do short steps: its quadrature",
