@@ -144,8 +144,8 @@ class Motions:
             unseen = kernel(problem.comm, body, [fixed, *rows])
             if unseen.shape[1] < len(fields):
                 combined = np.linalg.pinv(coefficients) @ unseen
-                fields = np.concatenate([fields, np.tensordot(combined, fields, (0, 0))])
-        return cls(body.index, np.where(np.abs(fields) > NOTHING, fields, 0.0))
+                fields = np.concatenate([fields, _without_rounding(np.tensordot(combined, fields, (0, 0)))])
+        return cls(body.index, fields)
 
     @cached_property
     def squares(self) -> Array:
@@ -160,7 +160,13 @@ def _supported(problem: Problem, body: JoinedBodies) -> tuple[Array, Array]:
     mine = np.flatnonzero(problem.bodies.labels[:here] == body.index).astype(np.int32)
     fields = np.zeros((free.shape[1], here, problem.dimension))
     fields[:, mine] = np.moveaxis(np.tensordot(problem.motions_at(mine, body), free, (1, 0)), 2, 0)
-    return free, fields
+    return free, _without_rounding(fields)
+
+
+def _without_rounding(motions: Array) -> Array:
+    """Motions without rounding, which is what bodies that move alike have of each other; changed in place."""
+    motions[np.abs(motions) <= NOTHING] = 0.0
+    return motions
 
 
 NOTHING = 1e-10
