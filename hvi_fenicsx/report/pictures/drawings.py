@@ -148,12 +148,13 @@ def _draw(drawing: Drawing) -> None:
     except Exception as error:  # whatever it is, it is reported in one line
         words = str(error) if isinstance(error, HviError) else f"{type(error).__name__}: {error}"
         sys.exit(_complain(f"{drawing.path.name}: {words}"))
-    print(drawing.path.name, flush=True)
+    sys.stdout.write(f"{drawing.path.name}\n")  # in one piece: several processes draw
+    sys.stdout.flush()
 
 
 def _complain(words: str) -> int:
     """Tell the caller what went wrong; the exit code."""
-    print(f"{COMPLAINT}{words}", file=sys.stderr, flush=True)
+    sys.stderr.write(f"{COMPLAINT}{words}\n")
     return 1
 
 
