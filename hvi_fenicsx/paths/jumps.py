@@ -132,7 +132,8 @@ class Jump:
             stands = self._points.straight and np.allclose(branch.values.x, x, rtol=1e-12, atol=0.0)
             standing, x = standing + 1 if stands else 0, branch.values.x
             anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
-            if move.outcome is StepEnd.FACTOR or anywhere:
+            back = move.outcome is StepEnd.FACTOR and branch.rising > 0.0  # else it has only set out, but for rounding
+            if back or anywhere:
                 stable = self._points.unstable_directions(branch.values) == 0
                 return self._landed(branch.z.copy(), branch.inverse()) if stable else None
             if move.outcome is StepEnd.AWAY:
