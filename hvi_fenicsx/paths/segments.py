@@ -113,7 +113,8 @@ def piece_at(chain: Sequence[Segment], x: float, rounding: float, *, forward: bo
         forward: whether the next one is the one after it.
     """
     pieces = [n for n, s in enumerate(chain) if not s.rise]
-    near = [n for n in pieces if abs(chain[n].displacement(chain[n].coordinate(x, 0.0)) - x) <= rounding * abs(x)]
+    away = [abs(chain[n].displacement(chain[n].coordinate(x, 0.0)) - x) for n in pieces]
+    near = [n for n, way in zip(pieces, away, strict=True) if way <= max(rounding * abs(x), min(away))]
     return near[-1] if forward else near[0]
 
 
