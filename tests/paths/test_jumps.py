@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from test_exact_paths import path, random_chain, random_problem
+from condensed import bonds, problem
+from test_exact_paths import path, random_chain, random_law, random_problem
 
 import hvi_fenicsx as hvi
+from hvi_fenicsx.paths.contact_points import ContactPoints
 from hvi_fenicsx.paths.state import Event, PathState
 from hvi_fenicsx.reduced.condensed_problem import CondensedProblem
 from hvi_fenicsx.reduced.condensed_stiffness import DenseStiffness
@@ -51,6 +53,26 @@ def test_jumps_release_the_same_whatever_rounding_and_order(seed: int, make: obj
         assert end is found[0][0]
         assert factors == pytest.approx(found[0][1], rel=1e-6)
         assert released == pytest.approx(found[0][2], rel=1e-6, abs=1e-6 * max(found[0][2], default=1.0))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_a_bond_may_yet_bear_is_what_its_graph_has_once_it_has_been_there(seed: int) -> None:
+    """Noted in the middle of each segment: exact on its own side, a bound on the other."""
+    law = random_law(np.random.default_rng(seed))
+    points = ContactPoints(problem(1.0, 1.0, bonds(law, 0)), [0])
+    for number, segment in enumerate(points.chain(0)):
+        coordinate = 0.5 * (max(segment.low, -2.0) + min(segment.high, 2.0))
+        x, force = segment.displacement(coordinate), segment.force + (segment.rise or segment.slope) * coordinate
+        been = ContactPoints(problem(1.0, 1.0, bonds(law, 0)), [0])
+        been.remember(0, x, force)
+        points.enter(0, number)
+        least, greatest = min(points.least[0], force), max(points.greatest[0], force)
+        ends = [(s, end) for s in been.chain(0) for end in np.clip((s.low, s.high), -9, 9)]
+        forces = [s.force + (s.rise or s.slope) * end for s, end in ends]
+        assert least <= min(forces) + 1e-12
+        assert greatest >= max(forces) - 1e-12
+        assert x < 0.0 or greatest == pytest.approx(max(forces), abs=1e-12)
+        assert x > 0.0 or least == pytest.approx(min(forces), abs=1e-12)
 
 
 def rest(given: CondensedProblem, state: PathState) -> Array:
