@@ -188,10 +188,11 @@ class Carrier:
         inside = (self.low < size) & (size < self.high) & (squares > 0.0)
         share = np.divide(1.0, squares, out=np.zeros_like(squares), where=inside)
         found = share[:, :, None] * (self._shown[:, :, None] * self._shown[:, None])
-        _, slope = self.length.nearest(self._inside(wanted), self.radius[:, 0])
-        slope = slope * (self.counts[:, :, None] & self.counts[:, None, :])
-        turned = np.einsum("mkd,mkl,mle->mde", self.axes, slope, self.axes)
-        found = np.where(self.at_rest[:, :, None], turned, found)
+        if np.any(self.at_rest):
+            _, slope = self.length.nearest(self._inside(wanted), self.radius[:, 0])
+            slope = slope * (self.counts[:, :, None] & self.counts[:, None, :])
+            turned = np.einsum("mkd,mkl,mle->mde", self.axes, slope, self.axes)
+            found = np.where(self.at_rest[:, :, None], turned, found)
         return found * (self.visible[:, :, None] & self.visible[:, None, :])
 
     @cached_property

@@ -115,14 +115,13 @@ class VertexLaw:
             return True
         return bool(graph.left[number] != graph.right[number] or graph.slopes[number] != graph.slopes[number + 1])
 
-    def limits(self, x: float) -> tuple[float, float]:
-        """The limits of the traction along the coordinate from the left and from the right, with memory.
+    def limits(self, x: float) -> Array:
+        """The limits of the traction along the coordinate from the left and from the right, with memory, (2,).
 
         Args:
             x: the coordinate.
         """
-        left, right = self._one.limits(np.array([x]))
-        return float(left[0]), float(right[0])
+        return np.concatenate(self._one.limits(np.array([x])))
 
     def has_moved(self, x: float) -> bool:
         """Whether a coordinate is not rounding; where the traction jumps at 0 none is: no side is like the other.

@@ -22,7 +22,7 @@ from ..typing import Array, Integers, Mask
 from .condensed_problem import Bonds, PrescribedBonds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Loading:
     """This rank's part of loads g + λ g' and prescribed displacements: columns for constant ones and for scaled ones.
 
@@ -95,13 +95,13 @@ def loading_of(system: System, scaled: Collection[str] | None) -> Loading:
     for name in sorted(chosen - set(known)):
         raise InputError(f"path.scaled: there is no load {name!r}; there are: {', '.join(known) or 'none'}")
     columns = [_column(system, [n for n in known if (n in chosen) == with_factor]) for with_factor in (False, True)]
-    found = Loading(*(np.column_stack(parts) for parts in zip(*columns, strict=True)))
+    found = Loading(**{name: np.column_stack([column[name] for column in columns]) for name in columns[0]})
     _check_overlap(system, found.prescribed, chosen)
     return found
 
 
-def _column(system: System, chosen: Collection[str]) -> tuple[Array, ...]:
-    """What a loading consists of, of these loads and conditions. Collective."""
+def _column(system: System, chosen: Collection[str]) -> dict[str, Array]:
+    """What a loading consists of, by its name, of these loads and conditions. Collective."""
     problem, fixed = system.problem, system.problem.fixed_here
     applied, working, prescribed = (new_vector(problem.space) for _ in range(3))
     for name in system.forces.keys() & set(chosen):
@@ -115,10 +115,11 @@ def _column(system: System, chosen: Collection[str]) -> tuple[Array, ...]:
         turn(vector, system.rotation)
     lifted, pulled = applied.array_r - pull.array_r, np.zeros(applied.local_size)
     lifted[fixed], pulled[fixed] = prescribed.array_r[fixed], pull.array_r[fixed]
-    own = [np.array(vector.array_r) for vector in (applied, working, prescribed)]
-    for vector in (applied, working, prescribed, pull):
+    parts = {"applied": applied, "working": working, "prescribed": prescribed}
+    own = {name: np.array(vector.array_r) for name, vector in parts.items()}
+    for vector in (*parts.values(), pull):
         vector.destroy()
-    return *own, lifted, pulled
+    return own | {"lifted": lifted, "pulled": pulled}
 
 
 def _check_overlap(system: System, prescribed: Array, chosen: Collection[str]) -> None:
