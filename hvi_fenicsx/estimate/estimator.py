@@ -248,9 +248,9 @@ class Coupled:
 
     def tell_bubbles(self) -> None:
         """Let the bubbles feel that nodes and laws have moved. Collective."""
-        before = self._least.laws
+        self._least.residual += self._least.laws
         self._least.laws, _ = self._traces.tested(self.error)
-        self._least.residual += before - self._least.laws
+        self._least.residual -= self._least.laws
         self._least.residual -= self._of_moved.values()
 
 
@@ -274,6 +274,7 @@ def of_solution(traces: LawTraces, inverse: DualNorm, stiffness: BubbleStiffness
             break
         coupled.tell_bubbles()
     error = coupled.error
+    del coupled  # it is large
     return error, traces.problem.bulk.energy_by_cell(error.nodes + error.bubbles)
 
 

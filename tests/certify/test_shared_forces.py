@@ -80,7 +80,7 @@ def _gauge(carrier: Carrier, forces: Array) -> Array:
 
 SUMS = [
     ([disc("floor", 1.0), disc("wall", 1e-3), contact(2)], True),
-    ([disc("floor", 1.0), disc("wall", 0.5), disc("end", 2.0)], False),
+    pytest.param([disc("floor", 1.0), disc("wall", 0.5), disc("end", 2.0)], False, marks=pytest.mark.long),
     ([bond(1.0, 3.0), disc("wall", 0.5)], True),
 ]
 

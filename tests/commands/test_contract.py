@@ -228,7 +228,7 @@ def test_a_killed_run_leaves_no_result_and_the_next_one_works(scene: Path, tmp_p
     ("number", "ranks"),
     [
         (signal.SIGINT, ()),
-        (signal.SIGTERM, ()),
+        pytest.param(signal.SIGTERM, (), marks=pytest.mark.long),
         (signal.SIGINT, ("--np", "2")),
         pytest.param(signal.SIGTERM, ("--np", "2"), marks=pytest.mark.long),  # passed on by the same few lines
     ],
@@ -325,7 +325,11 @@ def processor_time_of_children() -> float:
 
 
 @pytest.mark.parametrize(
-    "form", [["--petsc", "-hvi_snes_view -hvi_pc_type lu"], ["--petsc=-hvi_snes_view -hvi_pc_type lu"]]
+    "form",
+    [
+        ["--petsc", "-hvi_snes_view -hvi_pc_type lu"],
+        pytest.param(["--petsc=-hvi_snes_view -hvi_pc_type lu"], marks=pytest.mark.long),
+    ],
 )
 def test_petsc_options_reach_the_solver(form: list[str], scene: Path, tmp_path: Path) -> None:
     done = process("run", scene, "--out", tmp_path / "r", "--no-pictures", *form)

@@ -242,7 +242,11 @@ def glued() -> Table:
 
 SCENES = [
     pytest.param(space(2), id="friction in space"),
-    pytest.param(space(1) | {"solver": {"smoothing": "chks", "epsilon": 0.05}}, id="smoothed friction in space"),
+    pytest.param(
+        space(1) | {"solver": {"smoothing": "chks", "epsilon": 0.05}},
+        id="smoothed friction in space",
+        marks=pytest.mark.long,
+    ),
     pytest.param(glued(), id="cohesion", marks=pytest.mark.long),
 ]
 

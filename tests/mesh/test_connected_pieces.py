@@ -37,7 +37,7 @@ JOINT: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("ranks", LONG_RANKS)
-@pytest.mark.parametrize(("dimension", "size"), [(2, 0.05), (3, 0.13)])
+@pytest.mark.parametrize(("dimension", "size"), [(2, 0.05), pytest.param(3, 0.13, marks=pytest.mark.long)])
 def test_each_body_has_its_own_coarser_mesh(dimension: int, size: float, ranks: int, tmp_path: Path) -> None:
     file = meshes.make(tmp_path / "two.msh", meshes.TOUCHING.format(size=size, dimension=dimension))
     found = on_ranks(ranks, "tests/mesh/connected_pieces_ranks.py", file, dimension)

@@ -201,7 +201,7 @@ def test_a_plane_result_has_its_body_and_its_contact(
     assert_drawn(page.draw(folder), "body.png", "contact.png")
 
 
-@pytest.mark.parametrize("value", [pressed, peeled], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("value", [pressed, pytest.param(peeled, marks=pytest.mark.long)], ids=["pressed", "peeled"])
 def test_so_has_a_result_in_space_and_no_x_server_remains(
     tmp_path: Path, value: Callable[[Array], Array], left_running: Callable[[], list[str]]
 ) -> None:

@@ -64,7 +64,7 @@ def said_factor(reason: str) -> float:
     return float(match[1])
 
 
-@pytest.mark.parametrize("load", [1.05, 2.0])
+@pytest.mark.parametrize("load", [pytest.param(1.05, marks=pytest.mark.long), 2.0])
 def test_above_its_strength_the_path_of_a_bar_says_which_load_it_bears(load: float) -> None:
     found = solved(bar(load * STRENGTH))
     assert found.exit_code == 4

@@ -23,8 +23,8 @@ from hvi_fenicsx.commands.cli import main
 from hvi_fenicsx.runtime.processes import SIGNALS
 
 ROOT = Path(__file__).parents[2]
-RANKS = (1, pytest.param(2, marks=pytest.mark.long), 3)
-"""Three ranks show what two do, and more: one with a neighbour on either side, parts of unequal size."""
+RANKS = (1, 2, pytest.param(3, marks=pytest.mark.long))
+"""Three ranks show more: one with a neighbour on either side, parts of unequal size. They want three cores."""
 LONG_RANKS = (1, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3)))
 """For what the scenes of ``workflow/test_ranks.py`` go through on three ranks as well."""
 

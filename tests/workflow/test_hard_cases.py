@@ -183,6 +183,7 @@ def test_a_path_that_found_no_step_short_enough_reaches_its_end(key: str) -> Non
     assert record["outcome"] == "certified", record
 
 
+@pytest.mark.long
 def test_a_slender_body_that_slides_under_its_limit_load_meets_nothing_far_off() -> None:
     """Rounding of its motion opened gaps after 1e10 of its slip; the path went there, and back to smaller loads."""
     wide = Table.read(BENCHMARKS / "hard_wide.toml")
@@ -194,6 +195,7 @@ def test_a_slender_body_that_slides_under_its_limit_load_meets_nothing_far_off()
     assert path.rows[-1].factor == pytest.approx(prepared.solvability.lambda_held, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_path_along_short_steep_pieces_reaches_its_end() -> None:
     """Ends of pieces that are 1e-7 of the unit long were passed so early that forces jumped by a thousandth."""
     wide = Table.read(BENCHMARKS / "hard_wide.toml")

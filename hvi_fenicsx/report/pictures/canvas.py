@@ -212,7 +212,9 @@ class Canvas:
 
     def write(self) -> None:
         """Write the labels, each where it is wanted, or as near to that as it covers no other one."""
-        self.fig.draw_without_rendering()
+        if engine := self.fig.get_layout_engine():
+            engine.execute(self.fig)
+        self.axes.apply_aspect()
         taken, dots = list[Bbox](), self.fig.dpi / 72
         for label in self.labels:
             text = self._written(label)

@@ -92,16 +92,16 @@ def drawings(result: Result) -> Iterator[Drawing]:
 
 
 def _of_body(result: Result) -> Iterator[tuple[str, str, Callable[[Result], Figure]]]:
-    """The pictures of a body: name of the file, caption, and what draws it."""
+    """The pictures of a body, the slowest first: name of the file, caption, and what draws it."""
     if result.body.displacement is not None:
         yield "body", "The deformed body, its displacements magnified, with what acts on it.", bodies.body
     if result.body.escape_mode is not None:
         yield "escape", "The rigid motion along which the load carries the body away.", bodies.escape
-    if result.arrays.sides:
-        yield "scene", "The scene: the undeformed body with its supports, loads and contact parts.", bodies.scene
     if result.body.von_mises is not None:
         end = "the scale may end below a peak in a corner"
         yield "stress", f"Stress in the body (von Mises), constant in each cell; {end}.", bodies.stress
+    if result.arrays.sides:
+        yield "scene", "The scene: the undeformed body with its supports, loads and contact parts.", bodies.scene
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -149,7 +149,7 @@ def fill(axes: Axes, mesh: Triangulation, values: Array, ends: tuple[float, floa
     """
     filled = TriMesh(mesh, array=values, clim=ends, **look)
     axes.add_collection(filled, autolim=False)  # matplotlib's own limits are those of the paths
-    axes.update_datalim(np.column_stack([mesh.x, mesh.y]))
+    axes.update_datalim([(end(mesh.x), end(mesh.y)) for end in (np.min, np.max)])
     axes.autoscale_view()
     return filled
 
