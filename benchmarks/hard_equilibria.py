@@ -17,9 +17,9 @@ from covering import Case, Table, cases
 from hard_cases import AXES
 from mpi4py import MPI
 
-from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.errors import HviError
 from hvi_fenicsx.workflow import finish
+from hvi_fenicsx.workflow.equilibria import Equilibria
 
 UNDECIDED = ("metastable", "borderline")
 LARGEST = 8

@@ -23,7 +23,7 @@ from mpi4py import MPI
 
 import hvi_fenicsx as hvi
 from hvi_fenicsx import workflow
-from hvi_fenicsx.equilibrium_search.bodies import Equilibria
+from hvi_fenicsx.workflow.equilibria import Equilibria
 
 Table = dict[str, Any]
 SPACE_SIZES = (2, 3, 4, 5, 6, 7, 9, 11, 13, 15)

@@ -13,10 +13,10 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..certify.contact_state import ContactState
 from ..estimate import bubbles, data_errors
 from ..mesh import nodes, refinement
 from ..mesh.domain import Domain
-from ..mesh.refinement import Refinement
 from ..model import Model
 from ..problem.problem import Problem
 from ..runtime.cost import Timer
@@ -24,7 +24,7 @@ from ..runtime.mpi import agree, largest, total
 from ..solvers.method import never
 from ..solvers.nested_iteration import CoarseStart, refined_levels
 from ..system.multigrid import Level, Levels
-from ..typing import Entities
+from ..typing import Entities, together
 from ..workflow import Preparation, Solution, find_solution, prepare
 
 _ROUNDING = float(np.sqrt(np.finfo(float).eps))
@@ -80,6 +80,11 @@ class AdaptiveLevel:
         """Global number of unknowns."""
         return self.prepared.system.dofs
 
+    @property
+    def states(self) -> tuple[ContactState, ...]:
+        """Those of the parts of Γc; none where nothing was solved."""
+        return () if self.solution.examination is None else self.solution.examination.states
+
 
 @dataclass(frozen=True, kw_only=True)
 class AdaptiveSolver:
@@ -119,7 +124,7 @@ class AdaptiveSolver:
         return AdaptiveLevel(prepared=prepared, solution=found.estimated(), levels=found.levels, step=None)
 
     def refine(
-        self, level: AdaptiveLevel, refined: Refinement, scene: Model, ahead: fem.Function | None = None
+        self, level: AdaptiveLevel, refined: refinement.Refinement, scene: Model, ahead: fem.Function | None = None
     ) -> AdaptiveLevel:
         """Solve a scene on the refined mesh, from the solution on the coarser one. Collective.
 
@@ -161,22 +166,20 @@ class AdaptiveSolver:
         step: PETSc.Mat,
         ahead: fem.Function | None = None,
     ) -> AdaptiveLevel:
-        found, start = level.solution.solve_result, None
-        if found is not None:
-            found = found if ahead is None else replace(found, u=ahead)
-            obstacle = level.solution.obstacle
-            start = CoarseStart(
-                system=level.prepared.system,
-                result=found,
-                prolongation=step,
-                levels=levels,
-                way=None if obstacle is None else obstacle.way,
-            )
+        found, obstacle = level.solution.solve_result, level.solution.obstacle
+        assert found is not None
+        start = CoarseStart(
+            system=level.prepared.system,
+            result=found if ahead is None else replace(found, u=ahead),
+            prolongation=step,
+            levels=levels,
+            way=None if obstacle is None else obstacle.way,
+        )
         finer = find_solution(prepared, interrupted=self.interrupted, start=start)
         return AdaptiveLevel(prepared=prepared, solution=finer.estimated(), levels=finer.levels, step=step)
 
 
-def refined(level: AdaptiveLevel, bulk: float) -> Refinement:
+def refined(level: AdaptiveLevel, bulk: float) -> refinement.Refinement:
     """Refine the cells of the largest errors; all cells where nothing was estimated. Collective.
 
     Args:
@@ -203,7 +206,7 @@ def _unresolved(problem: Problem) -> Entities:
     place does so within one facet of any mesh: it is the part as a whole that decides.
     """
     space, comm = bubbles.space(problem.space.mesh, nodes.degree(problem.space)), problem.comm
-    found: list[Entities] = [np.empty(0, dtype=np.int32)]
+    found = list[Entities]()
     for facets, value in data_errors.everything(problem):
         at = data_errors.facet_modes(problem, space, facets)
         squares, area, values = at.beyond_nodes(value) ** 2 @ at.weights, at.facets.areas, at.of(value)
@@ -211,7 +214,7 @@ def _unresolved(problem: Problem) -> Entities:
         allowed = max(CONTROL.unresolved * (high - low), _ROUNDING * max(abs(low), abs(high))) ** 2
         if total(comm, float(area @ squares)) > allowed * total(comm, float(np.sum(area))):
             found.append(at.facets.cells[squares > allowed])
-    return np.unique(np.concatenate(found)).astype(np.int32)
+    return np.unique(together(found)).astype(np.int32)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -172,8 +172,10 @@ class _Run:
         quantity = self._quantity
         on_contact = quantity.known_from_one_mesh and not quantity.in_energy_norm
         most = CONTROL.bulk ** (1 if dimension == 2 and not on_contact else 2)
-        mesh, smoothing, _ = (0.0, 0.0, 0.0) if last is None else quantity.parts(last)
-        if not quantity.known_from_one_mesh or mesh <= 0.0:
+        if last is None or not quantity.known_from_one_mesh:
+            return most
+        mesh, smoothing, _ = quantity.parts(last)
+        if mesh <= 0.0:
             return most
         left = self._beside(smoothing) / mesh
         # Halving the edges of marked cells leaves 4^-p of it.

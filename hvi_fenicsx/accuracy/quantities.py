@@ -132,7 +132,7 @@ class FrictionTraction(ContactField):
         """The distance from the unsmoothed law at the same slip, relative. Collective."""
         level = self._last
         whole, apart = contact_norm(level, self.read(level).x.array, self.power), 0.0
-        for law in (law for state in _states(level) for law in state.laws if law.term.direction.tangential):
+        for law in (law for state in level.states for law in state.laws if law.term.direction.tangential):
             apart += float(np.sum(law.term.weights * law.true_distance()))
         return float(level.comm.allreduce(apart)) * level.prepared.problem.scales.stress / (whole or 1.0)
 
@@ -149,7 +149,7 @@ class Resultant(Observable):
 
     def read(self, level: AdaptiveLevel) -> Array:
         """Its components (d,), N/m in 2D, N in 3D."""
-        states = [s for s in _states(level) if s.bounds is not None]
+        states = [s for s in level.states if s.bounds is not None]
         own = sum((s.resultant for s in states), np.zeros(level.solution.scene.dimension))
         return level.comm.allreduce(own) * level.prepared.problem.scales.force
 
@@ -196,16 +196,11 @@ def find(name: str) -> type[Quantity]:
     return Quantity.registry[name]
 
 
-def _states(level: AdaptiveLevel) -> tuple[ContactState, ...]:
-    examination = level.solution.examination
-    return () if examination is None else examination.states
-
-
 def _tangential(level: AdaptiveLevel, read: Callable[[ContactState], Array], unit: float) -> fem.Function:
     """Tangential vectors (m, d-1) of each part as a field."""
     field = fem.Function(level.prepared.problem.space)
     rows = field.x.array.reshape(-1, level.solution.scene.dimension)
-    for state in _states(level):
+    for state in level.states:
         rows[state.surface.blocks] = np.einsum("mk,mkd->md", read(state), state.surface.tangents) * unit
     field.x.scatter_forward()
     return field

@@ -52,8 +52,7 @@ class Quantity(ABC):
         if "name" in cls.__dict__:
             enter(Quantity.registry, cls, cls.name, "quantity")
 
-    def __init__(self) -> None:
-        self._last: AdaptiveLevel
+    _last: AdaptiveLevel
 
     def add(self, level: AdaptiveLevel) -> None:
         """Take the next level. Collective.
@@ -108,7 +107,6 @@ class Observable(Quantity):
     power: ClassVar[int] = 2
 
     def __init__(self) -> None:
-        super().__init__()
         self._values: list[tuple[float, Value]] = []  # behind the mean mesh size, up to a factor
 
     @abstractmethod
@@ -148,28 +146,26 @@ class Observable(Quantity):
 
     def _change(self) -> float:
         """The error without smoothing's part. Collective."""
-        (size, own), *others = reversed(self._values)
-        apart = [one for one in others if one[0] >= _APART * size]
-        if not apart:
+        chosen = self._values[-1:]
+        for one in reversed(self._values):
+            if one[0] >= _APART * chosen[-1][0]:
+                chosen.append(one)
+        sizes, values = zip(*chosen[:3], strict=True)
+        own, *others = (value.x.array if isinstance(value, fem.Function) else value for value in values)
+        if not others:
             return np.inf
-        near, far = apart[0], next((one for one in apart if one[0] >= _APART * apart[0][0]), None)
-        largest = self._norm(own, None) or 1.0
-        change = self._norm(own, near[1]) / largest
-        further = None if far is None else self._norm(own, far[1]) / largest
-        return extrapolated((size, near[0], far[0] if far else np.nan), change, further)
+        largest = self._norm(own) or 1.0
+        return extrapolated(sizes, *(self._norm(own - other) / largest for other in others))
 
-    def _norm(self, own: Value, other: Value | None) -> float:
-        """The norm of a quantity, or of its difference from another one."""
-        difference = own.x.array if isinstance(own, fem.Function) else own
-        if other is not None:
-            difference = difference - (other.x.array if isinstance(other, fem.Function) else other)
-        if isinstance(own, fem.Function):
-            return contact_norm(self._last, difference, self.power)
-        return float(np.linalg.norm(difference))
+    def _norm(self, numbers: Array) -> float:
+        """The norm of a quantity on the last level, or of a difference there."""
+        if isinstance(self._values[-1][1], fem.Function):
+            return contact_norm(self._last, numbers, self.power)
+        return float(np.linalg.norm(numbers))
 
 
-def extrapolated(sizes: Sequence[float], change: float, further: float | None) -> float:
-    """The error of a quantity on the finest of three meshes.
+def extrapolated(sizes: Sequence[float], change: float, further: float | None = None) -> float:
+    """The error of a quantity on the finest of three meshes, or of two.
 
     Args:
         sizes: of the meshes, the finest first.
@@ -202,8 +198,8 @@ def contact_norm(level: AdaptiveLevel, values: Array, power: int) -> float:
         values: its local array.
         power: 1 or 2.
     """
-    examination, found = level.solution.examination, 0.0
-    for state in () if examination is None else examination.states:
+    found = 0.0
+    for state in level.states:
         lengths = np.linalg.norm(state.surface.values(values), axis=1)
         found += float(np.sum(state.surface.weights * lengths**power))
     return float(float(level.comm.allreduce(found)) ** (1.0 / power))

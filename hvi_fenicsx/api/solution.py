@@ -22,7 +22,6 @@ from ..problem.stress import cell_stress, space_of_stress
 from ..report.reader import Result
 from ..report.solution_arrays import ContactPart
 from ..results import ResultFolder, gathering
-from ..results.gathering import contact_parts
 from ..results.whole import write_whole
 from ..runtime import log
 from ..runtime.mpi import on_root
@@ -104,7 +103,7 @@ class ModelSolution(Solution):
         Raises:
             InputError: on all ranks alike: no solution under the whole load exists, or none was found.
         """
-        parts = contact_parts(self.problem, self._known(self.examination).states)
+        parts = gathering.contact_parts(self.problem, self._known(self.examination).states)
         return self.problem.comm.bcast(_ContactParts(parts), root=0)
 
     @cached_property

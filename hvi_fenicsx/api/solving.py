@@ -13,7 +13,6 @@ from mpi4py import MPI
 from pydantic import Field
 
 from .. import console, workflow
-from ..equilibrium_search import bodies
 from ..errors import InputError, of_user
 from ..load_paths import last_borne
 from ..mesh.domain import Domain
@@ -22,7 +21,6 @@ from ..model import Model, is_portable
 from ..paths.load_path import LoadPath
 from ..problem import spaces
 from ..runtime import log
-from ..runtime.log import newton_step
 from ..runtime.mpi import time_over
 from ..schema import Count, Positive, Table, require_path
 from ..solvers.method import Progress
@@ -32,11 +30,12 @@ from ..study.table import Study
 from ..system import petsc_options
 from ..system.thresholds import DEFAULT, Thresholds
 from ..workflow import Preparation, Solution
+from ..workflow.equilibria import Equilibria
 from .solution import ModelSolution
 
 
 class _Asked(Table):
-    progress: Callable[..., None] = newton_step
+    progress: Callable[..., None] = log.newton_step
     estimate: bool = True
     lowest: bool = False
     gap: Annotated[float, Field(gt=0, lt=1)] = 0.5
@@ -56,7 +55,7 @@ def solve(
     model: Model,
     comm: MPI.Comm | None = None,
     *,
-    progress: Progress = newton_step,
+    progress: Progress = log.newton_step,
     thresholds: Thresholds = DEFAULT,
     start: ModelSolution | str | Sequence[Any] | None = None,
     estimate: bool = True,
@@ -226,7 +225,7 @@ def equilibria(
     """
     _Asked.made({"lowest": lowest, "gap": gap, "limit": limit})
     prepared = check(model, comm, **options)
-    searched = bodies.Equilibria(prepared)
+    searched = Equilibria(prepared)
     stop = time_over(prepared.system.comm, limit)
     found = searched.find(lowest=lowest, gap=gap, stop=stop, report=_LOG.debug)
     solutions = tuple(ModelSolution(**fields_of(searched.solution(point))) for point in found.points)

@@ -7,20 +7,16 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from mpi4py import MPI
-
 from .. import console
 from ..errors import ExitCode
-from ..model import read_scene
 from ..problem import domain_forms
 from ..runtime import log
-from ..runtime.mpi import on_root
 from ..solvers import obstacle_force
 from ..system import existence
 from ..typing import Array, magnitude
 from ..workflow import Preparation, prepare
+from .session import COMM, scene_of
 
-COMM = MPI.COMM_WORLD
 _CODES = {"escapes": ExitCode.NO_SOLUTION, "undecided": ExitCode.NOT_CONVERGED}
 """What the command ends with, by the state."""
 
@@ -31,8 +27,7 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         InputError: on all ranks alike.
     """
-    scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
-    prepared = prepare(scene, COMM)
+    prepared = prepare(scene_of(options), COMM)
     text = _report(prepared, options.loads, as_json=options.json)
     if COMM.rank == 0:
         log.say(text)
@@ -45,8 +40,8 @@ def _report(prepared: Preparation, loads: Sequence[str], *, as_json: bool) -> st
     factors = {name: prepared.load_factors(name) for name in loads}
     if as_json:
         return json.dumps(console.as_data(prepared, factors) | {"sizes": sizes}, indent=2, ensure_ascii=False)
-    begin, end = [*console.heading(prepared, COMM.size), *_size_lines(sizes)], console.load_factors(factors)
-    return "\n".join([*begin, *end, *console.effects(prepared), *console.history(prepared)])
+    lines = [*console.heading(prepared, COMM.size), *_size_lines(sizes), *console.load_factors(factors)]
+    return "\n".join([*lines, *console.effects(prepared), *console.history(prepared)])
 
 
 def _sizes(prepared: Preparation) -> dict[str, Any]:

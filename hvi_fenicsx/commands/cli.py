@@ -25,7 +25,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from ..errors import ExitCode, HviError, InputError
 from ..runtime import log, processes
@@ -145,50 +145,45 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 certified, 2 bad input, 3 no solution exists, 4 not converged, 130 interrupted.",
     )
     commands = main_parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    scene, folder, solve = _scene(), _folder(), _solve()
 
-    def add(name: str, text: str, *parents: Any) -> argparse.ArgumentParser:
-        return commands.add_parser(name, help=text, description=text, parents=list(parents))
+    def add(name: str, text: str, *options: Callable[[argparse.ArgumentParser], None]) -> None:
+        command = commands.add_parser(name, help=text, description=text)
+        for one in options:
+            one(command)
 
-    _run(add("run", "solve a scene; by default into results/SCENE", scene, folder, solve))
+    add("run", "solve a scene; by default into results/SCENE", _scene, _folder, _solve, _run)
     text = "follow the equilibria of a scene over its load, through peak and unloading; by default into"
-    add("path", f"{text} results/SCENE-path", scene, folder, solve)
-    _check(add("check", "validate a scene and say whether a solution exists; solves nothing", scene))
+    add("path", f"{text} results/SCENE-path", _scene, _folder, _solve)
+    add("check", "validate a scene and say whether a solution exists; solves nothing", _scene, _check)
     text = "find all equilibria of a scene, or the lowest with a proof; by default into results/SCENE-equilibria"
-    _equilibria(add("equilibria", text, scene, folder, solve))
+    add("equilibria", text, _scene, _folder, _solve, _equilibria)
     text = "measure what accuracy costs in time, along several axes; by default into results/SCENE-study"
-    _study(add("study", text, scene, folder))
+    add("study", text, _scene, _folder, _study)
     add("version", "versions of everything")
     return main_parser
 
 
-def _scene() -> argparse.ArgumentParser:
+def _scene(command: argparse.ArgumentParser) -> None:
     """What all commands have that read a scene."""
-    found = _Parser(add_help=False)
-    found.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
+    command.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
     text = "override a value of the scene, like domain.cells=[64,64]"
-    found.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help=text)
-    return found
+    command.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help=text)
 
 
-def _folder() -> argparse.ArgumentParser:
+def _folder(command: argparse.ArgumentParser) -> None:
     """What all commands have that write a folder."""
-    found = _Parser(add_help=False)
-    found.add_argument("--out", type=Path, metavar="DIR", help="the folder for the result")
-    found.add_argument("--force", action="store_true", help="replace what is there")
+    command.add_argument("--out", type=Path, metavar="DIR", help="the folder for the result")
+    command.add_argument("--force", action="store_true", help="replace what is there")
     text = "keep a finished result of the same scene; else go on with what was stopped, or begin"
-    found.add_argument("--resume", action="store_true", help=text)
-    found.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
-    return found
+    command.add_argument("--resume", action="store_true", help=text)
+    command.add_argument("--np", type=_ranks, metavar="N", help="run on N MPI ranks")
 
 
-def _solve() -> argparse.ArgumentParser:
+def _solve(command: argparse.ArgumentParser) -> None:
     """What all commands have that solve one scene into a folder."""
-    found = _Parser(add_help=False)
     text = 'PETSc options, like "-hvi_ksp_monitor"; those of the solvers begin with -hvi_'
-    found.add_argument("--petsc", default="", metavar="OPTIONS", help=text)
-    found.add_argument("--no-pictures", action="store_true", help="write no pictures")
-    return found
+    command.add_argument("--petsc", default="", metavar="OPTIONS", help=text)
+    command.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
 
 def _run(run: argparse.ArgumentParser) -> None:

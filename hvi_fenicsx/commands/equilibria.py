@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from .. import console, results
-from ..equilibrium_search.bodies import Equilibria
 from ..equilibrium_search.search import OTHER, Found, Saved, counted, falls_passed
 from ..equilibrium_search.stationarity import StationaryPoint
 from ..errors import ExitCode, InputError, NotWrittenError
@@ -23,6 +22,7 @@ from ..results.whole import made, write_record, write_whole
 from ..runtime import writing
 from ..runtime.mpi import largest, on_root, time_over
 from ..workflow import Preparation, Solution, prepare
+from ..workflow.equilibria import Equilibria
 from . import session
 from .session import COMM, LOG, Record, Session, say, tell_moving
 

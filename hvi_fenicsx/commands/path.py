@@ -7,7 +7,7 @@ import argparse
 from .. import console
 from ..load_paths import path_files
 from ..load_paths.following import PathRun
-from ..model import Model, PathTable
+from ..model import PathTable
 from ..paths.state import End
 from ..runtime.mpi import on_root
 from ..runtime.writing import Record
@@ -22,14 +22,13 @@ def execute(options: argparse.Namespace) -> int:
     Raises:
         InputError: on all ranks alike.
     """
-
-    def done(record: Record) -> bool:
-        return End(record["path"]["end"]) is not End.INTERRUPTED
-
-    def changed(scene: Model) -> Model:
-        return scene.changed(path=scene.path or PathTable())
-
-    return session.execute(options, _run, kind="path", done=done, changed=changed)
+    return session.execute(
+        options,
+        _run,
+        kind="path",
+        done=lambda record: End(record["path"]["end"]) is not End.INTERRUPTED,
+        changed=lambda scene: scene.changed(path=scene.path or PathTable()),
+    )
 
 
 def _run(call: Session) -> int:

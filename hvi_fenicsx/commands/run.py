@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .. import console, results
 from ..errors import ExitCode, InputError
@@ -53,7 +53,7 @@ def _goal(options: argparse.Namespace) -> Goal | None:
 def _run(call: Session) -> int:
     """Solve, write and tell; the exit code. Collective."""
     goal = _goal(call.options)
-    options, given, drawn = call.options, dict[str, Any](call.given), not call.options.no_pictures
+    options, given, drawn = call.options, call.given, not call.options.no_pictures
     with picture_process(call.folder.work) if drawn and COMM.rank == 0 else nullcontext() as process:
         if goal is None:
             solution = _solved(call)
@@ -61,8 +61,10 @@ def _run(call: Session) -> int:
             reached = _solved_to_goal(call, goal)
             solution = reached.solution
             given |= {"accuracy": results.plain(reached.as_dict()), "exit_code": reached.exit_code}
-        wanted: dict[str, Any] = {"pictures": drawn, "report": not options.no_report, "process": process}
-        record = write_whole(call.folder, solution, given, call.timer, LOG.info, **wanted)
+        record = write_whole(
+            call.folder, solution, given, call.timer, LOG.info, pictures=drawn, report=not options.no_report,
+            process=process,
+        )  # fmt: skip
     return int(record["exit_code"])
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
@@ -45,7 +46,7 @@ class Session:
     interrupted: Callable[[], bool]
 
     @property
-    def given(self) -> dict[str, str]:
+    def given(self) -> dict[str, Any]:
         """The command line and PETSc's options, for ``summary.json``."""
         return {"command": self.options.given, "petsc": self.options.petsc}
 
@@ -90,14 +91,12 @@ def execute(
     """
     timer = Timer()
     petsc_options.insert(options.petsc)
-    scene = changed(on_root(COMM, lambda: read_scene(options.scene, options.overrides)))
-    name = options.scene.stem + (f"-{options.command}" if kind != "result" else "")
-    target = on_root(COMM, lambda: results.resolved(options.out or Path("results") / name))
+    scene, target = changed(scene_of(options)), target_of(options)
     resume = options.resume and not options.force
     if resume and (code := on_root(COMM, lambda: _finished(target, scene, kind, done))) is not None:
         return code
-    ways = {"force": options.force, "resume": resume, "inputs": [options.scene, *scene.files()]}
-    with results.ResultFolder(COMM, target, kind=kind, **ways) as folder:
+    inputs = [options.scene, *scene.files()]
+    with results.ResultFolder(COMM, target, force=options.force, resume=resume, inputs=inputs, kind=kind) as folder:
         interrupted, run_log = stop_on_signals(COMM), log.RunLog(folder.work / "run.log")
         with display():
             with log.handled(run_log):
@@ -108,6 +107,17 @@ def execute(
             first = on_root(COMM, lambda: f"; open {PAGE} there" if (target / PAGE).is_file() else "")
             say([f"{target}: {timer.total:.1f} s in all{first}"])
     return int(code)
+
+
+def scene_of(options: argparse.Namespace) -> Model:
+    """The scene that the words of the command line name. Collective."""
+    return on_root(COMM, lambda: read_scene(options.scene, options.overrides))
+
+
+def target_of(options: argparse.Namespace) -> Path:
+    """The folder that they name, or by default one of the name of scene and command. Collective."""
+    name = options.scene.stem + ("" if options.command == "run" else f"-{options.command}")
+    return on_root(COMM, lambda: results.resolved(options.out or Path("results") / name))
 
 
 def _finished(target: Path, scene: Model, kind: Kind, done: Callable[[Record], bool]) -> int | None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from .. import results
+from .. import console
 from ..errors import ExitCode
-from ..model import read_scene
 from ..runtime.manifest import MARKS
-from ..runtime.mpi import on_root, stop_on_signals
+from ..runtime.mpi import stop_on_signals
 from ..study import plan
 from ..study.conduct import Measurement
-from .session import COMM, display, say
+from .session import COMM, display, say, scene_of, target_of
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -23,11 +21,9 @@ def execute(options: argparse.Namespace) -> int:
         NoReferenceError: no solution exists (3), or the reference is not certified (4).
         StudyInterruptedError: a signal came (130); finished points are kept.
     """
-    scene = on_root(COMM, lambda: read_scene(options.scene, options.overrides))
-    planned = plan.make(scene, [plan.read_axis(text) for text in options.axis])
+    planned = plan.make(scene_of(options), [plan.read_axis(text) for text in options.axis])
     interrupted = stop_on_signals(COMM)
-    default = Path("results") / f"{options.scene.stem}-study"
-    folder = on_root(COMM, lambda: results.resolved(options.out or default))
+    folder = target_of(options)
     measurement = Measurement(
         plan=planned, comm=COMM, repeats=options.repeat, limit=options.limit, interrupted=interrupted
     )
@@ -35,11 +31,10 @@ def execute(options: argparse.Namespace) -> int:
         study, warnings = measurement.conduct(
             folder, force=options.force, resume=options.resume, inputs=[options.scene]
         )
-        told = [f"warning: {text}" for text in warnings]
         certified = sum(row.converged for row in study.rows)
         ranks = "1 rank" if COMM.size == 1 else f"{COMM.size} ranks"
         say([f"{study.title or 'untitled'}: {len(study.rows)} points, {certified} certified, on {ranks}"])
         if study.left_out:
             say([f"{len(study.left_out)} combinations are no scenes, like {study.left_out[0]}"])
-        say([*study.sentences, *told, f"{folder}: {MARKS['study']}, study.csv, pictures"])
+        say([*study.sentences, *console.warnings(warnings), f"{folder}: {MARKS['study']}, study.csv, pictures"])
     return ExitCode.CERTIFIED

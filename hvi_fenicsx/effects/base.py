@@ -77,28 +77,22 @@ class FormContext(Protocol):
         trial: UFL argument, the displacement u.
         test: UFL argument, the test function v.
         normal: UFL's outward normal of the boundary.
+        length: scale L in m.
+        stress: scale p0 in N/m².
+        modulus: scale E0 of Young's modulus in N/m².
     """
 
     dimension: int
     trial: Any
     test: Any
     normal: Any
+    length: float
+    stress: float
+    modulus: float
 
     @property
     def scalar_test(self) -> Any:
         """A test function of scalar P1."""
-
-    @property
-    def length(self) -> float:
-        """Length scale L in m."""
-
-    @property
-    def stress(self) -> float:
-        """Stress scale p0 in N/m²."""
-
-    @property
-    def modulus(self) -> float:
-        """Young's modulus scale E0 in N/m²."""
 
     def number(self, value: float) -> Any:
         """A ``fem.Constant``, so that the value is not compiled into the form."""

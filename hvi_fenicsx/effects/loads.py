@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
 from ..formula import SpatialValue
+from ..geometry import in_space
 from ..schema import Finite, refusal
 from ..typing import Array, magnitude
 from .base import BodySizes, Drive, Effect, Evaluate, FormContext, Place, SideMoments, Sides, SurfaceLoad, from_python
@@ -241,7 +242,7 @@ class Moment(_Total):
     def spread_at(self, moments: SideMoments, points: Array) -> Array:
         """A x r."""
         d = len(moments.centroid)
-        r = np.pad(points[:, :d] - moments.centroid, ((0, 0), (0, 3 - d)))
+        r = in_space(points[:, :d] - moments.centroid)
         return np.cross(_rotation(moments.second, self.values)[0], r)[:, :d]
 
     def stress_scale(self, largest: Evaluate, sizes: BodySizes) -> float:

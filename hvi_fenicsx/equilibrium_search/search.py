@@ -209,6 +209,24 @@ def _all(task: Task) -> Found:
     )
 
 
+def few_boxes(problem: ScalarProblem, stop: Callable[[], bool]) -> list[StationaryPoint]:
+    """The stationary points of a search that ends at the first minimiser, or after few boxes; minimisers first.
+
+    Args:
+        problem: the problem; there are none of laws of a length.
+        stop: asked before each box.
+    """
+    search = Enumeration(problem=problem, cut=stop)
+
+    def enough() -> bool:
+        return stop() or search.cells >= LIMITS.few_boxes or any(p.kind is Kind.MINIMISER for p in search.points)
+
+    if not len(problem.lengths):
+        search.start()
+        search.run(enough, lambda _: None)
+    return sorted(by_energy(search.points), key=lambda point: point.kind is not Kind.MINIMISER)
+
+
 def _left_of_all(search: Enumeration, known: Iterable[Array]) -> Saved:
     boxes = {name: np.array([getattr(cell, name) for cell in search.waiting]) for name in ("low", "high")}
     x = np.array([*known, *(p.x for p in search.points)]).reshape(-1, search.problem.size)

@@ -37,6 +37,8 @@ class SearchThresholds:
         wide: intervals of pivots that are wider than this many times the largest joint are divided in growing parts.
         regular: least pivot, relative to the largest, of a matrix that counts as positive definite.
         first_boxes: boxes after which a search for all points asks for a bound of the energy.
+        few_boxes: boxes in which a run that has found no equilibrium looks for one,
+        few_unknowns: and the unknowns of Γc up to which it does: some ten seconds.
     """
 
     rounding: float = 1e-12
@@ -59,6 +61,8 @@ class SearchThresholds:
     wide: float = 100.0
     regular: float = 1e-6
     first_boxes: int = 200
+    few_boxes: int = 500
+    few_unknowns: int = 16
 
 
 LIMITS = SearchThresholds()

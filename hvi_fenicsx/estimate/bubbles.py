@@ -27,6 +27,7 @@ from ..mesh import nodes
 from ..problem.problem import Problem
 from ..problem.vectors import nodal
 from ..runtime import forms
+from ..runtime.mpi import agree, total
 from ..typing import Array, Entities
 
 LocalForces = tuple[npt.NDArray[np.integer], Array]
@@ -50,18 +51,6 @@ def collected(space: fem.FunctionSpace, parts: Iterable[LocalForces]) -> Array:
 
 Index = tuple[int, ...]
 """A multi-index over the corners of a cell or of a facet."""
-
-
-def quadrature(cell: str, degree: int) -> tuple[Array, Array]:
-    """Barycentric points (q, corners) and weights (q,), whose sum is 1, of a simplex.
-
-    Args:
-        cell: its name, such as "triangle".
-        degree: of the polynomials that are integrated exactly.
-    """
-    made: tuple[Any, Any] = basix.make_quadrature(basix.CellType[cell], degree)
-    points, weights = made
-    return np.column_stack([1 - points.sum(axis=1), points]), weights / weights.sum()
 
 
 def indices(degree: int, corners: Sequence[int], count: int) -> list[Index]:
@@ -161,10 +150,11 @@ def _points(found: Sequence[Index], corners: Array) -> Array:
 
 def _coefficients(cell: str, degree: int) -> Array:
     """The bubbles in the orthonormal polynomials of degree 2p, (bubbles, polynomials)."""
-    barycentric, weights = quadrature(cell, 4 * degree)
+    found = of_cell(degree, cell)
+    barycentric, weights = nodes.quadrature(len(found[0]), 4 * degree)
     kind, points = basix.CellType[cell], barycentric[:, 1:]
     legendre: Any = basix.tabulate_polynomials(basix.PolynomialType.legendre, kind, 2 * degree, points)
-    values = [shape(index, barycentric) for index in of_cell(degree, cell)]
+    values = [shape(index, barycentric) for index in found]
     volume = 1.0 / math.factorial(barycentric.shape[1] - 1)
     return np.einsum("iq,q,jq->ij", np.array(values), volume * weights, legendre)
 
@@ -218,7 +208,7 @@ class BubbleStiffness:
         """
         at, elastic = self._sprung
         self.inverse[at] = elastic
-        strong = bool(self.comm.allreduce(bool(np.any(rates * self.inverse > _WEAK)), op=MPI.LOR))
+        strong = any(agree(self.comm, bool(np.any(rates * self.inverse > _WEAK))))
         self._springs = springs if strong else None
         at = np.flatnonzero(np.any(rates, axis=1) & strong).astype(np.int32)
         self._sprung = at, self.inverse[at]
@@ -267,7 +257,7 @@ class BubbleStiffness:
         Returns:
             By how much e·A e grows.
         """
-        if not self.comm.allreduce(bool(step.any()), op=MPI.LOR):
+        if not any(agree(self.comm, bool(step.any()))):
             return 0.0
         p = self._owned(self._in)
         p[:] = 0.0
@@ -314,7 +304,7 @@ class BubbleStiffness:
             a: the one, (n, d).
             b: the other, (n, d).
         """
-        return float(self.comm.allreduce(float(np.vdot(a, b)), op=MPI.SUM))
+        return total(self.comm, float(np.vdot(a, b)))
 
 
 def diagonal(problem: Problem, bubbles: fem.FunctionSpace) -> Array:
@@ -344,7 +334,7 @@ def _energies(problem: Problem) -> Iterator[tuple[Any, tuple[Any, Any], dict[Ind
     """The forms whose sum is a bubble's energy, the two functions that each is taken of, and the bubbles' shares."""
     mesh, d = problem.space.mesh, problem.dimension
     cell, degree = mesh.topology.cell_name(), nodes.degree(problem.space)
-    barycentric, weights = quadrature(cell, 4 * degree)
+    barycentric, weights = nodes.quadrature(d + 1, 4 * degree)
     values = {index: shape(index, barycentric) for index in of_cell(degree, cell)}
     slopes = {
         index: [shape(index, barycentric, a) - shape(index, barycentric, 0) for a in range(1, d + 1)]

@@ -21,15 +21,16 @@ from .. import geometry
 from ..certify.contact_state import ContactState
 from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..formula import SpatialValue
+from ..mesh import nodes
 from ..mesh.boundary_part import Inequalities
 from ..problem import spaces
 from ..problem.contact_surface import Surface
 from ..problem.elastic_operator import stiffness_tensor
 from ..problem.problem import Bounds, PrescribedComponent, Problem
 from ..problem.scaling import DEFAULT as composition
-from ..runtime.mpi import total
+from ..runtime.mpi import largest, total
 from ..typing import Array, Entities, magnitude
-from .bubbles import DEFAULT, of_facet, quadrature, shape
+from .bubbles import DEFAULT, of_facet, shape
 from .traces import ContactFacets, contact_facets, part_points
 
 
@@ -170,10 +171,9 @@ def facet_modes(problem: Problem, bubbles: fem.FunctionSpace, facets: Entities) 
         facets: the local facets.
     """
     found, d = contact_facets(problem, bubbles, facets), problem.dimension
-    degree, kind = DEFAULT.data_degree[d - 2], "interval" if d == 2 else "triangle"
-    barycentric, weights = quadrature(kind, 2 * degree)
-    family, cell = basix.PolynomialType.legendre, basix.CellType[kind]
-    legendre: Any = basix.tabulate_polynomials(family, cell, degree, barycentric[:, 1:])
+    degree, family = DEFAULT.data_degree[d - 2], basix.PolynomialType.legendre
+    barycentric, weights = nodes.quadrature(d, 2 * degree)
+    legendre: Any = basix.tabulate_polynomials(family, nodes.KINDS[d], degree, barycentric[:, 1:])
     values = legendre / math.sqrt(math.factorial(d - 1))
     degrees = np.concatenate([np.full(math.comb(n + d - 2, d - 2), n) for n in range(degree + 1)])
     material, places = stiffness_tensor(problem.bulk, found.cells), problem.positions[found.nodes]
@@ -244,8 +244,8 @@ def redistributed(
     if wanted == 0.0:
         return pressure
     reach = (pushes @ kernel.T) * compliance[:, None]
-    low = comm.allreduce(float(np.min(gaps - reach, initial=0.0)), op=MPI.MIN)
-    high = comm.allreduce(float(np.max(gaps, initial=0.0)), op=MPI.MAX)
+    low = -largest(comm, float(np.max(reach - gaps, initial=0.0)))
+    high = largest(comm, float(np.max(gaps, initial=0.0)))
     for _ in range(DEFAULT.bubble_steps):
         shift = (low + high) / 2
         pressure = _solved(kernel, pushes, within - shift / compliance[:, None], pressure, DEFAULT.coupled_rounds)
@@ -330,7 +330,7 @@ def _moved_pressure(
         within: what interpolation between the nodes leaves of the gap at the sample points, (f, q).
     """
     comm = problem.comm
-    if comm.allreduce(magnitude(within), op=MPI.MAX) <= CERTIFICATE.near:
+    if largest(comm, magnitude(within)) <= CERTIFICATE.near:
         return np.zeros(len(within))
     spread = part_points(problem, bubbles, surface, 1).spread
     normals = spread.by_facet(surface.normals).mean(axis=1)

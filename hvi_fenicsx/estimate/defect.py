@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 
 from ..geometry import units
 from ..mesh import nodes
@@ -22,6 +21,7 @@ from ..problem.problem import Bounds, Problem
 from ..problem.scaling import DEFAULT as composition
 from ..problem.vectors import nodal_values
 from ..runtime import forms
+from ..runtime.mpi import agree
 from ..typing import Array, Entities, together
 from .bubbles import DEFAULT, BubbleStiffness, of_cell
 from .dual_norm import DualNorm
@@ -206,7 +206,7 @@ class LeastEnergy:
             changed = tuple(p.updated(e[p.blocks], self.residual[p.blocks]) for p in self._parts)
             same = all(np.array_equal(a.side, b.side) for a, b in zip(self._parts, changed, strict=True))
             self._parts = changed
-            if stiffness.comm.allreduce(same, op=MPI.LAND):
+            if all(agree(stiffness.comm, same)):
                 break
         self._bubbles.x.scatter_forward()
 

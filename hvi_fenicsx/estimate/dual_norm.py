@@ -20,7 +20,7 @@ from ..certify.thresholds import DEFAULT as CERTIFICATE
 from ..problem.law_term import LawTerm
 from ..problem.problem import Problem
 from ..runtime.cost import Timer
-from ..runtime.mpi import total
+from ..runtime.mpi import agree, largest, total
 from ..system.held_solver import HeldPreconditioner, LinearSettings
 from ..system.multigrid import Levels
 from ..system.system import System
@@ -42,7 +42,7 @@ class DualNorm:
     """
 
     def __init__(self, system: System, levels: Levels, u: fem.Function) -> None:
-        self.system, self._before, self._tolerance = system, system.jacobian.rates, DEFAULT.tolerance
+        self.system, self._before = system, system.jacobian.rates
         self._x = system.unknowns(u)
         self.held = _held(system, self._x)
         at = self._x.array_r
@@ -50,18 +50,18 @@ class DualNorm:
         self._inverse = HeldPreconditioner(system, levels, LinearSettings.choose(system, levels=bool(levels)), Timer())
         self._inverse.prepare(self.held)
 
-    def solve(self, functional: Array, tolerance: float | None = None) -> tuple[fem.Function, float]:
+    def solve(self, functional: Array, tolerance: float = DEFAULT.tolerance) -> tuple[fem.Function, float]:
         """The Riesz representative of a functional and its energy norm. Collective.
 
         Args:
             functional: at the owned blocks, Cartesian, (n, d).
-            tolerance: of the relative residual; by default that of the thresholds.
+            tolerance: of the relative residual.
         """
         system = self.system
         load, x = self._load(functional), system.load.duplicate()
         x.set(0.0)
         if load.norm() > 0:
-            self._inverse.solve(load, x, self._tolerance if tolerance is None else tolerance)
+            self._inverse.solve(load, x, tolerance)
         energy = float(load.dot(x))
         return system.displacement(x), float(np.sqrt(max(energy, 0.0))) if np.isfinite(energy) else np.inf
 
@@ -94,7 +94,7 @@ class DualNorm:
             beyond = np.abs(along - inside) > NEAR
             error_there.array[dofs[beyond]] = (sign * inside - at[dofs])[beyond]
             self.held = np.union1d(self.held, dofs[beyond]).astype(np.int32)
-        leaves = bool(self.system.comm.allreduce(len(self.held) > len(before), op=MPI.LOR))
+        leaves = any(agree(self.system.comm, len(self.held) > len(before)))
         if leaves:
             error.x.array[:] = self.system.displacement(error_there).x.array
             self._inverse.prepare(self.held)
@@ -131,7 +131,7 @@ def _rising(comm: MPI.Comm, term: LawTerm, u: Array) -> Array:
     argument = term.argument(u)
     convex = term.law.convex
     second = np.maximum(term.law.derivatives(argument)[1], 0.0)
-    if comm.allreduce(float(np.max(second, initial=0.0)), op=MPI.MAX) == 0.0:
+    if largest(comm, float(np.max(second, initial=0.0))) == 0.0:
         second = np.full_like(second, SYSTEM.foundation)
         return term.rate(u, second * argument * term.stretch, second * term.stretch)
     secant = np.maximum((convex.left(argument) + convex.right(argument)) / 2, 0.0) if term.radial else second

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 
 from ..certify.certificate import Examination
 from ..certify.contact_state import ContactState, LawState
 from ..laws import Superpotential
 from ..problem.problem import Problem
 from ..runtime.log import percent
-from ..runtime.mpi import total
+from ..runtime.mpi import agree, total
 from ..system.multigrid import Levels
 from ..system.system import System
 from ..typing import Array
@@ -161,7 +160,7 @@ def within_facets(traces: LawTraces) -> bool:
         for state in traces.states
         for law in state.laws
     ]
-    return bool(traces.problem.comm.allreduce(any(found), op=MPI.LOR))
+    return any(agree(traces.problem.comm, any(found)))
 
 
 def heights(points: Trace, law: LawState, of: Superpotential) -> Array:

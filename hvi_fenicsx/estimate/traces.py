@@ -22,9 +22,10 @@ from ..problem.contact_surface import Surface
 from ..problem.facets import Facets
 from ..problem.interfaces import Interface
 from ..problem.problem import Problem
+from ..problem.spaces import global_numbers
 from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers, Mask
-from .bubbles import LocalForces, of_cell, of_facet, quadrature, shape
+from .bubbles import LocalForces, of_cell, of_facet, shape
 
 Basis = Literal["functions", "hats", "at_ends"]
 """By what values at nodes are interpolated."""
@@ -282,17 +283,11 @@ def _side(space: fem.FunctionSpace, degree: int, sign: float, at: Array, bubbles
 def _of_interface(problem: Problem, space: fem.FunctionSpace, side: Facets, name: str) -> Integers:
     """The global numbers of the bubbles of all facets of an interface's side, (facets, k). Collective."""
     local = contact_facets(problem, space, problem.domain.facets([name]))
-    own = [_numbers(problem.space, local.nodes), _numbers(space, local.bubbles)]
+    own = [global_numbers(problem.space, local.nodes), global_numbers(space, local.bubbles)]
     nodes_of, found = (np.concatenate(parts) for parts in zip(*agree(problem.comm, own), strict=True))
     numbers = np.empty_like(found)
     numbers[np.lexsort(side.nodes.T)] = found[np.lexsort(nodes_of.T)]
     return numbers
-
-
-def _numbers(space: fem.FunctionSpace, blocks: Entities) -> Integers:
-    """Local blocks by their global numbers."""
-    found = space.dofmap.index_map.local_to_global(np.ascontiguousarray(blocks.ravel()))
-    return np.asarray(found, dtype=np.int64).reshape(blocks.shape)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -330,9 +325,9 @@ def part_points(problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, 
         degree: of the quadrature.
     """
     comm, on = problem.comm, contact_facets(problem, bubbles, surface.facets)
-    at, weights = quadrature("interval" if problem.dimension == 2 else "triangle", degree)
+    at, weights = nodes.quadrature(problem.dimension, degree)
     functions = spaces.simplex_functions(on.degree, at, spaces.edge_share(problem.space))
-    count, own = len(on.nodes), _numbers(problem.space, surface.blocks)
+    count, own = len(on.nodes), global_numbers(problem.space, surface.blocks)
     known, kept = np.unique(np.concatenate(agree(comm, own))), np.ones(on.nodes.shape, dtype=np.bool_)
     functions, hats, ends, places = (
         np.broadcast_to(values, (count, *values.shape))
@@ -345,12 +340,12 @@ def part_points(problem: Problem, bubbles: fem.FunctionSpace, surface: Surface, 
         hats=hats,
         at_ends=ends,
         normals=None,
-        sides=(_side(bubbles, on.degree, 1.0, places, _numbers(bubbles, on.bubbles)),),
+        sides=(_side(bubbles, on.degree, 1.0, places, global_numbers(bubbles, on.bubbles)),),
         spread=Spread(
             comm=comm,
             count=len(known),
             own=np.searchsorted(known, own),
-            at=np.searchsorted(known, _numbers(problem.space, on.nodes)),
+            at=np.searchsorted(known, global_numbers(problem.space, on.nodes)),
             kept=kept,
             shares=np.ones((len(own), 1)),
             carriers=dual_basis.means(kept),
@@ -370,7 +365,7 @@ def interface_points(problem: Problem, bubbles: fem.FunctionSpace, interface: In
     d, comm, first = problem.dimension, problem.comm, interface.first
     overlaps, names = interface.overlaps, interface.sides
     own = np.arange(comm.rank, len(overlaps.areas), comm.size)
-    rule, weights = quadrature("interval" if d == 2 else "triangle", degree)
+    rule, weights = nodes.quadrature(d, degree)
     points = overlaps.sampled(rule, weights, own)
     size, found = (len(own), len(weights)), list[SideBubbles]()
     for side, name, sign, at, of in (
@@ -424,7 +419,7 @@ class Spread(Shared):
 def _of_carriers(problem: Problem, interface: Interface) -> Spread:
     """The way from the carriers of an interface, some of whose nodes carry nothing. Collective."""
     first, weights = interface.first, interface.rows.weights
-    own = _numbers(problem.space, interface.surface.blocks)
+    own = global_numbers(problem.space, interface.surface.blocks)
     known, kept = np.flatnonzero(weights > 0.0), weights[first.nodes] > 0.0
     at = np.where(kept, np.searchsorted(known, first.nodes), 0)
     carriers = dual_basis.means(kept)

@@ -19,8 +19,6 @@ import numpy as np
 from dolfinx import fem
 
 from ..certify import balance, certificate, contact_state
-from ..certify.certificate import Examination
-from ..certify.contact_state import Forces
 from ..certify.thresholds import DEFAULT as THRESHOLDS
 from ..paths.distances import Distances, StateOnGraphs
 from ..paths.state import Event, PathState
@@ -33,7 +31,7 @@ from ..solvers import frozen_mixity
 from ..system.system import System
 from ..typing import Array, magnitude
 
-ALWAYS = frozenset({Event.START, Event.JUMP, Event.TURN, Event.END})
+ALWAYS = (Event.START, Event.JUMP, Event.TURN, Event.END)
 """The events whose states are examined with the whole body, and that a film shows first."""
 FIRST = 100
 """So many states are examined in any case; of twice as many each second one, and so on."""
@@ -93,7 +91,7 @@ class Certifier:
         # fewer and fewer rows the longer the path is
         if state.event not in ALWAYS and number % (1 << (number // FIRST).bit_length()):
             return StateVerdict(certified=on_graphs, whole=False)
-        u = self._expanded(state)
+        u = self._condensation.displacement(state.x, state.factor)
         found = self._examination(state, u)
         if (on_graphs or found is not None) and self._passes(state, u, found):
             return StateVerdict(certified=True, whole=True)
@@ -107,11 +105,11 @@ class Certifier:
             state: the state.
             verdict: what was found of it.
         """
-        u = self._expanded(state)
+        u = self._condensation.displacement(state.x, state.factor)
         found = self._refined(state, self._examination(state, u)) if verdict.corrected else None
         return u if found is None else found
 
-    def _examination(self, state: PathState, u: fem.Function) -> Examination | None:
+    def _examination(self, state: PathState, u: fem.Function) -> certificate.Examination | None:
         """What the certificate of a single run says of a displacement; None: it cannot judge the state. Collective."""
         turned_back = state.memory is not None and np.any(state.memory)  # then bonds are not as the laws say
         if turned_back or self._is_unloaded(state):
@@ -120,7 +118,7 @@ class Certifier:
         frozen_mixity.freeze(problem, u)
         return certificate.examine(problem, u, self._tolerance)
 
-    def _passes(self, state: PathState, u: fem.Function, found: Examination | None) -> bool:
+    def _passes(self, state: PathState, u: fem.Function, found: certificate.Examination | None) -> bool:
         if found is not None:
             return found.certificate.passed
         forces = contact_state.forces(self._factored.at(state.factor), u)
@@ -130,7 +128,7 @@ class Certifier:
 
     # -- where rounding speaks against a state
 
-    def _refined(self, state: PathState, found: Examination | None) -> fem.Function | None:
+    def _refined(self, state: PathState, found: certificate.Examination | None) -> fem.Function | None:
         """What Newton steps along the graphs, with what bonds remember, leave of rounding; None: it does not help."""
         if found is not None and not found.certificate.is_near:
             return None
@@ -150,7 +148,7 @@ class Certifier:
         unknowns = condensation.expand(graphs.x, factor)
         for _ in range(_STEPS):
             forces = contact_state.forces(problem, system.displacement(unknowns))
-            left, carried = self._system.turned(forces.reaction), condensation.spread(-graphs.force)
+            left, carried = system.turned(forces.reaction), condensation.spread(-graphs.force)
             left.axpy(-1.0, carried)
             missing = condensation.forces(-left.array_r)
             before = graphs.x
@@ -185,7 +183,7 @@ class Certifier:
         load.destroy()
         return found
 
-    def _in_balance(self, state: PathState, u: fem.Function, forces: Forces, carried: Array) -> bool:
+    def _in_balance(self, state: PathState, u: fem.Function, forces: contact_state.Forces, carried: Array) -> bool:
         """Whether forces from the forms are those that were judged on Γc, and none are left elsewhere. Collective.
 
         What bonds remember is in their graphs on Γc, not in the laws that the certificate of a single run knows. As
@@ -202,7 +200,7 @@ class Certifier:
         return left <= self._tolerance * size or self._is_rounding(left / size, problem, u, forces, given, size)
 
     def _is_rounding(
-        self, left: float, problem: Problem, u: fem.Function, forces: Forces, carried: Array, size: float
+        self, left: float, problem: Problem, u: fem.Function, forces: contact_state.Forces, carried: Array, size: float
     ) -> bool:
         """Whether what is left is no more than the last digits of u make, and the net forces balance. Collective."""
         if left > THRESHOLDS.largest_rounding:
@@ -216,9 +214,6 @@ class Certifier:
 
     def _norm(self, values: Array) -> float:
         return float(np.sqrt(total(self._system.comm, float(np.sum(values**2)))))
-
-    def _expanded(self, state: PathState) -> fem.Function:
-        return self._condensation.displacement(state.x, state.factor)
 
 
 _STEPS = 3
@@ -239,4 +234,4 @@ class Refined:
     u: fem.Function
     x: Array
     force: Array
-    forces: Forces
+    forces: contact_state.Forces

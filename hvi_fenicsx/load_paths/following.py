@@ -15,7 +15,6 @@ from ..model import PathTable
 from ..paths.follower import Follower
 from ..paths.load_path import LoadPath, PathRow
 from ..paths.state import End, Event, EventPlace, Follow, PathOptions, PathState, Position
-from ..paths.vertex_laws import is_straight
 from ..problem.problem import FactoredProblem, Problem
 from ..reduced import loading
 from ..reduced.condensation import Condensation
@@ -44,6 +43,7 @@ class PathRun:
         prepared: the scene.
         wanted: what path is wanted.
         scaled: the names of what the factor multiplies.
+        condensed: what is followed, on Γc.
         states: those found so far.
     """
 
@@ -56,28 +56,23 @@ class PathRun:
         if not known:
             raise InputError("path: nothing drives the body; add a load or a prescribed displacement")
         with prepared.timer("setup"):
-            most = prepared.system.thresholds.largest_dense
-            self._condensation = Condensation(system, self.scaled, most, interrupted)
+            self._condensation = Condensation(system, self.scaled, system.thresholds.largest_dense, interrupted)
             self._measures = Measures(system, self._condensation, self.scaled, remember=wanted.memory)
-        self._remember = range(len(self._condensation.problem.bonds) if wanted.memory else 0)
+        self.condensed = self._condensation.problem
+        self._remember = range(len(self.condensed.bonds) if wanted.memory else 0)
         self._factored = FactoredProblem(system.problem, self.scaled)
-        tolerance, largest = prepared.options.tolerance, max(wanted.to, key=abs)
-        parts = system, self._condensation, self._factored, tolerance, self._remember
-        self._certifier = Certifier(*parts, largest)
+        self._certifier = Certifier(
+            system,
+            self._condensation,
+            self._factored,
+            prepared.options.tolerance,
+            self._remember,
+            largest=max(wanted.to, key=abs),
+        )
         self.states: list[PathState] = []
         self._verdicts: list[StateVerdict] = []
         self._rows: list[PathRow] = []
         self._reached = 0.0, 0.0
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether the path is straight between two events."""
-        return is_straight(self._condensation.problem)
-
-    @property
-    def size(self) -> int:
-        """The number of unknowns of Γc that are followed."""
-        return self._condensation.problem.size
 
     def follow(
         self,
@@ -107,7 +102,7 @@ class PathRun:
             **self._limits(),
         )
         resume = self.states[-1] if self.states else None
-        follower = Follower(self._condensation.problem, options, resume, interrupted)
+        follower = Follower(self.condensed, options, resume, interrupted)
         with self.prepared.timer("solve"):
             for state in follower.states():
                 if follower.end is End.INTERRUPTED or not np.isfinite([state.factor, *state.x]).all():
@@ -138,20 +133,17 @@ class PathRun:
         return {"borne": (known.peak_from, known.peak), "held": (known.held_from, known.held)}
 
     def _take(self, state: PathState, verdict: StateVerdict) -> None:
+        """Add a state and its row."""
         self.states.append(state)
         self._verdicts.append(verdict)
         low, high = self._reached
         self._reached = min(low, state.factor), max(high, state.factor)
-        self._rows.append(self._row(state, verdict))
-
-    def _row(self, state: PathState, verdict: StateVerdict) -> PathRow:
-        scales = self.prepared.problem.scales
-        place, d = state.place, scales.dimension
-        return PathRow(
+        scales, place = self.prepared.problem.scales, state.place
+        row = PathRow(
             factor=state.factor,
             event=str(state.event),
             part=None if place is None else place.part,
-            point=None if place is None else place.point[:d],
+            point=None if place is None else place.point[: scales.dimension],
             energy=state.energy * scales.energy,
             work=state.work * scales.energy,
             dissipated=state.dissipated * scales.energy,
@@ -162,6 +154,7 @@ class PathRun:
             displacements=self._measures.displacements(state.x, state.factor),
             certified=verdict.certified,
         )
+        self._rows.append(row)
 
     def displacement(self, number: int) -> fem.Function:
         """The displacement at a row, nondimensional, ghosts updated. Collective.

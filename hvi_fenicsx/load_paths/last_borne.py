@@ -13,6 +13,7 @@ from ..certify import plausibility
 from ..errors import InputError, SolverError
 from ..model import PathTable
 from ..paths.state import End
+from ..paths.vertex_laws import is_straight
 from ..problem.problem import FactoredProblem, Problem
 from ..reduced import loading
 from ..runtime.log import logger
@@ -54,12 +55,12 @@ def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable
     from .following import PathRun  # two hundred modules, which few runs want
 
     run = PathRun(prepared, PathTable(memory=False))
-    if not run.is_straight and 2 * run.size > prepared.system.thresholds.curve_unknowns:
+    if not is_straight(run.condensed) and 2 * run.condensed.size > prepared.system.thresholds.curve_unknowns:
         run.free()
         return failed
     path = run.follow(interrupted=interrupted)
-    peak = path.peak if path.rows and 0.0 < path.rows[path.peak].factor < 1.0 else None
-    found = None if peak is None or path.end == End.INTERRUPTED else run.state(peak)
+    factor = path.rows[path.peak].factor if path.rows else 0.0
+    found = run.state(path.peak) if 0.0 < factor < 1.0 and path.end != End.INTERRUPTED else None
     run.free()
     assert failed.solve_result is not None
     if path.end == End.INTERRUPTED:
@@ -67,19 +68,17 @@ def _at_the_limit(prepared: Preparation, failed: Solution, interrupted: Callable
     if found is None:
         return failed
     problem, u = found
-    return _shown(prepared, problem, Borne(u=u, factor=path.rows[path.peak].factor), failed)
+    return _shown(prepared, problem, Borne(u=u, factor=factor), failed)
 
 
 def _may_come_off(prepared: Preparation, failed: Solution) -> bool:
     """Whether there is a limit load to look for, and a path to it takes little time. Collective."""
     if failed.converged or failed.solve_result is None or failed.solve_result.interrupted:
         return False
-    system = prepared.system
-    if failed.solvability.state == "held" or not prepared.problem.has_potential:
+    system, problem = prepared.system, prepared.problem
+    if failed.solvability.state == "held" or not problem.has_potential or obstacle_force.pressed(problem) is not None:
         return False
-    if obstacle_force.pressed(prepared.problem) is not None:
-        return False
-    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > prepared.system.thresholds.vertex_unknowns:
+    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > system.thresholds.vertex_unknowns:
         return False
     system.jacobian.clear()
     return True

@@ -5,7 +5,7 @@ Both are affine in them, so that no state needs the displacement of the whole bo
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..reduced import loading
 from ..reduced.condensation import Condensation
 from ..runtime.mpi import agree
 from ..system.system import System
-from ..typing import Array, Integers
+from ..typing import Array, Entities, Integers
 
 
 class Measures:
@@ -156,23 +156,19 @@ def driven(problem: Problem) -> Iterator[str]:
 
 def _attributed(problem: Problem, parts: tuple[str, ...]) -> tuple[dict[str, Integers], dict[str, Integers]]:
     """The scalar unknowns of this rank that count for each part: those held, and those contact and laws act on."""
-    taken: set[int] = set()
-    here = problem.space.dofmap.index_map.size_local * problem.dimension
-    held: dict[str, list[int]] = {part: [] for part in parts}
-    touched: dict[str, list[int]] = {part: [] for part in parts}
-    for one in problem.prescribed:
-        new = [int(dof) for dof in one.dofs if dof < here and int(dof) not in taken]
-        held.setdefault(one.part, []).extend(new)
-        taken.update(new)
-    for surface in problem.surfaces:
-        new = [int(dof) for dof in surface.dofs.ravel() if int(dof) not in taken]
-        touched.setdefault(surface.part, []).extend(new)
-        taken.update(new)
-    return _arrays(held), _arrays(touched)
+    free = np.ones(problem.space.dofmap.index_map.size_local * problem.dimension, dtype=np.bool_)
 
+    def taken(found: Iterable[tuple[str, Entities | Integers]]) -> dict[str, Integers]:
+        """Of the unknowns of each part, those that none before it has."""
+        own: dict[str, list[int]] = {part: [] for part in parts}
+        for part, dofs in found:
+            here = dofs[dofs < len(free)]
+            own.setdefault(part, []).extend(map(int, here[free[here]]))
+            free[here] = False
+        return {part: np.array(dofs, dtype=np.int64) for part, dofs in own.items()}
 
-def _arrays(found: dict[str, list[int]]) -> dict[str, Integers]:
-    return {part: np.array(dofs, dtype=np.int64) for part, dofs in found.items()}
+    held = taken((one.part, one.dofs) for one in problem.prescribed)
+    return held, taken((surface.part, surface.dofs.ravel()) for surface in problem.surfaces)
 
 
 @dataclass(frozen=True)
@@ -234,8 +230,9 @@ def find(problem: Problem, parts: Mapping[int, int], prescribed: Array, *, remem
         )
         numbers, forces, arguments = (np.concatenate(agree(problem.comm, e)) for e in entries)
         known = numbers >= 0
-        ones = np.ones(np.count_nonzero(known))
-        laws, of_known = VertexLaws(law=term.law, factors=ones, weights=ones), (numbers[known], forces[known])
         if np.any(known):
-            found.append(HeldLaw(laws.with_memory if remember else laws, *of_known, arguments[known].T))
+            ones = np.ones(np.count_nonzero(known))
+            laws = VertexLaws(law=term.law, factors=ones, weights=ones)
+            laws = laws.with_memory if remember else laws
+            found.append(HeldLaw(laws, numbers[known], forces[known], arguments[known].T))
     return found

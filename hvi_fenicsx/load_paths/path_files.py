@@ -14,12 +14,10 @@ from ..model import dump_scene
 from ..paths.load_path import LoadPath
 from ..paths.state import End
 from ..report import page
-from ..report.page import draw as draw_pictures
 from ..results import vtk_fields, whole
 from ..results.gathering import contact_parts
 from ..results.output_folder import ResultFolder
 from ..results.summary import plain, summary
-from ..results.whole import made, write_record
 from ..runtime import writing
 from ..runtime.mpi import on_root
 from ..workflow import unsolved
@@ -85,11 +83,11 @@ def write(
         record = {**summary(unsolved(run.prepared)), **outcome, **given}
         on_root(comm, lambda: _write_on_root(folder, run, path, record, rows))
         if path.rows and draw:
-            on_root(comm, lambda: made("picture", tell, lambda: draw_pictures(work)))
+            on_root(comm, lambda: whole.made("picture", tell, lambda: page.draw(work)))
         if path.rows:
-            on_root(comm, lambda: made("report", tell, lambda: page.write_path(work)))
+            on_root(comm, lambda: whole.made("report", tell, lambda: page.write_path(work)))
     record["time"] = timer.report()
-    on_root(comm, lambda: write_record(work, record))
+    on_root(comm, lambda: whole.write_record(work, record))
     return record
 
 
@@ -111,4 +109,4 @@ def _write_on_root(
     if rows:
         whole.write_table(work / "path_contact.csv", ("row", "factor", *whole.CONTACT), rows)
     writing.text(work / "scene.toml", dump_scene(run.prepared.scene, folder.target))
-    write_record(work, record)
+    whole.write_record(work, record)

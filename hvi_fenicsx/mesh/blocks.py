@@ -22,6 +22,7 @@ from mpi4py import MPI
 from .. import compat
 from ..geometry import ROUNDING
 from ..typing import Array, Entities, Integers, Mask
+from . import facets as cell_facets
 from . import nodes
 from .domain import DEFAULT, Domain
 from .transfer import Numbers, Rows, Transfer, renumbered, weighted_rows
@@ -160,11 +161,8 @@ def _points(comm: MPI.Comm, size: Sequence[float], cells: Sequence[int]) -> Arra
 
 def _sides(mesh: dmesh.Mesh, size: Array) -> dict[str, Entities]:
     """Exterior facets by the side that their midpoint lies on."""
-    d = len(size)
-    mesh.topology.create_connectivity(d - 1, d)
-    facets, middles = dmesh.exterior_facet_indices(mesh.topology), np.empty((0, 3))
-    if len(facets):  # dolfinx divides by their number
-        middles = dmesh.compute_midpoints(mesh, d - 1, facets)
+    d, facets = len(size), cell_facets.exterior(mesh)
+    middles = cell_facets.corners(mesh, facets).mean(axis=1)
     ends = {n: (axis % d, end) for n, (axis, end) in _AXIS_OF_SIDE.items() if d == 3 or n not in ("front", "back")}
     return {name: facets[np.abs(middles[:, i] - end * size[i]) < ROUNDING * size[i]] for name, (i, end) in ends.items()}
 
@@ -227,15 +225,10 @@ def vertices(comm: MPI.Comm, parts: Sequence[Box]) -> tuple[Integers, Entities, 
     return places, local, (owned, ghosts, others.astype(np.int32))
 
 
-def _counts(part: Box) -> Integers:
-    """Vertices each way; none where the part has no cells."""
-    extent = part[1] - part[0]
-    return np.where(np.all(extent > 0), extent + 1, 0)
-
-
 def _places(part: Box) -> Integers:
-    """The integer coordinates of a part's vertices, x running fastest, (n, d)."""
-    counts = _counts(part)
+    """The integer coordinates of a part's vertices, x running fastest, (n, d); none where it has no cells."""
+    extent = part[1] - part[0]
+    counts = np.where(np.all(extent > 0), extent + 1, 0)
     return np.stack(np.unravel_index(np.arange(counts.prod()), counts, order="F"), axis=1) + part[0]
 
 
@@ -253,9 +246,8 @@ def _owners(parts: Sequence[Box], rank: int) -> Integers:
 def _numbers_of_owner(parts: Sequence[Box], rank: int, places: Integers) -> Integers:
     """The numbers that a rank gives to vertices which it owns, counted from 0, (g,)."""
     own: Mask = _owners(parts, rank) == rank
-    counts = _counts(parts[rank])
-    at = np.ravel_multi_index(tuple((places - parts[rank][0]).T), tuple(counts), order="F")
-    return (np.cumsum(own) - 1)[at]
+    lower, upper = parts[rank]
+    return (np.cumsum(own) - 1)[_flat(places - lower, upper - lower)]
 
 
 @dataclass(frozen=True)

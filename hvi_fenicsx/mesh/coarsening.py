@@ -108,7 +108,7 @@ def _sample(domain: Domain) -> _CellSample:
 def _surface(domain: Domain) -> _Surface | None:
     """The body's surface; None where a side lies inside of the body. Collective."""
     mesh, d = domain.mesh, domain.dimension
-    facets, owned = _exterior(mesh), mesh.topology.index_map(d - 1)
+    facets, owned = cell_facets.exterior(mesh), mesh.topology.index_map(d - 1)
     on: Mask = np.zeros((owned.size_local + owned.num_ghosts, len(domain.sides)), dtype=np.bool_)
     for i, name in enumerate(sorted(domain.sides)):
         on[domain.sides[name], i] = True
@@ -123,19 +123,10 @@ def _surface(domain: Domain) -> _Surface | None:
     return _Surface(*(array[order] for array in found))
 
 
-def _exterior(mesh: dmesh.Mesh) -> Entities:
-    d = mesh.topology.dim
-    mesh.topology.create_connectivity(d - 1, d)
-    return dmesh.exterior_facet_indices(mesh.topology)
-
-
 def _outward(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     """The (local) nodes of facets; of triangles counterclockwise as seen from outside, from the file's first on."""
-    d = mesh.topology.dim
-    if not len(facets):
-        return np.empty((0, d), dtype=np.int32)  # dolfinx divides by their number
-    nodes = dmesh.entities_to_geometry(mesh, d - 1, facets)
-    if d == 2:
+    nodes = cell_facets.nodes_of(mesh, facets)
+    if mesh.topology.dim == 2:
         return nodes
     links = mesh.topology.connectivity(2, 3)
     middle = mesh.geometry.x[compat.geometry_dofmap(mesh)[links.array[links.offsets[facets]]]].mean(axis=1)
@@ -215,17 +206,28 @@ def _in_space(surface: _Surface, cells: _CellSample, factor: float) -> tuple[Arr
 
 def _one_shell(triangles: Integers) -> bool:
     """Whether each edge has two triangles, and all triangles are connected."""
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    count = np.unique(edges, axis=0, return_counts=True)[1]
+    return bool(np.all(count == 2)) and connected(edges, triangles.max() + 1)[0] == 1
+
+
+def connected(pairs: Integers, size: int) -> tuple[int, Integers]:
+    """How many pieces a graph has, and the piece of each of its nodes.
+
+    Args:
+        pairs: nodes that are connected, (k, 2).
+        size: number of nodes.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-    count = np.unique(edges, axis=0, return_counts=True)[1]
-    graph = coo_array((np.ones(len(edges), np.int8), edges.T), shape=(triangles.max() + 1,) * 2)
-    return bool(np.all(count == 2)) and connected_components(graph, directed=False)[0] == 1
+    graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(size, size))
+    count, found = connected_components(graph, directed=False)
+    return int(count), found
 
 
 def _sides(domain: Domain, mesh: dmesh.Mesh, surface: _Surface) -> dict[str, Entities]:
-    facets = _exterior(mesh)
+    facets = cell_facets.exterior(mesh)
     middles = cell_facets.corners(mesh, facets).mean(axis=1)
     on = surface.on[_nearest(surface.corners.mean(axis=1), middles)]
     return {name: facets[on[:, i]] for i, name in enumerate(sorted(domain.sides))}

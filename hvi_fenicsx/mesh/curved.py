@@ -17,12 +17,12 @@ from scipy.spatial import KDTree
 
 from .. import compat
 from ..errors import InputError
-from ..geometry import ROUNDING, Curve, spot
+from ..geometry import ROUNDING, Curve, in_space, spot
 from ..runtime.mpi import agree, total
 from ..typing import Array, Entities, Integers
 from . import nodes, transfer
 from .domain import DEFAULT, Domain
-from .nodes import edges, lagrange
+from .nodes import edges, lagrange, middles, to_barycentric
 
 _SWEEPS = 3
 """Projections, from one side to the next, that bring a node of two sides onto both; each gains some digits."""
@@ -58,14 +58,13 @@ def mesh_of(domain: Domain, degree: int) -> dmesh.Mesh:
 
 def _curved(domain: Domain, names: Collection[str]) -> CurvedMesh:
     space = fem.functionspace(domain.mesh, ("Lagrange", 2))
-    before, d = nodes.points(space)[:, : domain.dimension], domain.dimension
+    before = nodes.points(space)[:, : domain.dimension]
     on = {name: np.unique(nodes.facet_nodes(space, domain.sides[name])) for name in names}
     after = before
     for _ in range(_SWEEPS if domain.dimension == 3 else 1):  # in space sides share edges
         after = onto_curves(space.dofmap.index_map, after, on, domain.curves)
     after, straight = _straightened(space, before, after)
-    points = np.pad(after, ((0, 0), (0, 3 - d)))
-    return CurvedMesh(compat.quadratic_mesh(domain.mesh, space.dofmap, points), straight)
+    return CurvedMesh(compat.quadratic_mesh(domain.mesh, space.dofmap, in_space(after)), straight)
 
 
 def _straightened(space: fem.FunctionSpace, before: Array, after: Array) -> tuple[Array, int]:
@@ -123,10 +122,6 @@ def _jacobians(points: Array) -> Array:
     return signed * np.sign(straight)[:, None]
 
 
-_EDGES = {2: [(0, 1)], 3: [(1, 2), (0, 2), (0, 1)]}
-"""The edges of a facet by its corners, in the order of their midpoints, by the number of its corners."""
-
-
 def is_curved(facets: Array) -> bool:
     """Whether any midpoint is off the middle of its edge.
 
@@ -145,9 +140,9 @@ def _turning_back(facets: Array) -> Integers:
 
 def _offsets(facets: Array) -> tuple[Array, Array]:
     """Midpoints from the middles of their edges, and the edges as vectors, (k, edges, d)."""
-    corners = {3: 2, 6: 3}[facets.shape[1]]
-    first, last = (facets[:, [pair[i] for pair in _EDGES[corners]]] for i in (0, 1))
-    return facets[:, corners:] - (first + last) / 2, last - first
+    d = facets.shape[2]
+    first, last = (facets[:, ends] for ends in np.array(edges(d)).T)
+    return facets[:, d:] - (first + last) / 2, last - first
 
 
 def straightened(
@@ -224,8 +219,7 @@ class CurvedFacets:
     def _middles(self) -> tuple[Array, Array]:
         """The middles of the edges if they were straight, and their nodes, (e, d) both."""
         d = self.points.shape[2]
-        ends = np.array(edges(d))
-        return self.points[:, ends].mean(axis=2).reshape(-1, d), self.points[:, d:].reshape(-1, d)
+        return middles(self.points[:, :d]).reshape(-1, d), self.points[:, d:].reshape(-1, d)
 
     def _pairs(self, x: Array) -> tuple[Integers, Integers]:
         """Facets, and points that may be nearest to them; all facets for points that are near none."""
@@ -250,7 +244,7 @@ class CurvedFacets:
             gram = np.einsum("ipd,jpd->pij", slopes, slopes)
             right = np.einsum("ipd,pd->pi", slopes, x - found)
             place = place + np.linalg.solve(gram, right[:, :, None])[:, :, 0]
-            place = transfer.clipped(np.column_stack([1 - place.sum(axis=1), place]))[:, 1:]
+            place = transfer.clipped(to_barycentric(place))[:, 1:]
         found, _ = _at(element, nodes, place)
         return found, np.linalg.norm(found - x, axis=1)
 

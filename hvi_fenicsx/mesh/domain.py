@@ -69,7 +69,7 @@ class Domain:
             curves: the true curve of a side by its name, where that is known and not straight.
             one_piece: whether the mesh is known to be connected.
         """
-        lower, upper = _bounding_box(mesh)
+        lower, upper = box(mesh.comm, mesh.geometry.x[:, : mesh.geometry.dim])
         return cls(
             mesh=mesh,
             sides=sides,
@@ -159,13 +159,15 @@ def check_affordable(comm: MPI.Comm, unknowns: float, dimension: int, place: str
         )
 
 
-def _bounding_box(mesh: dmesh.Mesh) -> tuple[Array, Array]:
-    """Lower and upper corner of the mesh, m, shape (d,), the same on all ranks. Collective."""
-    x = mesh.geometry.x[:, : mesh.geometry.dim]
-    inside = x if len(x) else np.full((1, x.shape[1]), np.nan)
-    lower, upper = np.fmin.reduce(inside, axis=0), np.fmax.reduce(inside, axis=0)
-    gathered = agree(mesh.comm, (lower, upper))
-    return np.nanmin([g[0] for g in gathered], axis=0), np.nanmax([g[1] for g in gathered], axis=0)
+def box(comm: MPI.Comm, points: Array) -> tuple[Array, Array]:
+    """Lower and upper corner of all ranks' points, shape (d,), the same on all ranks. Collective.
+
+    Args:
+        comm: the ranks.
+        points: this rank's, (n, d).
+    """
+    every = agree(comm, (points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)))
+    return np.min([low for low, _ in every], axis=0), np.max([high for _, high in every], axis=0)
 
 
 class SharedObjects:

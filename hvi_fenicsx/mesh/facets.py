@@ -42,9 +42,7 @@ def in_copies(facets: Entities, mesh: dmesh.Mesh, cells: Entities, other: dmesh.
         copies: the local cell there that each is, its vertices in the same order, (c,).
     """
     of_cells = cell_facets(mesh)
-    on = np.zeros(of_cells.max(initial=-1) + 1, dtype=np.bool_)
-    on[facets] = True
-    return np.unique(cell_facets(other)[copies][on[of_cells[cells]]]).astype(np.int32)
+    return np.unique(cell_facets(other)[copies][np.isin(of_cells[cells], facets)]).astype(np.int32)
 
 
 def owned(mesh: dmesh.Mesh, facets: Entities) -> Entities:
@@ -57,8 +55,14 @@ def owned(mesh: dmesh.Mesh, facets: Entities) -> Entities:
     return facets[facets < mesh.topology.index_map(mesh.topology.dim - 1).size_local]
 
 
-def corners(mesh: dmesh.Mesh, facets: Entities) -> Array:
-    """The vertices of facets, m, (f, d, d): by facet, vertex and coordinate.
+def exterior(mesh: dmesh.Mesh) -> Entities:
+    """The local facets of the surface."""
+    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+    return dmesh.exterior_facet_indices(mesh.topology)
+
+
+def nodes_of(mesh: dmesh.Mesh, facets: Entities) -> Entities:
+    """The nodes of the geometry at the vertices of facets, (f, d).
 
     Args:
         mesh: of simplices.
@@ -66,9 +70,18 @@ def corners(mesh: dmesh.Mesh, facets: Entities) -> Array:
     """
     d = mesh.topology.dim
     if not len(facets):  # dolfinx divides by their number
-        return np.empty((0, d, d))
-    found = dmesh.entities_to_geometry(mesh, d - 1, facets)
-    return mesh.geometry.x[found][:, :, :d]
+        return np.empty((0, d), dtype=np.int32)
+    return dmesh.entities_to_geometry(mesh, d - 1, facets)
+
+
+def corners(mesh: dmesh.Mesh, facets: Entities) -> Array:
+    """The vertices of facets, m, (f, d, d): by facet, vertex and coordinate.
+
+    Args:
+        mesh: of simplices.
+        facets: local facets.
+    """
+    return mesh.geometry.x[nodes_of(mesh, facets)][:, :, : mesh.topology.dim]
 
 
 def with_cells(mesh: dmesh.Mesh, facets: Entities) -> tuple[Entities, Entities, Integers]:
@@ -105,8 +118,8 @@ def turns(mesh: dmesh.Mesh, facets: Entities) -> Array:
     """
     points, d = corners(mesh, facets), mesh.topology.dim
     normals = units(across(points[:, 1:] - points[:, :1]))
-    nodes = dmesh.entities_to_geometry(mesh, d - 1, facets).ravel() if len(facets) else np.empty(0, np.int32)
-    _, first, vertex, count = np.unique(nodes, return_index=True, return_inverse=True, return_counts=True)
+    nodes = nodes_of(mesh, facets)
+    _, first, vertex, count = np.unique(nodes.ravel(), return_index=True, return_inverse=True, return_counts=True)
     own = np.repeat(normals, d, axis=0)
     along = np.abs(np.sum(own * own[first][vertex], axis=1))
     least = np.ones(len(first))

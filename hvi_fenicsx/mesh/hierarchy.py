@@ -23,7 +23,7 @@ from ..runtime.mpi import agree, total
 from ..typing import Entities, Integers, Mask
 from . import facets as cell_facets
 from . import refinement
-from .coarsening import coarsen
+from .coarsening import coarsen, connected
 from .domain import DEFAULT, Domain, MeshThresholds
 from .joined import PlacedBody, coarsening
 from .transfer import Transfer
@@ -113,21 +113,6 @@ def labels(domain: Domain) -> tuple[Integers, int]:
     shared = np.unique(np.column_stack([mine[apart], theirs[apart]]), axis=0)
     whole, merged = connected(np.vstack(agree(comm, shared)), sum(counts))
     return merged[local], whole
-
-
-def connected(pairs: Integers, size: int) -> tuple[int, Integers]:
-    """How many pieces a graph has, and the piece of each of its nodes.
-
-    Args:
-        pairs: nodes that are connected, (k, 2).
-        size: number of nodes.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(size, size))
-    count, found = connected_components(graph, directed=False)
-    return int(count), found
 
 
 def of_owners(index_map: Any, values: Integers) -> Integers:

@@ -24,7 +24,7 @@ from ..runtime.mpi import agree
 from ..typing import Array, Entities, Integers
 from . import facets as cell_facets
 from . import nodes
-from .domain import Coarsening, Domain
+from .domain import Coarsening, Domain, box
 from .transfer import Rows, Transfer, barycentric_weights, renumbered
 
 
@@ -312,7 +312,7 @@ def check_places(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> None:
         InputError: on all ranks alike, with a place.
     """
     own = [body.points[body.cells] for body in bodies]
-    boxes = [_box(comm, corners) for corners in own]
+    boxes = [box(comm, corners.reshape(-1, corners.shape[2])) for corners in own]
     for i, j in permutations(range(len(bodies)), 2):
         low, high = np.maximum(boxes[i][0], boxes[j][0]), np.minimum(boxes[i][1], boxes[j][1])
         if np.all(high - low > ROUNDING * np.max(boxes[i][1] - boxes[i][0])):
@@ -324,13 +324,6 @@ def check_places(comm: MPI.Comm, bodies: Sequence[PlacedBody]) -> None:
                     f'domain.{bodies[i].name}: at {spot(at[0])} it overlaps the body "{bodies[j].name}"; '
                     "move one of them by its origin, or make them one body"
                 )
-
-
-def _box(comm: MPI.Comm, corners: Array) -> tuple[Array, Array]:
-    """The box of a body. Collective."""
-    flat = corners.reshape(-1, corners.shape[2])
-    every = agree(comm, (flat.min(axis=0, initial=np.inf), flat.max(axis=0, initial=-np.inf)))
-    return np.min([low for low, _ in every], axis=0), np.max([high for _, high in every], axis=0)
 
 
 def _inside(points: Array, cells: Array) -> Array:

@@ -35,7 +35,7 @@ _SPLIT: dict[int, tuple[tuple[int, ...], ...]] = {
 """The parts of a simplex with so many corners by its nodes: corners, then midpoints of edges in the order of basix."""
 _CORNERS = {3: 2, 6: 3, 10: 4}
 """The number of corners of a simplex by that of its nodes."""
-_KINDS = {2: basix.CellType.interval, 3: basix.CellType.triangle, 4: basix.CellType.tetrahedron}
+KINDS = {2: basix.CellType.interval, 3: basix.CellType.triangle, 4: basix.CellType.tetrahedron}
 """Simplices by their number of corners."""
 
 
@@ -204,13 +204,30 @@ def joined(found: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return np.stack([grouped[:, row, column] for row, column in first], axis=1)
 
 
+def to_barycentric(local: Array) -> Array:
+    """Reference coordinates of points in a simplex (..., k) as barycentric ones, (..., k+1)."""
+    return np.concatenate([1.0 - local.sum(axis=-1, keepdims=True), local], axis=-1)
+
+
+def quadrature(corners: int, degree: int) -> tuple[Array, Array]:
+    """Barycentric points (q, corners) and weights (q,), whose sum is 1, of a simplex.
+
+    Args:
+        corners: how many it has.
+        degree: of the polynomials that are integrated exactly.
+    """
+    made: tuple[Any, Any] = basix.make_quadrature(KINDS[corners], degree)
+    points, weights = made
+    return to_barycentric(points), weights / weights.sum()
+
+
 def edges(corners: int) -> list[list[int]]:
     """The edges of a simplex by its corners, in the order of their midpoints.
 
     Args:
         corners: how many it has.
     """
-    found: list[list[int]] = basix.topology(_KINDS[corners])[1]
+    found: list[list[int]] = basix.topology(KINDS[corners])[1]
     return found
 
 
@@ -221,4 +238,4 @@ def lagrange(corners: int, degree: int) -> basix.finite_element.FiniteElement:
         corners: how many it has.
         degree: of the element.
     """
-    return basix.create_element(basix.ElementFamily.P, _KINDS[corners], degree, basix.LagrangeVariant.gll_warped)
+    return basix.create_element(basix.ElementFamily.P, KINDS[corners], degree, basix.LagrangeVariant.gll_warped)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import basix
 import numpy as np
 from dolfinx import mesh as dmesh
 
@@ -18,7 +17,8 @@ from ..geometry import ROUNDING, Curve
 from ..typing import Array, Entities
 from . import curved
 from .domain import DEFAULT, Domain, check_affordable
-from .facets import cell_facets
+from .facets import cell_facets, nodes_of
+from .nodes import edges as edges_of
 from .transfer import Halves, ParentCellTransfer
 
 _SKEWED = np.eye(3) + ROUNDING * np.sqrt([[2, 3, 5], [3, 7, 11], [5, 11, 13]])
@@ -83,7 +83,7 @@ def marked(domain: Domain, cells: Entities) -> Refinement:
 
 def _edge_lengths(mesh: dmesh.Mesh, cells: Entities) -> Array:
     """Lengths of the cells' edges, in the order of the topology, m, (cells, 3 or 6)."""
-    ends = np.array(basix.topology(basix.CellType[mesh.topology.cell_name()])[1])
+    ends = np.array(edges_of(mesh.topology.dim + 1))
     corners = cell_corners(mesh)[cells]
     return np.linalg.norm(corners[:, ends[:, 0]] - corners[:, ends[:, 1]], axis=2)
 
@@ -129,23 +129,14 @@ def _halves(coarse: dmesh.Mesh, fine: dmesh.Mesh, parents: Entities) -> Halves:
 
 def _sides(domain: Domain, fine: dmesh.Mesh, parents: Entities, halves: Halves) -> dict[str, Entities]:
     """The children's facets that lie in those of the domain's sides."""
-    coarse, own = cell_facets(domain.mesh), cell_facets(fine)
+    own = cell_facets(fine)
     # A child's facet i lies in its parent's facet j when none of its vertices (all but i) has a part in vertex j.
     cell, i, j = np.nonzero(halves.sum(axis=1, dtype=np.int8)[:, None, :] == halves)
-    parent_facet = coarse[parents[cell], j]
-    found = {}
-    for name, facets in domain.sides.items():
-        mask = np.zeros(coarse.max(initial=-1) + 1, dtype=bool)
-        mask[facets] = True
-        found[name] = np.unique(own[cell, i][mask[parent_facet]]).astype(np.int32)
-    return found
+    inside, around = own[cell, i], cell_facets(domain.mesh)[parents[cell], j]
+    return {n: np.unique(inside[np.isin(around, facets)]).astype(np.int32) for n, facets in domain.sides.items()}
 
 
 def _bend(mesh: dmesh.Mesh, sides: Mapping[str, Entities], curves: Mapping[str, Curve]) -> None:
     """Move the vertices of curved sides onto their curves, on all ranks that have them. Collective."""
-    d, on = mesh.geometry.dim, {}
-    for name in curves:
-        on[name] = np.empty(0, dtype=np.int32)
-        if len(sides[name]):  # dolfinx divides by their number
-            on[name] = np.unique(dmesh.entities_to_geometry(mesh, mesh.topology.dim - 1, sides[name]))
+    d, on = mesh.geometry.dim, {name: np.unique(nodes_of(mesh, sides[name])) for name in curves}
     mesh.geometry.x[:, :d] = curved.onto_curves(mesh.geometry.index_map(), mesh.geometry.x[:, :d], on, curves)

@@ -19,7 +19,7 @@ from scipy import sparse
 
 from .. import compat
 from ..geometry import ROUNDING
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, largest
 from ..typing import Array, Entities, Integers
 from . import nodes
 
@@ -177,7 +177,7 @@ def _gathered(points: Array, space: fem.FunctionSpace) -> tuple[Array, Integers]
     corners = nodes.points(space)[blocks][:, :, :d]
     numbers = space.dofmap.index_map.local_to_global(blocks.ravel()).reshape(blocks.shape)
     low, high = corners.min(axis=1), corners.max(axis=1)
-    widest = max(agree(comm, float(np.max(high - low, initial=0.0))))
+    widest = largest(comm, float(np.max(high - low, initial=0.0)))
     boxes = agree(comm, (points[:, :d].min(axis=0, initial=np.inf), points[:, :d].max(axis=0, initial=-np.inf)))
     wanted = [np.all((high >= a - widest) & (low <= b + widest), axis=1) for a, b in boxes]
     found = comm.alltoall([(corners[w], numbers[w]) for w in wanted])
@@ -229,4 +229,4 @@ def barycentric_weights(corners: Array, points: Array) -> Array:
     gram = np.einsum("...id,...jd->...ij", edges, edges)
     right = np.einsum("...id,...d->...i", edges, points - first)
     rest = np.einsum("...ij,...j->...i", np.linalg.inv(gram), right)
-    return np.concatenate([1.0 - rest.sum(axis=-1, keepdims=True), rest], axis=-1)
+    return nodes.to_barycentric(rest)

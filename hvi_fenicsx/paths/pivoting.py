@@ -53,10 +53,12 @@ class StraightBranch(StraightEquations):
         """
         self.heading, self.trend, self.unstable, self._leader = 1, 0, 0, 0
         self._stiffest, self._live = magnitude(self._stiffness.diagonal), magnitude(self.rate)
-        random, z = np.random.default_rng(0), self.z
-        # coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them
-        self.small = random.uniform(0.5, 1.5, len(z)) * np.where(z == self.points.high, -1.0, 1.0)
-        self._lag = random.uniform(0.5, 1.5, len(z))
+        random, z, sizes = np.random.default_rng(0), self.z, np.abs(self.values.x)
+        # coordinates of the order ε, inside the segments where a coordinate is at an end; q follows from them; they go
+        # by the size of displacements, whatever the numbers of points and however the scene is mirrored
+        place = np.argsort(np.argsort(sizes, kind="stable"))
+        self.small = random.uniform(0.5, 1.5, len(z))[place] * np.where(z == self.points.high, -1.0, 1.0)
+        self._lag = random.uniform(0.5, 1.5, len(z))[place]
         self._behind = self._lag.copy()
         self._begin(FACTOR, inverse)
 

@@ -18,8 +18,8 @@ from ..errors import InputError
 from ..formula import SpatialValue
 from ..mesh.boundary_part import BoundaryPart, InterfaceSides
 from ..mesh.domain import Domain
-from ..runtime.mpi import agree, largest
-from ..typing import Entities, together
+from ..runtime.mpi import largest
+from ..typing import Entities, magnitude, together
 from . import constraints, domain_forms, elastic_operator, interfaces, law_term, scaling
 from .contact_surface import Surface
 from .domain_forms import DomainForms
@@ -93,12 +93,12 @@ def _largest(domain: Domain, facets: Mapping[str, Entities], placed: Placed, for
         points = domain.mesh.geometry.x[np.unique(dolfinx.mesh.entities_to_geometry(domain.mesh, dimension, found))]
         if placed[1].drive is Drive.LOAD or placed[1].place is Place.BODY:  # integrated, not taken at vertices
             points = np.vstack([points, dolfinx.mesh.compute_midpoints(domain.mesh, dimension, found)])
-    values = np.abs(formula.at(points))
-    largest = max(agree(domain.mesh.comm, float(np.max(np.where(np.isnan(values), np.inf, values), initial=0.0))))
-    if largest == np.inf:
+    values = formula.at(points)
+    most = largest(domain.mesh.comm, magnitude(np.where(np.isnan(values), np.inf, values)))
+    if most == np.inf:
         text = f"the formula {formula.source!r} is not finite everywhere there"
         raise InputError(f"{scaling.place(placed)}: {text}")
-    return largest
+    return most
 
 
 def _entities(domain: Domain, facets: Mapping[str, Entities], placed: Placed) -> tuple[int, Entities]:

@@ -95,7 +95,7 @@ def make_surface(
     normal = nodal(ufl.inner(ufl.FacetNormal(space.mesh), test) * measure)[blocks]
     ones = ufl.as_vector([fem.Constant(space.mesh, 1.0)] * normal.shape[1])
     weights: Array = nodal(ufl.inner(ones, test) * measure)[blocks, 0] / area
-    if space.mesh.comm.allreduce(bool(np.any(weights == 0.0)), op=MPI.LOR):
+    if any(agree(space.mesh.comm, bool(np.any(weights == 0.0)))):
         raise InputError(f"boundary.{part}: contact and laws act on the body's surface, and facets of it lie inside")
     lies_on, places = quadric_of(side), coefficients_of(space, vertices)[blocks, : normal.shape[1]]
     normals = turned(normal if lies_on is None else lies_on.slopes(places), normal)
@@ -158,7 +158,7 @@ def decide(
     Raises:
         InputError: on all ranks alike: two directions at a vertex are neither orthogonal nor equal.
     """
-    own = {name: _own(s, stated.get(name), length, DEFAULT.rounding) for name, s in surfaces.items()}
+    own = {name: _own(s, stated.get(name), length) for name, s in surfaces.items()}
     flat = {name for name, surface in own.items() if largest_turn(comm, surface) <= DEFAULT.same}
     normals = _at_shared_vertices(comm, own, flat, fixed)
     return {name: replace(s, normals=normals[name], tangents=tangents(normals[name])) for name, s in own.items()}
@@ -176,15 +176,15 @@ def largest_turn(comm: MPI.Comm, surface: Surface) -> float:
     return largest(comm, float(np.max(np.linalg.norm(away, axis=1), initial=0.0)))
 
 
-def _own(surface: Surface, stated: Array | None, length: float, rounding: float) -> Surface:
+def _own(surface: Surface, stated: Array | None, length: float) -> Surface:
     """The surface with its normals as if it were alone, without rounding."""
     if stated is None:
         # size of the coordinates over that of the facets: so much larger is rounding of normals
         facet = length * surface.weights ** (1 / (surface.normals.shape[1] - 1))
         refinement = (length + np.linalg.norm(surface.points, axis=1)) / facet
-        normals = without_rounding(surface.normals, rounding * refinement[:, None])
+        normals = without_rounding(surface.normals, DEFAULT.rounding * refinement[:, None])
     else:
-        normals = without_rounding(stated, rounding)
+        normals = without_rounding(stated, DEFAULT.rounding)
     return replace(surface, normals=normals, measured=normals)
 
 

@@ -20,7 +20,7 @@ from ..mesh import curved, nodes
 from ..mesh import facets as facet_sizes
 from ..mesh.boundary_part import BoundaryPart
 from ..mesh.domain import Domain
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, total
 from ..typing import Array, Entities
 from . import facets as boundary_facets
 from .facets import Facets
@@ -102,7 +102,7 @@ class DomainForms:
 
     @functools.cached_property
     def _cell_tags(self) -> tuple[Any, dict[str, tuple[int, ...]]]:
-        return _tags(self.mesh, self.dimension, dict(self.domain.regions))
+        return _tags(self.mesh, self.dimension, self.domain.regions)
 
     def cells(self, *regions: str | None) -> Any:
         """dx/L^d over what the regions share; None where that is nothing."""
@@ -162,7 +162,7 @@ class ScaledMeasure:
         return self.factor * integrand * self.measure
 
 
-def _tags(mesh: Any, dimension: int, parts: dict[str, Any]) -> tuple[Any, dict[str, tuple[int, ...]]]:
+def _tags(mesh: Any, dimension: int, parts: Mapping[str, Any]) -> tuple[Any, dict[str, tuple[int, ...]]]:
     """Mesh tags in which overlapping parts are unions of atoms. The atoms' numbers agree on all ranks. Collective."""
     entities = np.unique(np.concatenate(list(parts.values())))
     within = np.column_stack([np.isin(entities, parts[name]) for name in sorted(parts)])
@@ -223,7 +223,7 @@ def of_points(comm: Any, points: Array, weights: Array) -> SideMoments:
         points: m, (p, d).
         weights: the area that each of them stands for, m² (m in 2D), (p,).
     """
-    area = float(comm.allreduce(float(weights.sum())))
+    area = total(comm, float(weights.sum()))
     centroid = comm.allreduce(weights @ points) / area
     r = points - centroid
     return SideMoments(area=area, centroid=centroid, second=comm.allreduce(np.einsum("p,pi,pj->ij", weights, r, r)))

@@ -103,9 +103,7 @@ def _bounded(problem: Problem, part: str | None) -> int:
 def _prescribed(problem: Problem, part: str | None, contribution: Contribution) -> int:
     """Displacements that its conditions take away, over all ranks. Collective."""
     own = [one.dofs for one in problem.prescribed if one.part == part] if contribution.conditions else []
-    size = problem.space.dofmap.index_map.size_local * problem.space.dofmap.index_map_bs
-    dofs = np.unique(together(own))
-    return int(problem.comm.allreduce(int(np.count_nonzero(dofs < size))))
+    return int(problem.comm.allreduce(np.intersect1d(together(own), problem.fixed_here).size))
 
 
 def _output(effect: Effect, contribution: Contribution) -> Iterator[str]:

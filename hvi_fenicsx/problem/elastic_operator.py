@@ -22,6 +22,7 @@ from ..mesh import nodes
 from ..mesh.domain import SharedObjects
 from ..rigid import RigidBody, rigid_fields
 from ..runtime import forms
+from ..runtime.mpi import total
 from ..typing import Array, Entities
 from . import spaces
 from .scaling import DEFAULT, Scales
@@ -42,7 +43,7 @@ def feels_no_rigid_motion(form: Any, space: fem.FunctionSpace) -> bool:
 
     def force(values: Array) -> float:
         field.x.array[:] = values.ravel()
-        return float(np.sqrt(space.mesh.comm.allreduce(float(np.sum(nodal_values(compiled) ** 2)))))
+        return float(np.sqrt(total(space.mesh.comm, float(np.sum(nodal_values(compiled) ** 2)))))
 
     motions = rigid_fields(points, RigidBody(dimension=d, centre=np.zeros(3)))
     sizes = [force(motions[:, k]) for k in range(motions.shape[1])]
@@ -289,7 +290,7 @@ class Bulk:
         """
         q = ufl.TestFunction(self._constants)
         pairs = zip(self.dilatations, pressures, strict=True)
-        return np.sum([nodal(part.across(p, p * q))[:, 0] / part.averaged.modulus for part, p in pairs], axis=0)
+        return np.sum([nodal(part.tested(p * (p * q)))[:, 0] / part.averaged.modulus for part, p in pairs], axis=0)
 
     def dilatation_error(self, u: fem.Function) -> Array:
         """2μ/d ∫ (div u - p/λ)² of every owned cell, p being the averaged volumetric stress, (cells,). Collective.

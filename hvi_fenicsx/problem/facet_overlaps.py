@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..geometry import across, tangents
+from ..mesh.nodes import to_barycentric
 from ..typing import Array, Integers, Mask
 from . import facets
 from .facets import Facets, places, slopes
@@ -131,7 +132,7 @@ def overlaps(first: Facets, second: Facets) -> Overlaps:
         sides=(first, second),
         first=number[on],
         second=other[on],
-        on_first=np.concatenate([1.0 - pieces.sum(axis=2, keepdims=True), pieces], axis=2),
+        on_first=to_barycentric(pieces),
         on_second=_barycentric(outlines[outline], pieces) @ of_second[outline],
         covered=_covered(pieces, number[on], len(first.nodes), DEFAULT.rim if first.curved else DEFAULT.uncovered),
     )
@@ -170,7 +171,7 @@ def _sizes(simplices: Array) -> Array:
 def _barycentric(simplices: Array, points: Array) -> Array:
     """Barycentric coordinates of points (n, q, d-1) in simplices (n, d, d-1), (n, q, d)."""
     found = (points - simplices[:, :1]) @ np.linalg.inv(simplices[:, 1:] - simplices[:, :1])
-    return np.concatenate([1.0 - found.sum(axis=2, keepdims=True), found], axis=2)
+    return to_barycentric(found)
 
 
 def _clipped(outlines: Array) -> tuple[Array, Integers]:
@@ -186,7 +187,7 @@ def _clipped(outlines: Array) -> tuple[Array, Integers]:
 
 def _clipped_triangles(triangles: Array) -> tuple[Array, Integers]:
     """The same in the plane: polygons, cut into triangles about their first corners."""
-    ring = np.concatenate([1.0 - triangles.sum(axis=2, keepdims=True), triangles], axis=2)
+    ring = to_barycentric(triangles)
     sizes: Integers = np.full(len(ring), 3, dtype=np.int64)
     for side in range(3):
         ring, sizes = _cut(ring, sizes, side)
@@ -272,8 +273,7 @@ def _curved_outlines(first: Facets, number: Integers, local: Array, of_second: A
     d = first.dimension
     at = places(np.repeat(local, d, axis=0), of_second.reshape(-1, d))
     own = first.own_coordinates(number, first.points[number])[:, :, :-1]
-    straight = np.column_stack([1.0 - at.sum(axis=1), at])
-    found = _coordinates_of(np.repeat(own, d, axis=0), at, straight).reshape(-1, d, d)
+    found = _coordinates_of(np.repeat(own, d, axis=0), at, to_barycentric(at)).reshape(-1, d, d)
     if d == 3:
         found[_rim_edges(first)[number][:, None] & (np.abs(found) < DEFAULT.rim)] = 0.0
     return found[:, :, 1:] / found.sum(axis=2, keepdims=True)

@@ -10,9 +10,7 @@ import functools
 import math
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
-from typing import Any
 
-import basix
 import numpy as np
 from dolfinx import fem
 
@@ -25,8 +23,6 @@ from . import spaces
 
 _DEGREE = 12
 """Degree of the quadrature on curved facets: areas are square roots of polynomials, nearly constant ones."""
-_KINDS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
-"""Facets by dimension."""
 
 
 def is_curved(space: fem.FunctionSpace) -> bool:
@@ -42,8 +38,7 @@ def rule(dimension: int, degree: int, *, curved: bool) -> tuple[Array, Array]:
         degree: of the functions of which products are integrated exactly on straight facets.
         curved: whether facets are curved.
     """
-    made: tuple[Any, Any] = basix.make_quadrature(_KINDS[dimension], _DEGREE if curved else 2 * degree)
-    return np.column_stack([1.0 - made[0].sum(axis=1), made[0]]), made[1] / made[1].sum()
+    return nodes.quadrature(dimension, _DEGREE if curved else 2 * degree)
 
 
 def samples(space: fem.FunctionSpace, facets: Entities) -> tuple[Array, Array, Array]:
@@ -138,7 +133,7 @@ class Facets:
     @property
     def edges(self) -> list[list[int]]:
         """The ends of the edges whose midpoints are nodes, in their order."""
-        return basix.topology(_KINDS[self.dimension])[1] if self.degree == 2 else []
+        return nodes.edges(self.dimension) if self.degree == 2 else []
 
     def _middles(self, share: float, weight: float) -> Array:
         """The nodes, of each midpoint that less a share of both ends, times a weight, (f, n, d)."""

@@ -170,7 +170,7 @@ def _interface(
     others = [taken, pair.second.nodes.ravel()]
     others += [side.nodes.ravel() for n, p in pairs.items() if n != name for side in (p.first, p.second)]
     busy, covered = np.isin(pair.first.nodes, np.concatenate(others)), pair.covered(overlaps)
-    kept = ~np.isin(pair.first.nodes, pair.first.nodes[~covered | busy])
+    kept = np.isin(pair.first.nodes, pair.first.nodes[covered]) & ~busy
     check_carried(pair, overlaps, kept, covered & busy)
     size = context.space.dofmap.index_map.size_global
     rows = dual_basis.relative_rows(pair.first, pair.second, overlaps, kept, size)

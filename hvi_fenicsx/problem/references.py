@@ -203,13 +203,12 @@ def elastic_forces(problem: Problem, u: fem.Function) -> Array:
     return bulk.force(strains) + bulk.foundation_force(travel)
 
 
-def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) -> fem.Function:
+def strained(problem: Problem, u: fem.Function) -> fem.Function:
     """A displacement, of each body that travels far without the rigid motion that is nearest to it. Collective.
 
     Args:
         problem: the bodies.
         u: nondimensional, ghosts updated.
-        travel: of a body, relative to its deformation, beyond which it is far.
 
     Returns:
         u itself where none is.
@@ -220,7 +219,7 @@ def strained(problem: Problem, u: fem.Function, travel: float = DEFAULT.travel) 
         with np.errstate(invalid="ignore"):  # what is no number is told by who judges it
             share = comm.allreduce(motions[:, :owned] @ values[:owned])
             rest = values - share @ motions
-        if share @ share > travel**2 * comm.allreduce(rest[:owned] @ rest[:owned]):
+        if share @ share > DEFAULT.travel**2 * comm.allreduce(rest[:owned] @ rest[:owned]):
             found = u.copy() if found is u else found
             found.x.array[places] = rest
     return found

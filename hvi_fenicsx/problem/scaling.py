@@ -89,18 +89,18 @@ def choose(
     found = [(placed[1].stress_scale(evaluate(placed), sizes), placed) for placed in effects]
     driving = [pair for pair in found if pair[0] != 0.0]
     for stress, placed in driving:
-        _check(Scales(sizes.length, stress, sizes.modulus, dimension), placed, DEFAULT.largest_scale, 0.0)
+        _check(Scales(sizes.length, stress, sizes.modulus, dimension), placed, 0.0)
     if not driving:
         return Scales(sizes.length, 1.0, sizes.modulus, dimension)
     active = [pair for pair in driving if pair[1][1].drive is not Drive.RESISTANCE]
     stress, placed = max(active or driving, key=lambda pair: pair[0])
     chosen = Scales(sizes.length, stress, sizes.modulus, dimension)
-    _check(chosen, placed, DEFAULT.largest_scale, 1.0 / DEFAULT.largest_scale)
+    _check(chosen, placed, 1.0 / DEFAULT.largest_scale)
     return chosen
 
 
-def _check(scales: Scales, placed: Placed, most: float, least: float) -> None:
-    if not all(least <= scale <= most for scale in (scales.stress, scales.displacement)):
+def _check(scales: Scales, placed: Placed, least: float) -> None:
+    if not all(least <= scale <= DEFAULT.largest_scale for scale in (scales.stress, scales.displacement)):
         raise InputError(
             f"{place(placed)}: makes stresses of about {scales.stress:.0e} N/m² and displacements of about "
             f"{scales.displacement:.0e} m, which cannot be computed with; give all numbers, the modulus of "

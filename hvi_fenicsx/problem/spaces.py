@@ -258,33 +258,30 @@ class Dilatation:
         _, vector = self.averaged.divergence.arguments()
         return ufl.replace(self.averaged.divergence, {vector: v})
 
-    def work(self, pressure: fem.Function, v: Any) -> Any:
+    def work(self, pressure: Any, v: Any) -> Any:
         """The UFL form ∫ p div v dx over the region.
 
         Args:
-            pressure: p, a P1 field.
+            pressure: p, a P1 field or a scalar test function.
             v: a displacement or test function of any space.
         """
         scalar, vector = self.averaged.divergence.arguments()
         return ufl.replace(self.averaged.divergence, {scalar: pressure, vector: v})
 
-    def across(self, pressure: fem.Function, q: Any) -> Any:
-        """The UFL form ∫ p q dx over the region: what p adds to σ_33, tested with q.
+    def tested(self, q: Any) -> Any:
+        """The UFL form ∫ q dx over the region.
 
         Args:
-            pressure: p, a P1 field.
-            q: a scalar test function.
+            q: a scalar test function, perhaps times a field: what that adds to σ_33.
         """
         (scalar,) = self.averaged.volume.arguments()
-        return ufl.replace(self.averaged.volume, {scalar: pressure * q})
+        return ufl.replace(self.averaged.volume, {scalar: q})
 
     def error(self, u: fem.Function) -> Array:
         """2μ/d ∫ (div u - p/λ)² of every owned cell, (cells,). Collective."""
         pressure, mesh = self.pressure(u), u.function_space.mesh
         q, d = ufl.TestFunction(fem.functionspace(mesh, ("Discontinuous Lagrange", 0))), mesh.geometry.dim
-        scalar, vector = self.averaged.divergence.arguments()
-        volume = nodal(ufl.replace(self.averaged.volume, {scalar: q}))
-        dilated = nodal(ufl.replace(self.averaged.divergence, {scalar: q, vector: u}))
+        volume, dilated = nodal(self.tested(q)), nodal(self.work(q, u))
         mean = np.divide(dilated, volume, out=np.zeros_like(dilated), where=volume > 0)
         at = mean - pressure.x.array[pressure.function_space.dofmap.list[: len(mean)]] / self.averaged.modulus
         squares = np.sum(at**2, axis=1) + np.sum(at, axis=1) ** 2

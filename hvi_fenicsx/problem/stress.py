@@ -147,4 +147,4 @@ def _across(bulk: Bulk, u: fem.Function, pressures: Sequence[fem.Function], q: A
     if bulk.scales.dimension == 3:
         return []
     found = [ufl.replace(form, dict(zip(form.arguments(), (q, u), strict=False))) for form in bulk.across]
-    return found + [part.across(p, q) for part, p in zip(bulk.dilatations, pressures, strict=True)]
+    return found + [part.tested(p * q) for part, p in zip(bulk.dilatations, pressures, strict=True)]

@@ -57,9 +57,16 @@ def write(folder: Path) -> Path:
     """
     result = reader.read(folder)
     kind, words = _headline(result)
-    contact = [{"name": part.name, "rows": list(contact_rows(part))} for part in result.parts]
-    given = {"contact": contact, "forces": _forces(result), "reproduce": _reproduce(result)}
-    return _page("run.html.j2", folder, result.title, result=result, verdict={"kind": kind, "words": words}, **given)
+    return _page(
+        "run.html.j2",
+        folder,
+        result.title,
+        result=result,
+        verdict={"kind": kind, "words": words},
+        contact=[{"name": part.name, "rows": list(contact_rows(part))} for part in result.parts],
+        forces=_forces(result),
+        reproduce=_reproduce(result),
+    )
 
 
 def write_path(folder: Path) -> Path:
@@ -163,7 +170,7 @@ def _named(table: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
 
 def _pictures(folder: Path) -> dict[str, dict[str, Any]]:
     """The finished pictures of a folder, which lie in the page itself, each with its size: the page does not jump."""
-    found = (path for path in folder.glob("*.png") if not path.name.startswith("."))
+    found = folder.glob("[!.]*.png")
     ordered = sorted(found, key=lambda p: (_FIRST.index(p.stem) if p.stem in _FIRST else len(_FIRST), p.stem))
     return {path.stem: _picture(path) for path in ordered}
 
@@ -246,12 +253,13 @@ def _reproduce(result: Result) -> dict[str, Any]:
     """
     summary, text = result.summary, (result.folder / "scene.toml").read_text(encoding="utf-8")
     mesh = (result.scene.get("domain") or {}).get("file")
-    files = [str(file) for file in (*([mesh] if mesh else []), *(result.scene.get("plugins") or ()))]
+    files = [str(file) for file in (mesh, *(result.scene.get("plugins") or ())) if file]
     for file in files:
         text = text.replace(f'"{file}"', f'"{PurePath(file).name}"')
     ranks, petsc = int(summary.get("ranks") or 1), str(summary.get("petsc") or "")
     again = ["hvi", "run", "scene.toml", "--out", "again"]
-    again += [*(("--np", str(ranks)) if ranks > 1 else ()), *((f"--petsc={petsc}",) if petsc else ())]
+    again += ["--np", str(ranks)] if ranks > 1 else []
+    again += [f"--petsc={petsc}"] if petsc else []
     given = shlex.split(str(summary.get("command") or ""))
     return {
         "given": shlex.join(_ABSOLUTE.sub(r"\g<before>\g<name>", word) for word in given),

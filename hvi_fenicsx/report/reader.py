@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..geometry import ROUNDING
+from ..geometry import ROUNDING, in_space
 from ..typing import Array, Mask, magnitude
 from . import solution_arrays
 from .body_mesh import BodyMesh, body_mesh
@@ -21,7 +21,7 @@ from .solution_arrays import CONTACT_LENGTHS, CONTACT_STRESSES, ContactPart, Res
 
 Row = Mapping[str, str]
 """The cells of a row by the names of the columns."""
-_WORDS = frozenset({"event", "part"})
+_WORDS = ("event", "part")
 """Columns of a path that are no numbers."""
 
 
@@ -157,7 +157,7 @@ class Result(Finished):
     def obstacle(self, part: str) -> Array | None:
         """The unit vector (3,) from a part towards its flat obstacle, if it has one."""
         known = [role["obstacle"] for role in self.roles(part) if role["obstacle"]]
-        return np.pad(np.array(known[0], dtype=np.float64), (0, 3 - len(known[0]))) if known else None
+        return in_space(np.array(known[:1], dtype=np.float64))[0] if known else None
 
     def resists(self, part: str, *directions: str) -> bool:
         """Whether a law acts on a displacement of a part.
@@ -298,8 +298,9 @@ def read_path(folder: Path) -> PathResult:
 
     def made(words: dict[str, Any]) -> PathResult:
         rows = _rows(folder / "path.csv")
-        numbers = [name for name in rows[0] if name not in _WORDS]
-        columns = {name: np.array([float(row[name] or "nan") for row in rows]) for name in numbers}
+        columns = {
+            name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0] if name not in _WORDS
+        }
         return PathResult(**words, columns=columns, events=[row["event"] for row in rows])
 
     return _read(folder, made)

@@ -32,8 +32,6 @@ from ..errors import HviError
 from ..runtime import writing
 from ..typing import Array, Integers, Mask
 
-Singles = npt.NDArray[np.float32]
-"""Real numbers in single precision, whose seven digits are enough for a stress."""
 FILE = "solution.npz"
 _OF_PART = {"vertices": "vertices", "facets": "facets", "weights": "weight", "normals": "normal", "drops": "drops"}
 """The attributes of a part that are no columns, by their keys."""
@@ -215,7 +213,7 @@ class SolutionArrays:
         degree: of the elements, 1 or 2.
         displacement: m, (n, d); None where nothing was solved.
         escape_mode: the rigid motion along which the body escapes, (n, d); None where it does not.
-        von_mises: the von Mises stress of each cell, N/m², (c,); None where it was not computed.
+        von_mises: the von Mises stress of each cell, N/m², (c,), to seven digits; None where it was not computed.
         sides: the facets of each boundary table of the scene, (k, d), each row ascending.
         regions: the cells of each region of the mesh, (k,).
         loads: by boundary table.
@@ -227,7 +225,7 @@ class SolutionArrays:
     degree: int = 1
     displacement: Array | None = None
     escape_mode: Array | None = None
-    von_mises: Singles | None = None
+    von_mises: npt.NDArray[np.float32] | None = None
     sides: Mapping[str, Integers] = field(default_factory=dict)
     regions: Mapping[str, Integers] = field(default_factory=dict)
     loads: Mapping[str, LoadArrays] = field(default_factory=dict)

@@ -25,7 +25,7 @@ from ..problem.problem import Problem
 from ..problem.stress import stress_of_parts, von_mises
 from ..report.reader import Result
 from ..report.solution_arrays import ContactPart, LoadArrays, SolutionArrays
-from ..runtime.mpi import agree, joined
+from ..runtime.mpi import joined
 from ..typing import Array, Entities, Integers
 from ..workflow import Solution
 from .summary import summary
@@ -68,11 +68,15 @@ def solution_arrays(solution: Solution, stress: Array | None = None) -> Solution
         fields["escape_mode"] = problem.bodies.motion(problem.points / problem.scales.length, mode)[:owned]
     if stress is not None:
         fields["von_mises"] = von_mises(stress).astype(np.float32)
-    found: dict[str, Any] = {name: joined(comm, values) for name, values in fields.items()}
-    found |= {"sides": {name: _facets(problem, facets) for name, facets in problem.part_facets.items()}}
-    found |= {"regions": _regions(problem), "loads": _loads(problem)}
-    found["parts"] = contact_parts(problem, () if solution.examination is None else solution.examination.states)
-    return None if comm.rank else SolutionArrays(degree=nodes.degree(problem.space), **found)
+    arrays = SolutionArrays(
+        **{name: joined(comm, values) for name, values in fields.items()},
+        degree=nodes.degree(problem.space),
+        sides={name: _facets(problem, facets) for name, facets in problem.part_facets.items()},
+        regions=_regions(problem),
+        loads=_loads(problem),
+        parts=contact_parts(problem, () if solution.examination is None else solution.examination.states),
+    )
+    return None if comm.rank else arrays
 
 
 def _facets(problem: Problem, facets: Entities) -> Integers:
@@ -84,11 +88,10 @@ def _facets(problem: Problem, facets: Entities) -> Integers:
 def _regions(problem: Problem) -> dict[str, Integers]:
     """The cells of each region, by their numbers among the cells of all ranks; on rank 0. Collective."""
     comm, parts = problem.comm, nodes.parts_of_cell(problem.space)
-    owned = problem.domain.mesh.topology.index_map(problem.dimension).size_local
-    first = int(sum(agree(comm, owned)[: comm.rank]))
+    known = problem.domain.mesh.topology.index_map(problem.dimension)
 
     def numbers(cells: Entities) -> npt.NDArray[Any]:
-        own = first + cells[cells < owned].astype(np.int64)
+        own = known.local_to_global(cells[cells < known.size_local])
         return joined(comm, (own[:, None] * parts + np.arange(parts)).ravel())
 
     return {name: numbers(cells) for name, cells in sorted(problem.domain.regions.items())}
@@ -126,12 +129,14 @@ def contact_parts(problem: Problem, states: Sequence[ContactState]) -> dict[str,
         problem: what was solved.
         states: of the parts.
     """
-    comm, scales, found = problem.comm, problem.scales, {}
+    comm, found = problem.comm, {}
     for state in sorted(states, key=lambda state: state.surface.part):
-        columns = {name: joined(comm, values) for name, values in columns_of(problem, state).items()}
-        others = {name: joined(comm, values) for name, values in _others(problem, state).items()}
+        columns, others = (
+            {name: joined(comm, values) for name, values in own.items()}
+            for own in (columns_of(problem, state), _others(problem, state))
+        )
         if comm.rank == 0:
-            found[state.surface.part] = _sorted(state.surface.part, columns, others, scales.dimension)
+            found[state.surface.part] = _sorted(state.surface.part, columns, others, problem.dimension)
     return found
 
 

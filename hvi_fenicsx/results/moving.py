@@ -17,7 +17,6 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..runtime import manifest
-from ..runtime.manifest import MARKS
 
 _PROGRAM = "hvi_fenicsx"
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
@@ -116,7 +115,7 @@ def move_in(work: Path, target: Path) -> tuple[str, ...]:
     new, old = manifest.read(work), manifest.read(target)
     assert new is not None
     owned = old.owned if old else frozenset()
-    mark = MARKS[new.kind]
+    mark = manifest.MARKS[new.kind]
     coming = {name for name in new.files if os.path.lexists(work / name)}
     for name in [*(owned & coming & {mark}), *(owned - new.owned)]:
         _remove(target / name)

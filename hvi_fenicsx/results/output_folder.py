@@ -26,8 +26,6 @@ from ..model import Model, dump_scene
 from ..runtime import manifest, processes, writing
 from ..runtime.manifest import MARKS, Kind, Manifest
 from ..runtime.mpi import on_root
-from ..runtime.processes import SIGNALS
-from ..runtime.writing import Journal, Record
 from .moving import FolderLock, discard, is_folder, make_room, move_in
 
 _WAYS = "--resume goes on with what is unfinished, --force (force=True in Python) replaces it, --out DIR writes beside"
@@ -124,8 +122,9 @@ class ResultFolder:
         found = manifest.read(self.target)
         if found is None:
             if any(self.target.iterdir()):
-                text = f"holds other files, and no {manifest.NAME} of this program; choose a new or empty folder"
-                raise self._refused(text)
+                raise self._refused(
+                    f"holds other files, and no {manifest.NAME} of this program; choose a new or empty folder"
+                )
             return
         if found.kind != self.kind and not (self._force and MARKS[found.kind] == MARKS[self.kind]):
             raise self._refused(f"holds a {found.kind}, not a {self.kind}; --force replaces all but a study")
@@ -151,7 +150,7 @@ class ResultFolder:
         if isinstance(error, NotWrittenError):
             raise self._in_words(error) from None
 
-    def begin_journal(self, name: str, identity: Sequence[str]) -> list[Record]:
+    def begin_journal(self, name: str, identity: Sequence[str]) -> list[writing.Record]:
         """What a journal in the target has, if it is gone on with. Rank 0 only.
 
         Args:
@@ -162,7 +161,7 @@ class ResultFolder:
             InputError: what is there cannot be gone on with.
         """
         self._journal, file = name, self.target / name
-        self.journal = Journal(file, identity, self.work, anew=not self._resume, begin=self._announce)
+        self.journal = writing.Journal(file, identity, self.work, anew=not self._resume, begin=self._announce)
         return self.journal.records
 
     def _announce(self) -> None:
@@ -196,7 +195,7 @@ class ResultFolder:
             files = {**manifest.listed(self.work), **dict.fromkeys(stay)}
             manifest.write(self.work, Manifest(kind=self.kind, files=files, inputs=inputs))
         try:
-            with processes.held(SIGNALS):
+            with processes.held(processes.SIGNALS):
                 kept = move_in(self.work, self.target)
                 self._staged = False
         except (OSError, NotWrittenError) as error:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..problem import effect_summary
 from ..runtime import cost, manifest
-from ..runtime.mpi import agree, largest
+from ..runtime.mpi import largest
 from ..workflow import Preparation, Solution
 
 
@@ -18,7 +18,6 @@ def summary(solution: Solution) -> dict[str, Any]:
     """All of ``summary.json``; null for infinite or absent. Collective; the same on all ranks."""
     problem, solved, examination = solution.problem, solution.solve_result, solution.examination
     wanted, forces, borne = solution.scene.solver, solution.forces, solution.last_borne
-    counts = ("newton", "linear", "branch")
     return plain(
         {
             **common(solution, solution.dofs),
@@ -28,9 +27,7 @@ def summary(solution: Solution) -> dict[str, Any]:
             "method": solved.method if solved else None,
             "smoothing": wanted.smoothing,
             "epsilon": solution.epsilon,
-            "iterations": {key: int(getattr(solved.counts, key)) for key in counts} | {"levels": solved.levels}
-            if solved
-            else None,
+            "iterations": asdict(solved.counts) | {"levels": solved.levels} if solved else None,
             "energy": examination.energy * problem.scales.energy if examination else None,
             "contact": _contact(solution),
             "mode_mixity": _mode_mixity(solution),
@@ -83,10 +80,10 @@ def _estimate(solution: Solution) -> dict[str, float | bool] | None:
 def _contact(solution: Solution) -> dict[str, Any] | None:
     """Over all parts with contact: vertices, those closed, largest gap and penetration (m), resultant (N/m or N)."""
     examination, scales = solution.examination, solution.problem.scales
-    states = [s for s in examination.states if s.bounds is not None] if examination else []
     comm = solution.problem.comm
-    if not sum(agree(comm, len(solution.problem.bounds))) or examination is None:
+    if examination is None or not comm.allreduce(len(solution.problem.bounds)):
         return None
+    states = [s for s in examination.states if s.bounds is not None]
     gaps = scales.displacement * np.concatenate([np.empty(0), *(s.gap[np.isfinite(s.gap)] for s in states)])
     resultant = comm.allreduce(sum(s.resultant for s in states))
     return {

@@ -25,7 +25,6 @@ _CELLS = {2: 3, 3: 5, 4: 10}
 """VTK's numbers of line, triangle and tetrahedron, by their vertices."""
 _BLOCK = 1 << 18
 """Bytes that are compressed at a time; in VTK's own blocks, an eighth of these, it takes a quarter longer."""
-_NAMES = {np.dtype(np.float32): "Float32", np.dtype(np.float64): "Float64"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,8 +113,8 @@ def _vtk_grid(grid: Grid) -> Any:
     count, corners = grid.cells.shape
     made = WrapDataObject(vtkUnstructuredGrid())
     made.SetPoints(np.ascontiguousarray(grid.points))
-    kinds, sizes = np.full(count, _CELLS[corners], dtype=np.ubyte), np.full((count, 1), corners)
-    made.SetCells(kinds, np.arange(count) * (corners + 1), np.hstack([sizes, grid.cells]).astype(np.int64).ravel())
+    kinds, counted = np.full(count, _CELLS[corners], dtype=np.ubyte), np.insert(grid.cells, 0, corners, axis=1)
+    made.SetCells(kinds, np.arange(count) * (corners + 1), counted.astype(np.int64).ravel())
     for fields, data in ((grid.at_points, made.PointData), (grid.in_cells, made.CellData)):
         for name, values in fields.items():
             data.append(np.ascontiguousarray(values), name)
@@ -155,7 +154,7 @@ def _write_xml(path: Path, root: Xml.Element) -> None:
 def _declared(fields: Mapping[str, npt.NDArray[Any]], units: Mapping[str, str]) -> Iterator[Xml.Element]:
     for name, values in fields.items():
         components = values.shape[1] if values.ndim > 1 else 1
-        kind = _NAMES[values.dtype]
+        kind = values.dtype.name.title()
         declared = Xml.Element("PDataArray", type=kind, Name=name, NumberOfComponents=str(components))
         Xml.SubElement(declared, "InformationKey", name="UNITS_LABEL", location="vtkDataArray").text = units.get(
             name, "1"

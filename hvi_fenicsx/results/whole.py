@@ -23,8 +23,7 @@ from ..problem.contact_surface import own_nodes
 from ..problem.stress import stress_of_parts
 from ..problem.vectors import NodalForces
 from ..report import page, solution_arrays
-from ..report.page import PictureProcess
-from ..report.solution_arrays import ContactPart, ReportError, SolutionArrays
+from ..report.solution_arrays import CONTACT_LENGTHS, CONTACT_STRESSES, ContactPart, ReportError, SolutionArrays
 from ..runtime import writing
 from ..runtime.cost import Timer
 from ..runtime.mpi import joined, on_root
@@ -34,12 +33,9 @@ from . import gathering, vtk_fields
 from .output_folder import ResultFolder
 from .summary import summary
 
-CONTACT = (
-    *("part", "s", "x", "y", "z", "u_n", "u_t1", "u_t2", "gap", "sigma_n", "friction_t1", "friction_t2"),
-    *("contact", "branch_t", "branch_n"),
-)
-"""The columns of ``contact.csv``."""
 _WHOLE = ("contact", "branch_t", "branch_n")
+CONTACT = ("part", "s", "x", "y", "z", *CONTACT_LENGTHS, *CONTACT_STRESSES, *_WHOLE)
+"""The columns of ``contact.csv``."""
 _QUANTITIES = ("", "u_", "traction_", "reaction_")
 """The vertex, its displacement, the part's load there, what the part's support, contact and laws put on the body."""
 BOUNDARY = ("part", *(quantity + axis for quantity in _QUANTITIES for axis in "xyz"))
@@ -56,7 +52,7 @@ def write_whole(
     *,
     pictures: bool = True,
     report: bool = True,
-    process: PictureProcess | None = None,
+    process: page.PictureProcess | None = None,
 ) -> dict[str, Any]:
     """Write all files but ``run.log``. Collective.
 

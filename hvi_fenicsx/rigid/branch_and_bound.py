@@ -19,7 +19,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..errors import SolverError
-from ..typing import Array
+from ..typing import Array, magnitude
 from .cutting_planes import CuttingPlanes, Functional, Minimum, Polytope, ball, faces, idle
 from .motions import DEFAULT
 
@@ -82,7 +82,7 @@ class ConcavePart:
         """
         slip = self.basis @ y
         shares = np.linalg.solve(edges, slip)
-        inner = np.flatnonzero(shares > DEFAULT.dropped * np.abs(shares).max(initial=0.0))
+        inner = np.flatnonzero(shares > DEFAULT.dropped * magnitude(shares))
         if depth % 3 == 2 or len(inner) < 2:
             cosines = edges.T @ edges
             inner = np.array(np.unravel_index(np.argmin(cosines), cosines.shape))

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..laws import Length
-from ..typing import Array
+from ..typing import Array, magnitude
 from .motions import DEFAULT
 
 _DIGITS = 12
@@ -240,7 +240,7 @@ class CuttingPlanes:
         if self.frame.shape[1] == 1:
             return self._solve_line(f, region)
         c, a_ub, b_ub = self._rows(f, region, active)
-        size = float(np.abs(c).max()) or 1.0
+        size = magnitude(c) or 1.0
         k, a_eq = len(f.linear), np.zeros((len(region.equal), len(c)))
         a_eq[:, :k] = region.equal
         bounds = [(None, None)] * k + [(0.0, None)] * (len(c) - k)
@@ -257,7 +257,7 @@ class CuttingPlanes:
         Heights are in units of the part's largest cut: HiGHS' tolerances are absolute, and parts may be small.
         """
         parts = [p for p, b in enumerate(f.factors) if b > 0.0]
-        sizes = [float(np.abs(self.cuts[p]).max()) or 1.0 for p in parts]
+        sizes = [magnitude(self.cuts[p]) or 1.0 for p in parts]
         cuts = [self.cuts[p] / size for p, size in zip(parts, sizes, strict=True)]
         sides, counts = np.vstack([f.cone[active], *cuts]), [len(rows) for rows in cuts]
         k, (q, width) = len(f.linear), region.upper.shape
@@ -272,7 +272,7 @@ class CuttingPlanes:
         reach = 1.0 / np.abs(self.frame).max()
         found = []
         for y in np.array([[reach], [-reach], [0.0]]):
-            off = max(np.abs(region.equal @ y - region.value).max(initial=0.0), (f.cone @ y).max(initial=0.0))
+            off = max(magnitude(region.equal @ y - region.value), (f.cone @ y).max(initial=0.0))
             if off <= DEFAULT.exact:
                 value = self.evaluate(f, y)
                 found.append(Minimum(value, y, value))

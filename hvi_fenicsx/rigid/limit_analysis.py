@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from ..errors import InputError, SolverError
 from ..runtime.mpi import on_root
-from ..typing import Array
+from ..typing import Array, magnitude
 from .branch_and_bound import GlobalProgramme
 from .cutting_planes import Functional, Minimum, Polytope, ball, cross
 from .motions import DEFAULT, Mode, mode_of, modes, natural_basis, null_space, triangle
@@ -69,7 +69,7 @@ class Analysis:
         """Orthonormal basis (k, q) of the motions that nothing holds and on which the load does no work."""
         loose = self.loose
         work = self.work @ loose
-        return loose if np.abs(work).max(initial=0.0) <= self.tie else loose @ null_space(work[None])
+        return loose if magnitude(work) <= self.tie else loose @ null_space(work[None])
 
     @property
     def gives_way(self) -> bool:
@@ -218,7 +218,7 @@ class Analysis:
     @cached_property
     def _law_scale(self) -> float:
         """The largest resistance to a unit motion, roughly."""
-        linear = max(float(np.abs(f.linear).max(initial=0.0)) for f in (self.growth, self.peak))
+        linear = max(magnitude(f.linear) for f in (self.growth, self.peak))
         return linear + max(float(np.abs(f.factors) @ self.reduced.areas) for f in (self.growth, self.peak))
 
     def _resisted(self) -> list[Array]:

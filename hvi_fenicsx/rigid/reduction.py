@@ -21,16 +21,15 @@ from .cutting_planes import Functional, SlipIntegral, merged
 from .motions import DEFAULT, JoinedBodies, Mode, kernel
 
 
-def _linear_part(law: Directional) -> float:
-    """The a of law(s) = a·s + b|s|; one side infinite: the sign of s is known, and the law linear."""
+def _parts(law: Directional) -> tuple[float, float]:
+    """The a and b of law(s) = a·s + b|s|; b is negative if the function is not convex.
+
+    One side infinite: the sign of s is known, and the law linear.
+    """
     if np.isinf(law.plus) or np.isinf(law.minus):
-        return 0.0 if law.plus == law.minus else (-law.minus if np.isinf(law.plus) else law.plus)
-    return 0.5 * (law.plus - law.minus)
-
-
-def _even_part(law: Directional) -> float:
-    """The b of law(s) = a·s + b|s|; negative if the function is not convex."""
-    return 0.0 if np.isinf(law.plus) or np.isinf(law.minus) else 0.5 * (law.plus + law.minus)
+        known = -law.minus if np.isinf(law.plus) else law.plus
+        return (0.0 if law.plus == law.minus else known), 0.0
+    return 0.5 * (law.plus - law.minus), 0.5 * (law.plus + law.minus)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,8 +162,8 @@ class ReducedProblem(ReducedRows):
             for sign, side in ((1.0, law.plus), (-1.0, law.minus))
             if np.isinf(side) and not self.slips[p].length.opens
         ]
-        linear = np.array([_linear_part(law) for law in laws]) @ self.moments
-        return Functional(linear, np.array([_even_part(law) for law in laws]), np.vstack([self.contact, *blocked]))
+        linear, even = np.array([_parts(law) for law in laws]).reshape(-1, 2).T
+        return Functional(linear @ self.moments, even, np.vstack([self.contact, *blocked]))
 
     def slip_rows(self, p: int) -> Array:
         """The slips of part p as rows (q, k) of length one; vanishing ones are left out."""

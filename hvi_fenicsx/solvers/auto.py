@@ -3,9 +3,9 @@
 Loading decides which equilibrium is meant, or that there is none (:func:`follow`). Where its path is not
 followed, or ends before the whole load, few other starts are tried. Each buys cases that nothing else solves (the hard
 cases, docs/hard-cases.md): the pieces of the slips at rest, and every bond broken, where the iteration slides off in
-the metastable state; and, where laws push, Newton's method through narrowing smoothings, which finds equilibria that
-are no minimum of the energy (:mod:`.continuation`). Where an equilibrium may not exist, the search ends after a number
-of Newton steps.
+the metastable state; where laws push, Newton's method through narrowing smoothings, which finds equilibria that are no
+minimum of the energy (:mod:`.continuation`); and where Γc has few unknowns, what a search of all equilibria has found
+after a number of boxes. Where an equilibrium may not exist, the search ends after a number of Newton steps.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
+from ..equilibrium_search.condensed_form import scalar_problem
+from ..equilibrium_search.search import few_boxes
+from ..equilibrium_search.thresholds import LIMITS
 from ..errors import InputError, SolverError
 from ..laws import Superpotential
 from ..laws.smoothing import SmoothedLaw
@@ -28,6 +31,7 @@ from ..reduced.condensation import Condensation
 from ..reduced.condensed_problem import CondensedProblem
 from ..runtime.mpi import on_root_asking
 from ..system.system import System
+from ..typing import Array
 from . import continuation
 from .branch import BranchIteration
 from .method import Borne, SolveContext, SolveResult
@@ -161,6 +165,9 @@ class Auto(BranchIteration):
         growths = [term.exact.growth for term in self.system.terms]
         if any(min(growth.minus, growth.plus) < 0.0 for growth in growths):
             yield from self._attempt(continuation.solve, self.context)
+        self._limit.next_start()
+        for x in searched(self.system, self._interrupted):
+            yield from self._attempt(self._iteration().solve, x)
 
     def _on_other_pieces(self, most: int | None) -> Iterator[SolveResult]:
         """On the pieces of the slips at rest, and with every bond broken, to either side."""
@@ -247,13 +254,10 @@ def follow(system: System, interrupted: Callable[[], bool]) -> tuple[PETSc.Vec |
         it ends before, the last state that is borne, None where that is not known.
     """
     laws = [term.exact for term in system.terms]
-    most = system.thresholds.vertex_unknowns if _are_straight(laws) else _most_on_curve(system)
-    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > most:
-        return None
-    system.jacobian.clear()
-    try:
-        condensation = Condensation(system)
-    except (InputError, SolverError):
+    condensation = _condensed(
+        system, system.thresholds.vertex_unknowns if _are_straight(laws) else _most_on_curve(system)
+    )
+    if condensation is None:
         return None
     found = _on_first_rank(system, condensation.problem, interrupted)
     start = None
@@ -263,6 +267,37 @@ def follow(system: System, interrupted: Callable[[], bool]) -> tuple[PETSc.Vec |
         start = x, found.reason, borne
     condensation.free()
     return start
+
+
+def searched(system: System, interrupted: Callable[[], bool]) -> list[PETSc.Vec]:
+    """Equilibria that a search of few boxes finds, minimisers first; none where Γc has many unknowns. Collective.
+
+    Args:
+        system: the system; its tangent and what it holds are taken away.
+        interrupted: whether to stop (collective).
+    """
+    condensation = _condensed(system, LIMITS.few_unknowns)
+    if condensation is None:
+        return []
+
+    def found(ask: Callable[[], bool]) -> list[Array]:
+        with suppress(np.linalg.LinAlgError, InputError):
+            return [point.x for point in few_boxes(scalar_problem(condensation.problem), ask)]
+        return []
+
+    starts = [condensation.expand(x) for x in on_root_asking(system.comm, found, interrupted)]
+    condensation.free()
+    return starts
+
+
+def _condensed(system: System, most: int) -> Condensation | None:
+    """The system on the unknowns of Γc's vertices; None where they are more, or it cannot be had. Collective."""
+    if system.comm.allreduce(len(system.jacobian.rows.dofs)) > most:
+        return None
+    system.jacobian.clear()
+    with suppress(InputError, SolverError):
+        return Condensation(system)
+    return None
 
 
 def _on_first_rank(system: System, problem: CondensedProblem, interrupted: Callable[[], bool]) -> FullLoad | None:

@@ -180,8 +180,10 @@ class Measurement:
     def _has(self, point: Point) -> bool:
         """Whether a point is finished, or was given up after no less time than now. Rank 0 only."""
         record = self.known.get(point.name)
-        given_up = None if record is None else record.get("limit")
-        return record is not None and (given_up is None or (self.limit is not None and given_up >= self.limit))
+        if record is None:
+            return False
+        given_up = record.get("limit")
+        return given_up is None or (self.limit is not None and given_up >= self.limit)
 
     def _keep(self, record: Record) -> None:
         """Rank 0 only."""

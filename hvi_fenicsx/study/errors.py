@@ -77,9 +77,9 @@ class ReferenceSolution:
 
     def __init__(self, arrays: SolutionArrays, stiffness: sparse.csr_array, joints: Collection[str] = ()) -> None:
         self._arrays, self._stiffness, self._joints = arrays, stiffness, joints
-        self._ends = nodes.ends_of(cells_of(arrays), len(arrays.points), arrays.points.shape[1])
-        self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[arrays.points.shape[1]]
         parts, d = arrays.parts.values(), arrays.points.shape[1]
+        self._ends = nodes.ends_of(cells_of(arrays), len(arrays.points), d)
+        self._share = 0.0 if arrays.degree == 1 else spaces.EDGE_SHARE[d]
         self._weights = np.concatenate([np.empty(0), *(part.weight for part in parts)])
         self._normals = np.vstack([np.empty((0, d)), *(part.normal for part in parts)])
         self._bounded = any("contact" in part.columns for part in parts)

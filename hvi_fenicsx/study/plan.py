@@ -18,7 +18,6 @@ from ..model import Model, SolverTable, dump_scene
 from ..report.units import quantity
 from ..schema import unknown
 from ..solvers import method
-from ..solvers.method import checked
 
 EXACT = "exact"
 """The width of a smoothing that is none."""
@@ -195,7 +194,7 @@ def _solved(scene: Model, pairs: Mapping[str, str]) -> Model:
         values = {**dict.fromkeys(_WIDTHS), **values, "smoothing": kind}
     found = scene.with_solver(**values)
     solver = found.solver
-    checked(solver)
+    method.checked(solver)
     for law in found.laws() if solver.smoothing else ():
         smoothing.create(str(solver.smoothing), law, epsilon=solver.epsilon, epsilon_absolute=solver.epsilon_absolute)
     return found
@@ -207,9 +206,15 @@ def _refined(scene: Model, factor: Fraction) -> Model | None:
     return None if shape is None else scene.changed(domain=shape)
 
 
+def _with_coarser(scene: Model) -> list[Model]:
+    """A scene, and it on the next two coarser meshes that there are."""
+    coarser = [_refined(scene, Fraction(1, n)) for n in (2, 4)]
+    return [scene, *(one for one in coarser if one is not None)]
+
+
 def _default_meshes(scene: Model) -> list[DomainShape]:
     """The scene's mesh, two coarser ones, and a finer one if twice finer ones are affordable as references."""
-    found = [scene] + [s for n in (2, 4) if (s := _refined(scene, Fraction(1, n))) is not None]
+    found = _with_coarser(scene)
     finer, reference = (_refined(scene, Fraction(n)) for n in (2, 4))
     if finer is not None and reference is not None and _affordable(reference):
         found.append(finer)
@@ -222,8 +227,7 @@ def _reference(finest: Point, degree: int) -> tuple[Point, ...]:
     fine = _refined(scene, Fraction(4))
     if fine is None or not _affordable(fine):
         fine = _refined(scene, Fraction(2)) or scene
-    coarser = [_refined(fine, Fraction(1, n)) for n in (2, 4)]
-    return tuple(Point(one) for one in (fine, *coarser) if one is not None)
+    return tuple(map(Point, _with_coarser(fine)))
 
 
 def _affordable(scene: Model) -> bool:

@@ -246,8 +246,12 @@ class Study:
         return found
 
 
-_ITERATIONS = ("newton", "linear", "levels", "branch")
-_NESTED = {"phases": PHASES, "iterations": _ITERATIONS, "errors": NORMS, "epsilon_part": NORMS}
+_NESTED = {
+    "phases": PHASES,
+    "iterations": ("newton", "linear", "levels", "branch"),
+    "errors": NORMS,
+    "epsilon_part": NORMS,
+}
 """The columns that a column of a row becomes."""
 
 
@@ -280,9 +284,9 @@ def _row(point: Point, known: Mapping[str, Any], certain: Mapping[str, Certainty
     """A point's setting, and its record."""
     solver, errors = point.scene.solver, known.get("errors") or {}
     found = [(q, error, certain[q].error) for q, error in errors.items()]
-    row = Row(point=point.name, mesh=point.mesh, degree=point.degree, h=None)
     of_solver = ("smoothing", "epsilon", "epsilon_absolute", "method", "linear_solver", "tolerance")
-    vars(row).update({name: getattr(solver, name) for name in of_solver})
+    own = {name: getattr(solver, name) for name in of_solver}
+    row = Row(point=point.name, mesh=point.mesh, degree=point.degree, h=None, **own)
     vars(row).update({key: value for key, value in known.items() if key != "limit"})
     row.h, row.epsilon = point.scene.domain.width() or known.get("h"), known["epsilon"] or solver.epsilon
     row.errors, row.epsilon_part = known.get("errors"), known.get("epsilon_part")

@@ -17,6 +17,7 @@ from petsc4py import PETSc
 
 from ..laws import ConvexPart, Superpotential
 from ..problem.law_term import LawTerm
+from ..runtime.mpi import total
 from ..typing import Array, Integers
 from .jacobian import Jacobian
 from .thresholds import DEFAULT
@@ -126,7 +127,7 @@ class Equations:
         u, local = x.array_r, 0.0
         for term, model in zip(self._terms, models, strict=True):
             local += float(np.sum(term.energy_weights * model.value(term.argument(u))))
-        return self.base.energy + self._elastic_change(x) + float(self._comm.allreduce(local))
+        return self.base.energy + self._elastic_change(x) + total(self._comm, local)
 
     def _elastic_change(self, x: PETSc.Vec) -> float:
         """½ a(u, u) - <g, u> less its value at the base: small changes keep their digits. Collective."""

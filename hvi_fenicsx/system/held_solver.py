@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..mesh import nodes
 from ..runtime.cost import Timer
+from ..runtime.mpi import agree
 from ..typing import Array, Entities
 from .factorisation import Direct, FactorForm, form_of
 from .multigrid import Algebraic, Levels, MixedMultigrid, Multigrid
@@ -72,7 +72,7 @@ class HeldPreconditioner:
         """Make it suit these held unknowns (local, owned, sorted). Collective."""
         self._wanted = held.copy()
         self.system.jacobian.hold(held if self.settings.kind in ("mg", "mixed") else held[:0])
-        if self.system.comm.allreduce(self._fits(held), op=MPI.LAND):
+        if all(agree(self.system.comm, self._fits(held))):
             return
         self._held = None  # what fails to be made fits nothing
         with self._timer("setup"):

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array, vstack
 
 from ..errors import Interrupted, SolverError
-from ..runtime.mpi import agree
+from ..runtime.mpi import agree, largest
 from ..typing import Array, Integers, magnitude
 from .factorisation import FactorForm, Factorisation
 from .petsc_options import CHOLESKY
@@ -131,12 +131,12 @@ class Interior:
 
     def is_held(self) -> bool:
         """Whether the kept unknowns hold the body, other than by rounding (inverse iteration). Collective."""
-        largest = max(agree(self._comm, magnitude(self._system.jacobian.matrix.getDiagonal().array_r)))
+        size = largest(self._comm, magnitude(self._system.jacobian.matrix.getDiagonal().array_r))
         load = np.cos(np.arange(self._system.load.local_size) + 1.0)[:, None]
         for _ in range(2):
             load = self.solve(load)[: len(load)]
-            growth = max(agree(self._comm, magnitude(load))) * largest
-            load *= largest / (growth or 1.0)
+            growth = largest(self._comm, magnitude(load)) * size
+            load *= size / (growth or 1.0)
         return bool(growth * self._system.thresholds.rounding < 1.0)
 
     def gathered(self, values: Array) -> Array:

@@ -17,7 +17,7 @@ from ..problem.contact_surface import Surface
 from ..problem.law_term import LawTerm
 from ..problem.problem import Bounds, Problem
 from ..runtime.mpi import agree
-from ..typing import Array, Entities, Integers
+from ..typing import Array, Entities, Integers, magnitude, together
 from .thresholds import DEFAULT
 
 
@@ -48,8 +48,7 @@ class ContactRows:
 
     def __init__(self, matrix: PETSc.Mat, surfaces: Sequence[Surface]) -> None:
         d = matrix.getBlockSize()
-        blocks = np.concatenate([np.empty(0, np.int64), *(s.blocks for s in surfaces)])
-        self.vertices: Integers = np.unique(blocks).astype(np.int64)
+        self.vertices: Integers = np.unique(together(s.blocks for s in surfaces)).astype(np.int64)
         self.dofs: Integers = (self.vertices[:, None] * d + np.arange(d)).ravel()
         self.bulk = rows_of(matrix, self.dofs)
         self._product = self.bulk.createVecLeft()
@@ -210,7 +209,7 @@ class Jacobian:
     def drift(self, rates: Sequence[Array]) -> float:
         """Largest nodal stiffness (an elastic one is about 1) by which this rank's K differs from ``rates``."""
         changes = (
-            float(np.max(np.abs(new - old) * term.weights[:, None, None], initial=0.0))
+            magnitude((new - old) * term.weights[:, None, None])
             for term, new, old in zip(self._terms, self._rates, rates, strict=True)
         )
         return max(changes, default=0.0)

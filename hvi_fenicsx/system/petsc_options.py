@@ -20,6 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..errors import InputError
+from ..runtime.mpi import agree
 
 CHOLESKY: Mapping[str, object] = {
     "pc_type": "cholesky",
@@ -122,7 +123,7 @@ def check_read(options: Mapping[str, Any], comm: MPI.Comm) -> None:
         InputError: on all ranks alike.
     """
     for name in options:
-        if not comm.allreduce(_is_read(f"{prefix()}{name}"), op=MPI.LOR):
+        if not any(agree(comm, _is_read(f"{prefix()}{name}"))):
             raise InputError(
                 f"petsc: no solver of this run has read {name}: it is misspelt, or of a solver that is not in use here "
                 '("ksp_view": None shows those that are)'

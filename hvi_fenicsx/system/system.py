@@ -192,7 +192,7 @@ class System:
         """The displacement field of unknowns x: Cartesian, in units of u0, ghosts updated. Collective."""
         u = fem.Function(self.problem.space, name="displacement")
         coupling = self.problem.coupling
-        u.x.array[: x.local_size] = product(x, self.rotation, None if coupling is None else coupling.matrix)
+        u.x.array[: x.local_size] = product(x, self.rotation, coupling and coupling.matrix)
         u.x.scatter_forward()
         return u
 

@@ -325,11 +325,7 @@ def processor_time_of_children() -> float:
 
 
 @pytest.mark.parametrize(
-    "form",
-    [
-        ["--petsc", "-hvi_snes_view -hvi_pc_type lu"],
-        pytest.param(["--petsc=-hvi_snes_view -hvi_pc_type lu"], marks=pytest.mark.long),
-    ],
+    "form", [["--petsc", "-hvi_snes_view -hvi_pc_type lu"], ["--petsc=-hvi_snes_view -hvi_pc_type lu"]]
 )
 def test_petsc_options_reach_the_solver(form: list[str], scene: Path, tmp_path: Path) -> None:
     done = process("run", scene, "--out", tmp_path / "r", "--no-pictures", *form)

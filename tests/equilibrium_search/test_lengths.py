@@ -14,7 +14,6 @@ from scipy.optimize import minimize
 import hvi_fenicsx as hvi
 from hvi_fenicsx.equilibrium_search import relaxation
 from hvi_fenicsx.equilibrium_search.arcs import FREE, chain
-from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.equilibrium_search.lengths import Lengths
 from hvi_fenicsx.equilibrium_search.lowest import LowestSearch
 from hvi_fenicsx.equilibrium_search.relaxation import Relaxation
@@ -23,6 +22,7 @@ from hvi_fenicsx.equilibrium_search.stationarity import Kind
 from hvi_fenicsx.equilibrium_search.thresholds import LIMITS
 from hvi_fenicsx.laws.traction_graph import TractionGraph
 from hvi_fenicsx.workflow import prepare
+from hvi_fenicsx.workflow.equilibria import Equilibria
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]

@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from hvi_fenicsx import read_tables
 from hvi_fenicsx.certify import certificate
-from hvi_fenicsx.equilibrium_search.bodies import Equilibria
 from hvi_fenicsx.equilibrium_search.enumeration import Enumeration
 from hvi_fenicsx.load_paths.following import PathRun
 from hvi_fenicsx.model import PathTable
+from hvi_fenicsx.workflow import solve
+from hvi_fenicsx.workflow.equilibria import Equilibria
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
@@ -114,6 +116,26 @@ def test_a_search_with_a_proof_and_auto_agree_on_whether_there_is_an_equilibrium
     assert hard_equilibria.number_of_equilibria(case, TABLE.data) == expected
     record = hard_run.attempt(case, TABLE.data, "auto", TABLE.data["limit"])
     assert record["outcome"] == ("certified" if expected else "no_equilibrium")
+
+
+def test_a_run_finds_an_equilibrium_that_neither_loading_nor_another_start_leads_to() -> None:
+    """Two of the eight that a search proves are minimisers."""
+    friction = {"law": "graph", "points": [[0, 1.6e6], [9.4e-5, 6.2e5], [1.4e-4, 0]]}
+    glue = {"law": "graph", "points": [[0, 5.4e6], [1.6e-4, 2.1e6], [2.4e-4, 0]], "one_sided": True}
+    table = {
+        "domain": {"shape": "rectangle", "size": [1.9, 1.1], "cells": [2, 1]},
+        "material": {"model": "plane_strain", "youngs_modulus": 5.5e9, "poisson_ratio": 0.21},
+        "boundary": {
+            "floor": {"on": "bottom", "friction": friction, "adhesion": glue, "contact": {"gap": 0.0}},
+            "pull": {"on": "right", "traction": [-1e6, 1.1e4]},
+            "top": {"on": "top", "traction": [-3.4e5, 4.5e5]},
+        },
+    }
+    found = solve(read_tables(table), MPI.COMM_SELF)
+    assert found.examination is not None
+    assert found.converged
+    energy = found.examination.energy * found.problem.scales.energy
+    assert min(abs(energy - least) for least in (-505.9196, -484.8706)) < 1e-3
 
 
 def test_algebraic_multigrid_that_takes_too_long_goes_over_to_the_direct_solver() -> None:

@@ -159,13 +159,10 @@ class PlaneShape(DomainShape):
     def coarsest(self) -> Self:
         """The shape with its mesh size doubled as long as the cells stay small beside its extent."""
         largest = math.sqrt(self.box_area()) * LARGEST_PART
-        return self._finer(Fraction(1, 2 ** max(0, math.floor(math.log2(largest / self.mesh_size)))))
+        return self.refined(Fraction(1, 2 ** max(0, math.floor(math.log2(largest / self.mesh_size)))))
 
-    def refined(self, factor: Fraction) -> Self | None:
+    def refined(self, factor: Fraction) -> Self:
         """The shape with its mesh sizes divided by ``factor``."""
-        return self._finer(factor)
-
-    def _finer(self, factor: Fraction) -> Self:
         sizes = {name: getattr(self, name) for name in self.mesh_sizes}
         return self.changed(**{name: float(h / factor) for name, h in sizes.items() if h is not None})
 
@@ -177,7 +174,7 @@ class PlaneShape(DomainShape):
             size = 0.0
         if not (math.isfinite(size) and size > 0.0):
             raise InputError(f"{text!r} is no mesh size in m, like {self.mesh_size}")
-        return self._finer(Fraction(self.mesh_size) / Fraction(size))
+        return self.refined(Fraction(self.mesh_size) / Fraction(size))
 
     def mesh_text(self, length: Callable[[float], str]) -> str:
         """The mesh size."""

@@ -27,6 +27,10 @@ Refinements = Annotated[int, Field(ge=0, le=MOST_REFINEMENTS)]
 class FixedMesh(DomainShape):
     """A given mesh, refined so often. A subclass has the field ``refinements``."""
 
+    dimension = None
+    normals = None
+    regions = None
+
     if TYPE_CHECKING:  # each shape says where it stands among its keys
         refinements: int
 
@@ -73,10 +77,6 @@ class MeshFile(FixedMesh):
     It may hold a mesh or describe one, and do nothing else: see docs/tutorial.md.
     """
 
-    dimension = None
-    normals = None
-    regions = None
-
     shape: Literal["file"] = "file"
     """the mesh comes from a gmsh file"""
     file: ExistingFile
@@ -107,9 +107,6 @@ class GivenMesh(FixedMesh):
     """A mesh that exists already. It is not registered: ``shape`` is "given mesh"."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
-    dimension = None
-    normals = None
-    regions = None
 
     given: Any = Field(exclude=True)
     """the domain, unrefined"""

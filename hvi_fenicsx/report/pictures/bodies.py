@@ -58,8 +58,8 @@ def scene(result: Result) -> Figure:
     contacts, held = [side for side, roles in found if touches(roles)], held_sides(result)
     canvas = _canvas(result, "the scene", {side.part: side.facets for side in contacts})
     canvas.show(rest, areas)
-    names = [side.part for side in contacts], [support.side.part for support in held]
-    canvas.sides(rest, [side for side, _ in found], *names)
+    parts = [side.part for side in contacts]
+    canvas.sides(rest, [side for side, _ in found], parts, [support.side.part for support in held])
     canvas.supports(rest, held)
     canvas.loads(rest, loaded_sides(result))
     if len(areas) <= MOST_NAMED:
@@ -119,10 +119,8 @@ def stress_end(body: BodyMesh) -> float:
     """Where the scale of the stress ends, N/m²: at the largest one, or where a share ``PEAK`` of the body has more."""
     values = body.von_mises
     assert values is not None
-    end, largest = (
-        float(np.quantile(values, 1.0 - PEAK, weights=body.volumes, method="inverted_cdf")),
-        float(values.max()),
-    )
+    end = float(np.quantile(values, 1.0 - PEAK, weights=body.volumes, method="inverted_cdf"))
+    largest = float(values.max())
     return end if 0.0 < 1.25 * end < largest else largest
 
 

@@ -223,7 +223,7 @@ class Canvas:
             places = _places(label, np.array(box.size) / dots / 2)
             boxes = [box.translated(*(place * dots)) for place in places]
             best = int(np.argmin([one.count_overlaps(taken) for one in boxes]))
-            text.xyann = (float(places[best][0]), float(places[best][1]))
+            text.set(position=places[best])
             assert text.arrow_patch is not None
             text.arrow_patch.set_visible(best > 0)
             taken.append(boxes[best])

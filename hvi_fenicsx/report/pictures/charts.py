@@ -48,8 +48,7 @@ def path_chart(result: PathResult) -> Figure:
     u, force = result.along(result.driven)
     pulled, name = bool(np.any(force)), "N" if len(result.axes) == 3 else "N/m"
     load = force if pulled else result.columns["factor"]
-    units = [unit_for(magnitude(u), "m")]
-    units += [unit_for(magnitude(load), name) if pulled else Unit(1.0, "")]
+    units = [unit_for(magnitude(u), "m"), unit_for(magnitude(load), name) if pulled else Unit(1.0, "")]
     fig = figure(5.8)
     titled(fig, result.title, _path_subject(result), *_path_verdict(result))
     axes = fig.add_subplot()
@@ -83,15 +82,15 @@ def _stretches(axes: Axes, result: PathResult, x: Array, y: Array) -> None:
     """The curve, each kind of it in its own look."""
     jump = np.array([event == "jump" for event in result.events[1:]], dtype=bool)
     stable, points = result.stable[:-1] & ~jump, np.column_stack([x, y])
-    kinds: tuple[tuple[Mask, str, dict[str, Any]], ...] = (
-        (stable, "stable", {"color": BLUE, "ls": "-", "lw": 2.4, "zorder": 3}),
-        (~stable & ~jump, "unstable", {"color": VERMILION, "ls": (0, (4, 2)), "lw": 1.5, "zorder": 2}),
-        (jump, "jump", {"color": GREY, "ls": ":", "lw": 2.2, "zorder": 2}),
-    )
-    for kind, name, look in kinds:
+
+    def draw(kind: Mask, **look: Any) -> None:
         if np.any(kind):
             pieces = list(np.stack([points[:-1], points[1:]], axis=1)[kind])
-            axes.add_collection(LineCollection(pieces, label=name, **look))
+            axes.add_collection(LineCollection(pieces, **look))
+
+    draw(stable, label="stable", color=BLUE, ls="-", lw=2.4, zorder=3)
+    draw(~stable & ~jump, label="unstable", color=VERMILION, ls=(0, (4, 2)), lw=1.5, zorder=2)
+    draw(jump, label="jump", color=GREY, ls=":", lw=2.2, zorder=2)
 
 
 def _marks(axes: Axes, result: PathResult, x: Array, y: Array, units: Sequence[Unit]) -> None:
@@ -162,8 +161,8 @@ def _strips(axes: Axes, rows: Sequence[Row], states: Sequence[Sequence[Row]]) ->
     for piece in np.unique(pieces).tolist():
         own, plain = pieces == piece, (_PIECES[piece % len(_PIECES)], f"piece {piece + 1} of the law")
         colour, words = _BESIDE.get(piece, plain)
-        look: dict[str, Any] = {"color": colour, "ec": "white", "lw": 0.8 if longest < 80 else 0.2, "label": words}
-        axes.bar(x[own], 0.52, 1.0, y[own] - 0.26, **look)
+        width = 0.8 if longest < 80 else 0.2
+        axes.bar(x[own], 0.52, 1.0, y[own] - 0.26, color=colour, ec="white", lw=width, label=words)
     if any(off := [vertex["contact"] == "0" for *_, vertex in vertices]):
         axes.hlines(y[off] + 0.34, x[off] - 0.5, x[off] + 0.5, color=INK, lw=3.0, label="lifted off")
     for i, row in enumerate(rows):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.tri import Triangulation
 
-from ...typing import Array, Integers, Mask
+from ...typing import Array, Integers, Mask, magnitude
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..solution_arrays import ContactPart
@@ -61,7 +60,7 @@ class Field:
     @property
     def unit(self) -> Unit:
         """Its unit, with the prefix that suits it."""
-        return unit_for(float(np.nanmax(np.abs(self.values), initial=0.0)), self.name)
+        return unit_for(magnitude(np.nan_to_num(self.values)), self.name)
 
 
 def _fields(result: Result, part: ContactPart) -> Iterator[Field]:
@@ -128,9 +127,8 @@ def _panel(axes: Axes, part: ContactPart, field: Field, length: Unit) -> None:
     s, values = part["s"] / length.size, field.values / field.unit.size
     axes.plot(s, values, color=field.colour, marker="o" if len(s) <= MARKED else "", ms=3.6)
     if field.kind == "slip" and part.drops.size:
-        look: dict[str, Any] = {"color": INK, "ls": (0, (4, 3)), "lw": 1.4, "zorder": 4}
         seen = axes.dataLim.frozen()
-        axes.plot(s, part.drops / field.unit.size, **look)
+        axes.plot(s, part.drops / field.unit.size, color=INK, ls=(0, (4, 3)), lw=1.4, zorder=4)
         axes.dataLim.set(seen)  # where no slip reaches a drop, it is out of sight
         axes.set_title(_drops_in_words(part.drops), loc="right", size=11.5, color=GREY)
     elif field.kind == "pressure":
@@ -159,14 +157,15 @@ def _maps(result: Result, part: ContactPart) -> Figure:
     panels[-1].set_xlabel(f"{flat.names[0]} in {flat.unit.name}")
     said = [*_drop_lines(panels[0], flat, part)]
     said += [f"grey: lifted, up to {quantity(part.largest_gap, 'm')}"] if part.idle.any() else []
-    fig.supxlabel("; ".join([*said, *([flat.how] if flat.how else [])]), size=12, color=GREY)
+    said += [flat.how] if flat.how else []
+    fig.supxlabel("; ".join(said), size=12, color=GREY)
     return fig
 
 
 def _map(fig: Figure, axes: Axes, flat: FlatPart, part: ContactPart, field: Field) -> None:
     """Values as colours, with a bar beside it, from zero; a field along the part as arrows too."""
     values = np.nan_to_num(field.values / field.unit.size)
-    largest = float(np.abs(values).max())
+    largest = magnitude(values)
     colours, low, high = pressure_scale(float(values.min()), largest)
     if field.kind != "pressure":
         colours, low = shades("#f4f4f1", field.colour), 0.0
@@ -192,11 +191,11 @@ def _arrows(axes: Axes, flat: FlatPart, vectors: Array) -> None:
     """Vectors at the vertices nearest to the nodes of a coarse grid, whatever the mesh."""
     spacing, unit = float(np.max(np.ptp(flat.points, axis=0))) / ARROWS, flat.unit.size
     shown = sparse(flat.points, spacing)
-    ways = vectors[shown] * 0.9 * spacing / (float(np.linalg.norm(vectors, axis=1).max()) or 1.0)
-    look: dict[str, Any] = {"units": "inches", "width": 0.016, "minlength": 0, "color": INK, "alpha": 0.85}
+    ways = vectors[shown] * 0.9 * spacing / (magnitude(np.linalg.norm(vectors, axis=1)) or 1.0)
     axes.quiver(
-        *flat.points[shown].T / unit, *ways.T / unit, angles="xy", scale_units="xy", scale=1.0, pivot="mid", **look
-    )
+        *flat.points[shown].T / unit, *ways.T / unit, angles="xy", scale_units="xy", scale=1.0, pivot="mid",
+        units="inches", width=0.016, minlength=0, color=INK, alpha=0.85,
+    )  # fmt: skip
 
 
 def _drop_lines(axes: Axes, flat: FlatPart, part: ContactPart) -> Iterator[str]:
@@ -210,7 +209,7 @@ def _drop_lines(axes: Axes, flat: FlatPart, part: ContactPart) -> Iterator[str]:
 
 def _drops_in_words(drops: Array) -> str:
     """Where a law drops, in words: at one slip, or at one for each vertex."""
-    least, most = float(np.abs(drops).min()), float(np.abs(drops).max())
+    least, most = float(np.abs(drops).min()), magnitude(drops)
     words = quantity(most, "m") if least == most else f"{quantity(least, 'm')} to {quantity(most, 'm')}"
     return f"the law drops (dashed) at {words}"
 
@@ -240,7 +239,7 @@ class FlatPart:
     @property
     def unit(self) -> Unit:
         """The unit of the coordinates."""
-        return unit_for(float(np.abs(self.points).max()), "m")
+        return unit_for(magnitude(self.points), "m")
 
     @property
     def mesh(self) -> Triangulation:

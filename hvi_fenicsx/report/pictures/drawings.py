@@ -173,9 +173,9 @@ def x_server(*, wanted: bool) -> Iterator[None]:
         return
     ready, told = os.pipe()
     display = f":{random.SystemRandom().choice(DISPLAYS)}"
-    size = ["-screen", "0", "640x480x24"]  # pictures are drawn beside the screen, whatever its size
     server = subprocess.Popen(
-        ["Xvfb", display, "-displayfd", str(told), *size, "-nolisten", "tcp", "-noreset"],
+        # pictures are drawn beside the screen, whatever its size
+        ["Xvfb", display, "-displayfd", str(told), "-screen", "0", "640x480x24", "-nolisten", "tcp", "-noreset"],
         pass_fds=[told],
         preexec_fn=processes.die_with_parent,
         stdin=subprocess.DEVNULL,

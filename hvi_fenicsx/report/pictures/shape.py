@@ -6,14 +6,14 @@ What acts on its sides is read from a result, on any mesh: regions, loads and su
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...geometry import chains
-from ...typing import Array, Integers
+from ...typing import Array, Integers, magnitude
 from ..body_mesh import BodyMesh
 from ..reader import Result
 from ..solution_arrays import ContactPart, LoadArrays
@@ -40,8 +40,8 @@ class DeformedBody:
 
     body: BodyMesh
     displacement: Array
-    factor: float = 1.0
-    stretch: Array = field(default_factory=lambda: np.ones(3))
+    factor: float
+    stretch: Array
 
     @cached_property
     def points(self) -> Array:
@@ -87,7 +87,7 @@ class PartGeometry:
     facets: Integers
     row: Integers
     obstacle: Array | None
-    between_bodies: bool = False
+    between_bodies: bool
 
     @property
     def pressure(self) -> Array:
@@ -120,7 +120,7 @@ def deform(body: BodyMesh, parts: Sequence[PartGeometry]) -> DeformedBody:
     """
     assert body.displacement is not None
     u, stretch = np.nan_to_num(body.displacement), _stretch(body)
-    largest = float(np.linalg.norm(u * stretch, axis=1).max(initial=0.0))
+    largest = magnitude(np.linalg.norm(u * stretch, axis=1))
     factor = max(1.0, round_below(VISIBLE * body.size / largest)) if largest > 0.0 else 1.0
     gap = max((float(np.nanmax(geometry.part["gap"], initial=0.0)) for geometry in parts), default=0.0)
     own_shape = factor * gap * stretch.max() > 3 * VISIBLE * body.size
@@ -149,7 +149,7 @@ def escaping(body: BodyMesh) -> tuple[Array, Array]:
     """
     mode = body.escape_mode
     assert mode is not None
-    moved = body.points + 3 * VISIBLE * body.size / (float(np.linalg.norm(mode, axis=1).max()) or 1.0) * mode
+    moved = body.points + 3 * VISIBLE * body.size / (magnitude(np.linalg.norm(mode, axis=1)) or 1.0) * mode
     far = body.outermost[sparse(body.points[body.outermost], body.size)]
     ways = np.stack([body.points[far], moved[far]], axis=1)
     lengths = np.linalg.norm(mode[far], axis=1)  # not the one that the body turns about
@@ -234,7 +234,7 @@ class LoadedSide:
     @property
     def largest(self) -> float:
         """The largest traction, N/m²."""
-        return float(np.linalg.norm(self.traction, axis=1).max())
+        return magnitude(np.linalg.norm(self.traction, axis=1))
 
     @property
     def value(self) -> str:
@@ -297,15 +297,9 @@ def roles_by_side(result: Result) -> Iterator[tuple[Side, Sequence[Mapping[str, 
     for name, own in result.arrays.sides.items():
         facets = body.oriented(own)
         lines = [np.column_stack([c[:-1], c[1:]]) for c in chains(facets)] if body.dimension == 2 else [facets]
-        for piece in lines:
-            if len(piece):
-                yield _side(name, body, piece), result.roles(name)
-
-
-def _side(name: str, body: BodyMesh, facets: Integers) -> Side:
-    """A line in the order of its edges, or a face with its vertices ascending."""
-    vertices = np.append(facets[:, 0], facets[-1, 1]) if body.dimension == 2 else np.unique(facets)
-    return Side(name, vertices, facets, body.normals(facets)[vertices])
+        for piece in (line for line in lines if len(line)):  # a line in the order of its edges
+            vertices = np.append(piece[:, 0], piece[-1, 1]) if body.dimension == 2 else np.unique(piece)
+            yield Side(name, vertices, piece, body.normals(piece)[vertices]), result.roles(name)
 
 
 def _traction(load: LoadArrays | None, side: Side) -> Array:

@@ -159,8 +159,10 @@ class SpaceCanvas(Canvas):
             points: its points there, m, (n, 3).
             ways: from and to, m, (j, 2, 3).
         """
-        look: dict[str, Any] = {"color": VERMILION, "opacity": 0.16, "lighting": False}
-        self._skin(body.points, points + self.nearer, body.boundary, width=4, edges=VERMILION, **look)
+        self._skin(
+            body.points, points + self.nearer, body.boundary, width=4, edges=VERMILION, color=VERMILION, opacity=0.16,
+            lighting=False,
+        )  # fmt: skip
         depths = ways[:, 0] @ self.toward
         self.follow(np.array([self.project(way) for way in ways[np.argsort(depths)[len(ways) > 1 :]]]))
 
@@ -189,11 +191,10 @@ class SpaceCanvas(Canvas):
         corner = self.axes.inset_axes((0.0, 0.0, 0.17, 0.17), zorder=8)
         corner.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), aspect="equal")
         corner.set_axis_off()
-        for name, (x, y) in zip("xyz", list[Array](self.project(np.eye(3))), strict=True):
+        ways: Any = self.project(np.eye(3)).tolist()
+        for name, way in zip("xyz", ways, strict=True):
             arrow = {"arrowstyle": "<|-", "color": GREY, "shrinkA": 0, "shrinkB": 0}
-            corner.annotate(
-                name, (0, 0), (float(x), float(y)), color=GREY, ha="center", va="center", size=11, arrowprops=arrow
-            )
+            corner.annotate(name, (0, 0), way, color=GREY, ha="center", va="center", size=11, arrowprops=arrow)
 
 
 def _view(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:

@@ -8,18 +8,19 @@ import numpy as np
 
 from ..certify.second_order import LOCAL_MINIMISER, NO_MINIMISER, UNDECIDED
 from ..certify.uniqueness import is_convex
+from ..equilibrium_search.condensed_form import scalar_problem
+from ..equilibrium_search.scalar_problem import ScalarProblem
+from ..equilibrium_search.search import Found, Keep, Saved, Task, find
+from ..equilibrium_search.stationarity import Kind, StationaryPoint, stationary_point
+from ..equilibrium_search.thresholds import LIMITS
 from ..errors import SolverError
 from ..reduced.condensation import Condensation
 from ..runtime.mpi import agree
 from ..solvers import frozen_mixity, obstacle_force
 from ..solvers.method import SolveResult
 from ..typing import Array, magnitude
-from ..workflow import Preparation, Solution, certified, finish
-from .condensed_form import scalar_problem
-from .scalar_problem import ScalarProblem
-from .search import Found, Keep, Saved, Task, find
-from .stationarity import Kind, StationaryPoint, stationary_point
-from .thresholds import LIMITS
+from .solution import Solution
+from .solving import Preparation, certified, finish
 
 NONE = Found(complete=True, proven=True, reason="no solution exists")
 """What is found where the load moves a body away."""
