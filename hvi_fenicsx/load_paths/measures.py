@@ -159,7 +159,7 @@ def _attributed(problem: Problem, parts: tuple[str, ...]) -> tuple[dict[str, Int
     free = np.ones(problem.space.dofmap.index_map.size_local * problem.dimension, dtype=np.bool_)
 
     def taken(found: Iterable[tuple[str, Entities | Integers]]) -> dict[str, Integers]:
-        """Of the unknowns of each part, those that none before it has."""
+        """The unknowns of each part that none before it has."""
         own: dict[str, list[int]] = {part: [] for part in parts}
         for part, dofs in found:
             here = dofs[dofs < len(free)]
