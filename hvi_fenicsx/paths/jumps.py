@@ -133,9 +133,11 @@ class Jump:
             standing, x = standing + 1 if stands else 0, branch.values.x
             anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
             back = move.outcome is StepEnd.FACTOR and branch.rising > 0.0  # else it has only set out, but for rounding
-            if back or anywhere:
-                stable = self._points.unstable_directions(branch.values) == 0
-                return self._landed(branch.z.copy(), branch.inverse()) if stable else None
+            passed = move.outcome is StepEnd.STEP and branch.factor > none and branch.rising > 0.0  # in the first step
+            if back or anywhere or passed:
+                z, inverse = (branch.balanced(0.0), None) if passed else (branch.z.copy(), branch.inverse())
+                stable = self._points.unstable_directions(self._points.values(z)) == 0
+                return self._landed(z, inverse) if stable else None
             if move.outcome is StepEnd.AWAY:
                 off = branch.stands and branch.factor < 0.0 and not self._held
                 return Landing(z=None) if off else None
