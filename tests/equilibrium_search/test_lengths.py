@@ -240,13 +240,10 @@ def glued() -> Table:
     }
 
 
+SMOOTHED = {"solver": {"smoothing": "chks", "epsilon": 0.05}}
 SCENES = [
     pytest.param(space(2), id="friction in space"),
-    pytest.param(
-        space(1) | {"solver": {"smoothing": "chks", "epsilon": 0.05}},
-        id="smoothed friction in space",
-        marks=pytest.mark.long,
-    ),
+    pytest.param(space(1) | SMOOTHED, id="smoothed friction in space", marks=pytest.mark.long),
     pytest.param(glued(), id="cohesion", marks=pytest.mark.long),
 ]
 

@@ -183,7 +183,7 @@ def _verdict(result: Result) -> tuple[str, str]:
     return "✗ NOT certified", VERMILION
 
 
-def save(fig: Figure, path: Path, caption: str) -> None:
+def save(fig: Figure, path: Path, caption: str = "") -> None:
     """Write a picture, whole or not at all; without an alpha channel, which nothing needs, it is a quarter smaller.
 
     Args:
@@ -197,6 +197,7 @@ def save(fig: Figure, path: Path, caption: str) -> None:
     canvas = FigureCanvasAgg(fig)
     canvas.draw()
     image, words = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"), PngInfo()
-    words.add_itxt(CAPTION, caption)
+    if caption:
+        words.add_itxt(CAPTION, caption)
     with writing.whole(path) as aside:  # more compression takes half as long again for a tenth of the size
         image.save(aside, "PNG", dpi=(DPI, DPI), compress_level=4, pnginfo=words)
