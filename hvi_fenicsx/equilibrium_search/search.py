@@ -224,7 +224,7 @@ def few_boxes(problem: ScalarProblem, stop: Callable[[], bool]) -> list[Stationa
     if not len(problem.lengths):
         search.start()
         search.run(enough, lambda _: None)
-    return sorted(by_energy(search.points), key=lambda point: point.kind is not Kind.MINIMISER)
+    return sorted(search.points, key=lambda point: (point.kind is not Kind.MINIMISER, point.energy))
 
 
 def _left_of_all(search: Enumeration, known: Iterable[Array]) -> Saved:

@@ -133,7 +133,8 @@ class Jump:
             standing, x = standing + 1 if stands else 0, branch.values.x
             anywhere = move.outcome is StepEnd.AWAY and abs(branch.factor) <= none
             back = move.outcome is StepEnd.FACTOR and branch.rising > 0.0  # else it has only set out, but for rounding
-            passed = move.outcome is StepEnd.STEP and branch.factor > none and branch.rising > 0.0  # in the first step
+            # it set out from its aim, which a long first step passes unseen
+            passed = move.outcome is StepEnd.STEP and branch.factor > none and branch.rising > 0.0
             if back or anywhere or passed:
                 z, inverse = (branch.balanced(0.0), None) if passed else (branch.z.copy(), branch.inverse())
                 stable = self._points.unstable_directions(self._points.values(z)) == 0
